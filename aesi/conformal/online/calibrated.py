@@ -10,7 +10,7 @@ from aesi.conformal.bands.band import Band
 from aesi.conformal.intervals import Intervals
 from aesi.conformal.online.records import checked_current, checked_record
 from aesi.conformal.online.scale import Scale
-from aesi.conformal.online.tracker import move, replay, scaled_band
+from aesi.conformal.online.tracker import begun, move, replay, scaled_band
 from aesi.errors import InputError
 from aesi.numerics.drive import N_RECENT
 from aesi.numerics.typing import Array, SavedState
@@ -106,7 +106,7 @@ class Stream:
         self._calibrated = calibrated
         self._past = _Tail(calibrated.window)
         self._currents = _Tail(N_RECENT - 1)
-        self._log_ratio = calibrated.scale.log_ratio.copy()
+        self._log_ratio = begun(calibrated.scale.log_ratio)
         self._pending: _Pending | None = None
 
     def interval(self, current_a: float | None = None) -> tuple[float, float]:
@@ -140,7 +140,7 @@ class Stream:
             return
         if pending.warm and calibrated.rate > 0:
             missed = error_v < low or error_v > high
-            move(self._log_ratio, pending.group, missed, calibrated.rate, calibrated.alpha)
+            move(self._log_ratio, pending.group, missed, pending.held, calibrated.rate, calibrated.alpha)
         self._past.append(error_v)
 
     def gap(self) -> None:
@@ -164,9 +164,9 @@ class Stream:
             current_a = None
         raw = calibrated.band.row(self._past.values, recent)
         if raw is None:
-            return _Pending(current_a, *calibrated.marginal_v, group, warm=False)
-        low, high = scaled_band(raw[0], raw[1], self._log_ratio[group], calibrated.floor_v)
-        return _Pending(current_a, low, high, group, warm=True)
+            return _Pending(current_a, *calibrated.marginal_v, group, held=False, warm=False)
+        low, high, held = scaled_band(raw[0], raw[1], self._log_ratio[group], calibrated.floor_v)
+        return _Pending(current_a, low, high, group, held, warm=True)
 
 
 @dataclass(frozen=True)
@@ -177,6 +177,7 @@ class _Pending:
     low: float
     high: float
     group: int
+    held: bool
     warm: bool
 
 

@@ -4,9 +4,19 @@
 
 r_g multiplies the half-width of the raw band about its middle; a group is a range of the current, so that
 coverage is held within each, not just on average. a = AIM alpha: on a record of some thousand samples the
-share of misses still scatters about a, and should fall below alpha more often than not. Whatever the residuals
-do, it is within |log r[n] - log r[0]| / (rate n) of a over n steps of one group: a long-run guarantee without
-assumptions.
+share of misses still scatters about a, and should fall below alpha more often than not.
+
+A step that the band would not follow is not taken, by its own group nor by the others: a hit where the band is held
+at its floor (r would go down for as long as a rest lasts, and that of all groups with it, and the drive that comes next
+be missed), and one that would lead r_g further beyond LOG_RATIO_LIMIT. Whatever the residuals do, of the n steps that
+were taken in group g, one of G,
+
+    share of misses - a = (D log r_g - shared / (1 + G shared) sum_h D log r_h) / (rate n)                   (2)
+
+with D the change over the record: (1) summed, and solved for the misses. As log r stays within a few times the limit,
+however groups push against each other, the share is a in the long run, without assumptions. Of all samples of a group
+it is no more, since what was not counted is hits, but at the upper limit, where misses are not counted either.
+
 The rate trades speed against jitter: after a rise of the error by a factor f the band has caught up after
 about log(f) / rate misses. rate = 0 leaves the calibrated band as it is.
 
@@ -32,26 +42,42 @@ AIM = 0.95
 """Share of alpha that is aimed at. On 1,000 draws of 3,000 normal residuals an aim of alpha covers less than 1 -
 alpha on 42 %, one of 0.95 alpha on none (docs/theory/conformal.md)."""
 LOG_RATIO_LIMIT = 7.0
-"""|log r| is held below this (a factor of 1,100): a sensor that is stuck for hours must not drive r to zero
-or infinity, from where it would take as long to come back."""
+"""No group takes a step of its own to |log r| beyond this (a factor of 1,100): a sensor that is stuck for hours must
+not drive r to zero or infinity, from where it would take as long to come back. Steps of other groups are taken there
+too: were they cut off one way alone, a group that always hits would give the other way back to all, and let them miss
+more."""
 
 
 @kept_njit()
-def move(log_ratio: Array, group: int, missed: bool, rate: float, alpha: float) -> None:
-    """Equation (1), one step, in place; log_ratio : (n_groups,)."""
+def move(log_ratio: Array, group: int, missed: bool, held: bool, rate: float, alpha: float) -> None:
+    """Equation (1), one step, in place; log_ratio : (n_groups,).
+
+    held : whether the sample's band was held at its floor.
+    """
+    if held and not missed:
+        return
     step = rate * ((1.0 if missed else 0.0) - AIM * alpha)
+    if abs(log_ratio[group] + SHARED * step + step) > max(LOG_RATIO_LIMIT, abs(log_ratio[group])):
+        return
     for g in range(log_ratio.size):
-        moved = log_ratio[g] + SHARED * step + (step if g == group else 0.0)
-        log_ratio[g] = min(max(moved, -LOG_RATIO_LIMIT), LOG_RATIO_LIMIT)
+        log_ratio[g] = log_ratio[g] + SHARED * step + (step if g == group else 0.0)
 
 
 @kept_njit()
-def scaled_band(low: float, high: float, log_ratio: float, floor: float) -> tuple[float, float]:
-    """The raw band scaled by r about its middle, at least `floor` wide."""
+def begun(start: Array) -> Array:
+    """(n_groups,) log r at the first sample, from that of the calibration, which is the log of zero where held-out
+    residuals lay in the middle of their bands: no step would lead back from there."""
+    return np.maximum(start, -LOG_RATIO_LIMIT)
+
+
+@kept_njit()
+def scaled_band(low: float, high: float, log_ratio: float, floor: float) -> tuple[float, float, bool]:
+    """The raw band scaled by r about its middle, at least `floor` wide; and whether it is held there."""
     middle = 0.5 * (low + high)
     half = 0.5 * max(abs(high - low), floor) * np.exp(log_ratio)
+    held = half <= 0.5 * floor
     half = max(half, 0.5 * floor)
-    return middle - half, middle + half
+    return middle - half, middle + half, held
 
 
 @kept_njit()
@@ -68,13 +94,13 @@ def replay(
 ) -> None:
     """Scale the raw bands in place along a record; a row that is not ready keeps its band.
 
-    low, high, residuals : (n,) V.  groups : (n,).  start : (n_groups,) log r at the first sample.
+    low, high, residuals : (n,) V.  groups : (n,).  start : (n_groups,) log r of the calibration.
     """
-    log_ratio = start.copy()
+    log_ratio = begun(start)
     for k in range(low.size):
         if not ready[k]:
             continue
-        low[k], high[k] = scaled_band(low[k], high[k], log_ratio[groups[k]], floor)
+        low[k], high[k], held = scaled_band(low[k], high[k], log_ratio[groups[k]], floor)
         if rate > 0 and np.isfinite(residuals[k]):
             missed = residuals[k] < low[k] or residuals[k] > high[k]
-            move(log_ratio, groups[k], missed, rate, alpha)
+            move(log_ratio, groups[k], missed, held, rate, alpha)

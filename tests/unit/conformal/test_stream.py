@@ -1,5 +1,6 @@
 import time
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -80,3 +81,16 @@ def test_pairs_of_levels_hold_the_nominal_share() -> None:
     levels = level_pairs(0.1, 5)
     np.testing.assert_allclose(levels[5:] - levels[:5], 0.9)
     np.testing.assert_allclose(level_pairs(0.1, 1), [0.05, 0.95])
+
+
+def test_a_rest_at_the_floor_is_streamed_as_it_is_replayed(calibrated) -> None:
+    rng = np.random.default_rng(4)
+    drive = 1e-4 * rng.standard_normal(400)
+    record = np.concatenate([drive[:200], np.full(600, drive[199]), drive[200:]])
+    fitted = replace(calibrated, floor_v=1e-4)
+    replay = fitted.intervals(record)
+    assert np.isclose(replay.width_v, fitted.floor_v, rtol=1e-9).mean() > 0.3
+    stream = fitted.stream()
+    for k, error in enumerate(record):
+        assert stream.interval() == (replay.lower_v[k], replay.upper_v[k])
+        stream.update(float(error))

@@ -10,12 +10,19 @@ from aesi.conformal.online.tracker import AIM, LOG_RATIO_LIMIT, SHARED, move, re
 ALPHA, RATE = 0.1, 0.05
 
 
-def run(residuals: np.ndarray, rate: float = RATE, groups: np.ndarray | None = None, n_groups: int = 1):
+def run(
+    residuals: np.ndarray,
+    rate: float = RATE,
+    groups: np.ndarray | None = None,
+    n_groups: int = 1,
+    floor: float = 1e-6,
+    start: float = 0.0,
+):
     n = len(residuals)
     low, high = np.full(n, -1.0), np.full(n, 1.0)
     ready = np.ones(n, dtype=bool)
     groups = np.zeros(n, dtype=np.int64) if groups is None else groups
-    replay(low, high, ready, residuals, groups, np.zeros(n_groups), rate, ALPHA, 1e-6)
+    replay(low, high, ready, residuals, groups, np.full(n_groups, start), rate, ALPHA, floor)
     return low, high, (residuals < low) | (residuals > high)
 
 
@@ -53,6 +60,73 @@ def test_a_stuck_sensor_neither_collapses_nor_explodes_the_band() -> None:
     assert high[-1] <= math.exp(LOG_RATIO_LIMIT)
 
 
+def test_the_drive_after_a_rest_is_covered_as_if_there_had_been_none(rng: np.random.Generator) -> None:
+    drive, rest = rng.standard_normal(1000), 3600
+    residuals = np.concatenate([drive[:500], np.zeros(rest), drive[500:]])
+    groups = np.concatenate([np.zeros(500), np.ones(rest), np.zeros(500)]).astype(np.int64)
+    # At rest the band is at its floor from the start: a hit there would narrow nothing but the bands of the drive.
+    low, high, _ = run(residuals, groups=groups, n_groups=2, floor=2.0, start=-1.0)
+    assert np.ptp(high[500 : 500 + rest]) == 0
+    drive_groups = np.zeros(1000, dtype=np.int64)
+    alone_low, alone_high, _ = run(drive, groups=drive_groups, n_groups=2, floor=2.0, start=-1.0)
+    assert (alone_high > 1).mean() > 0.5
+    np.testing.assert_array_equal(low[500 + rest :], alone_low[500:])
+    np.testing.assert_array_equal(high[500 + rest :], alone_high[500:])
+
+
+def test_a_band_comes_back_from_its_floor_after_one_miss() -> None:
+    _, high, _ = run(np.array([0.0] * 5000 + [5.0] + [0.0] * 3), floor=1.0)
+    assert high[5000] == 0.5
+    assert high[5001] > 0.5
+    assert high[5002] > 0.5
+
+
+def test_a_group_that_always_hits_does_not_let_another_miss_more(rng: np.random.Generator) -> None:
+    n = 200_000
+    groups = rng.integers(0, 2, n)
+    _, _, missed = run(np.where(groups == 1, 0.0, rng.standard_normal(n)), groups=groups, n_groups=2)
+    # Equation (2) with D log r of 7 at most over 100,000 steps at a rate of 0.05: within 0.002.
+    assert missed[groups == 0].mean() == pytest.approx(AIM * ALPHA, abs=0.002)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 10_000), st.integers(1, 7))
+def test_log_r_tells_the_share_of_misses_of_each_group(seed: int, n_groups: int) -> None:
+    """Equation (2), through floors and limits: of the steps that moved anything."""
+    rng = np.random.default_rng(seed)
+    log_ratio, misses, steps = np.zeros(n_groups), np.zeros(n_groups), np.zeros(n_groups)
+    often, held_often = rng.uniform(size=(2, n_groups))
+    for _ in range(3000):
+        group = int(rng.integers(n_groups))
+        missed, held = bool(rng.uniform() < often[group]), bool(rng.uniform() < held_often[group])
+        before = log_ratio.copy()
+        move(log_ratio, group, missed, held, RATE, ALPHA)
+        if not np.array_equal(log_ratio, before):
+            assert missed or not held
+            misses[group] += missed
+            steps[group] += 1
+    told = log_ratio - SHARED / (1 + SHARED * n_groups) * log_ratio.sum()
+    np.testing.assert_allclose(misses - AIM * ALPHA * steps, told / RATE, atol=1e-6)
+
+
+def test_groups_that_push_against_each_other_stay_within_a_few_times_the_limit(
+    rng: np.random.Generator,
+) -> None:
+    log_ratio, furthest = np.zeros(7), 0.0
+    for _ in range(500):
+        misses, active = rng.uniform(size=(2, 7)) < rng.uniform(size=(2, 1))
+        for group in rng.integers(0, 7, 200):
+            if active[group]:
+                move(log_ratio, int(group), bool(misses[group]), False, 0.5, 0.5)
+        furthest = max(furthest, float(np.abs(log_ratio).max()))
+    assert LOG_RATIO_LIMIT < furthest < 4 * LOG_RATIO_LIMIT
+
+
+def test_a_group_calibrated_on_constant_residuals_widens_after_misses() -> None:
+    _, high, _ = run(np.full(500, 5.0), start=-math.inf)
+    assert high[-1] > 5.0
+
+
 def test_each_group_is_held_at_the_level(rng: np.random.Generator) -> None:
     groups = rng.integers(0, 2, 20_000)
     residuals = np.where(groups == 1, 6.0, 1.0) * rng.standard_normal(20_000)
@@ -68,5 +142,5 @@ def test_a_missing_residual_moves_nothing() -> None:
 
 def test_move_reaches_other_groups_with_the_shared_part() -> None:
     log_ratio = np.zeros(2)
-    move(log_ratio, 0, True, RATE, ALPHA)
+    move(log_ratio, 0, True, False, RATE, ALPHA)
     np.testing.assert_allclose(log_ratio, RATE * (1 - AIM * ALPHA) * np.array([1 + SHARED, SHARED]))
