@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aesi.calibration.model import Model
+from aesi.calibration.parameters import Free
 from aesi.constants import MV_PER_V
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
@@ -221,10 +222,14 @@ def undetermined(model: Model, jacobian: Array) -> tuple[Open, ...]:
 
 
 def at_bounds(model: Model, x: Array) -> tuple[str, ...]:
-    """Names of the parameters that ended on a bound of their range."""
+    """Names of the parameters that ended on a bound of their range; nought is where a resistance may end."""
     width = BOUND_SHARE * (model.high - model.low)
     return tuple(
         f.name
         for j, f in enumerate(model.free)
-        if model.high[j] - x[j] < width[j] or (x[j] - model.low[j] < width[j] and f.low != 0.0)
+        if model.high[j] - x[j] < width[j] or (x[j] - model.low[j] < width[j] and not _nought(f, model.low[j]))
     )
+
+
+def _nought(free: Free, z: float) -> bool:
+    return abs(free.value(z)) < ROUND_OFF * free.sd

@@ -5,6 +5,7 @@ import warnings
 from copy import copy
 from dataclasses import replace
 from datetime import date
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,10 +13,10 @@ import pytest
 from aesi.calibration import calibrate
 from aesi.calibration.fit import problem
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
-from aesi.calibration.parameters import free_parameters
+from aesi.calibration.parameters import Free, free_parameters
 from aesi.calibration.posterior import sampled
 from aesi.calibration.records.conditions import Conditions, Prior
-from aesi.calibration.result import intervals
+from aesi.calibration.result import at_bounds, intervals
 from aesi.calibration.start import size_assumed, sized
 from aesi.errors import DataError, InputError
 from aesi.physics import simulate
@@ -292,6 +293,15 @@ def test_a_resistance_of_nought_was_written_as_what_round_off_left(found):
     told = intervals(found.model, x, found.covariance)["contact.resistance"]
     assert told.value == 0.0
     assert told.low == 0.0 < told.high
+
+
+def test_a_parameter_on_a_lower_bound_was_passed_over_where_its_kind_may_be_nought():
+    energy = Free("negative.rate_energy", 55e3, 12e3, "J/mol", "", low=0.0)
+    full = Free("negative.full_stoichiometry", 0.9, 0.015, "1", "", low=0.0)
+    contact = Free("contact.resistance", 0.01, 0.007, "ohm", "", low=0.0)
+    low, high = np.transpose([one.bounds for one in (energy, full, contact)])
+    model = SimpleNamespace(free=(energy, full, contact), low=low, high=high)
+    assert at_bounds(model, low) == (energy.name, full.name)
 
 
 def test_a_start_given_against_the_voltage_bent_the_file_with_no_more_than_a_note(start, records):
