@@ -227,7 +227,8 @@ def at_bounds(model: Model, x: Array) -> tuple[str, ...]:
     return tuple(
         f.name
         for j, f in enumerate(model.free)
-        if model.high[j] - x[j] < width[j] or (x[j] - model.low[j] < width[j] and not _nought(f, model.low[j]))
+        if model.high[j] - x[j] < width[j]
+        or (x[j] - model.low[j] < width[j] and not _nought(f, model.low[j]))
     )
 
 

@@ -1,6 +1,10 @@
 """Verdicts as pure functions of frozen evidence, the archive, and the map from margin to frequency."""
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -418,6 +422,46 @@ def test_fits_of_another_version_were_taken_for_this_one_s(path, monkeypatch):
     here = context_of(path.problem)
     monkeypatch.setattr("aesi.tracer.search.archive.source_digest", lambda: "another")
     assert context_of(path.problem) != here
+
+
+def _typed(text: str, **more: object):
+    """A function as typed into a session: no file holds it."""
+    names = {"__name__": "typed", **more}
+    exec(text, names)
+    return names["act"]
+
+
+@pytest.mark.parametrize(
+    "functions",
+    [
+        lambda: (partial(np.multiply, 1.0), partial(np.multiply, 2.0)),
+        lambda: (partial(np.full, shape=3), partial(np.full, shape=4)),
+        lambda: (_typed("act = lambda x: x * 1.1"), _typed("act = lambda x: x * 1.2")),
+        lambda: (_typed("act = lambda x: abs(x)"), _typed("act = lambda x: max(x)")),
+        lambda: tuple(_typed("def made(k):\n return lambda x: k * x\nact = made(k)", k=k) for k in (1, 2)),
+    ],
+)
+def test_an_archive_took_the_fits_of_an_effect_that_computes_something_else(functions):
+    effect = CATALOGUE["series_resistance"]
+    one, other = (identity(replace(effect, on_model=function)) for function in functions())
+    assert one != other
+
+
+def test_an_effect_that_was_typed_in_could_not_be_kept_and_is_the_same_in_every_process():
+    program = (
+        "from dataclasses import replace\nfrom aesi.physics.effects.catalogue import CATALOGUE\n"
+        "from aesi.tracer.search.archive import identity\n"
+        "def act(x):\n return (lambda y: y in {'a', 'b', 'c', 'd'})(x)\n"
+        "print(identity(replace(CATALOGUE['series_resistance'], on_model=act)))"
+    )
+    said = [
+        subprocess.run(
+            [sys.executable, "-c", program],
+            capture_output=True, text=True, check=True, env={**os.environ, "PYTHONHASHSEED": seed},
+        ).stdout
+        for seed in "12"
+    ]  # fmt: skip
+    assert said[0] == said[1]
 
 
 def test_an_archive_knows_an_effect_by_what_it_is(path, tmp_path):
