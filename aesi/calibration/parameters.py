@@ -48,7 +48,7 @@ class Free:
     given: bool = False
 
     def value(self, z: float) -> float:
-        """The value at a working coordinate."""
+        """The value at a working coordinate; beyond a bound of the range that of the bound."""
         if self.factor:
             return self.start * float(np.exp(self.sd * z))
         return min(max(self.start + self.sd * z, self.low), self.high)

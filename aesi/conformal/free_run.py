@@ -101,8 +101,8 @@ class FreeRunBands:
         records : the name of the record that each array is of, where several are of one (its rows numbered alike): no
         piece is scored by a scale that is fitted to its own rows under another model. By default each is of its own.
 
-        Raises InputError for arrays that do not match, FitError for too few pieces, or none that shares no row with one,
-        and for errors all zero.
+        Raises InputError for arrays that do not match, FitError for too few pieces, or none that shares no row with
+        one, and for errors all zero.
         """
         if not errors_by_horizon:
             raise InputError("no horizon to calibrate; give errors for at least one.")
@@ -229,7 +229,7 @@ class FreeRunBands:
         return -half, half
 
 
-def _check_lengths(lengths: Sequence[int], **given: Sequence[Array | None] | None) -> None:
+def _check_lengths(lengths: Sequence[int], **given: Sequence[Array | BoolArray | None] | None) -> None:
     for name, arrays in given.items():
         if arrays is None:
             continue

@@ -77,6 +77,17 @@ def test_the_state_of_health_holds_the_true_one_within_its_intervals(found, trut
     assert high - low < 0.5 * true.capacity_ah
 
 
+def test_what_ended_on_its_upper_bound_was_taken_for_known_in_the_state_of_health(found):
+    at = [free.name for free in found.model.free].index("negative.full_stoichiometry")
+    width = []
+    for inside in (0.0, 0.1):
+        x = found.x.copy()
+        x[at] = found.model.high[at] - inside
+        low, high = health_intervals(replace(found, x=x))["inventory_ah"]
+        width.append(high - low)
+    assert width[0] == pytest.approx(width[1], rel=1e-2)
+
+
 def test_the_size_of_a_cell_is_said_to_be_the_files_where_no_record_is_a_full_discharge(found, records):
     whole = Measurement([0.0, 1800.0, 3600.0], [5.0, 5.0, 5.0], [4.15, 3.6, 2.6], name="whole")
     assert "size of the cell is taken from the start file, 5.15 Ah" in found.size_assumed
