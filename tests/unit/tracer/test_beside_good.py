@@ -175,3 +175,6 @@ def test_what_leaves_more_than_the_good_records_has_to_say_it_at_that_error(monk
     monkeypatch.setattr("aesi.tracer.decide.beside.look_alikes", lambda *given: ((), 1.0))
     verdict = judged_beside(path, Thresholds())
     assert (verdict.word, verdict.effects) == ("unknown", named)
+    # Without a name the confidence of `unknown` is read off the logarithm of what is left over what may be, 8 over 4 mV
+    # and what two records of a million rows each differ by.
+    assert verdict.margin == (1.0 if named else pytest.approx(np.log(2.0), abs=2e-3))
