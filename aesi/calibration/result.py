@@ -169,7 +169,7 @@ def _stand_ins(model: Model, x: Array) -> tuple[str, ...]:
 
 
 def information_weights(model: Model, x: Array) -> Array:
-    """(rows + frequencies + n,) factors on `Model.residual` that make it count as much as it says of its own.
+    """(rows + 2 frequencies + n,) factors on `Model.residual` that make it count as much as it says of its own.
 
     What is left of a record after the fit repeats itself: n rows of first autocorrelation rho are as many as
     n (1 - rho)/(1 + rho).

@@ -17,10 +17,10 @@ from aesi.numerics.typing import Array, BoolArray, IntArray, SavedState
 WHOLE_DRIVE = math.inf
 """The horizon of a prediction from the start of a record to its end."""
 N_PIECES = 8
-"""Records that hold more than an eighth of the usable rows are cut into pieces of about that length, so that each piece
-can be scored by a scale fitted to the others. Over the development splits in `aesi bench splits` the bands of AESI I
-score 46.1 mV on the NMC drive with 8 and 16, 47.7 mV with 4, and cover 96.3 % of the LG M50T's with 4 and 8, 66.9 %
-with 16."""
+"""Records that hold an eighth of the usable rows one and a half times or more are cut into pieces of about that length,
+so that each piece can be scored by a scale fitted to the others. Over the development splits in `aesi bench splits` the
+bands of AESI I score 46.1 mV on the NMC drive with 8 and 16, 47.7 mV with 4, and cover 96.3 % of the LG M50T's with 4
+and 8, 66.9 % with 16."""
 MIN_PIECES = 3
 """Least pieces of a band, since fewer cannot say how much one differs from the next. Where the rows inside the trained
 range give fewer, all rows are used and the band is marked `extrapolated`; where these do too, there is none. With 6 no
