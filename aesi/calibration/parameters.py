@@ -67,7 +67,7 @@ RATE_SD, SALT_SD = 0.8, 0.35
 CONTACT_V = 0.03
 """V at 1C: what contacts (tabs, collectors, can) are taken to drop, and the prior's deviation: a convention. It was
 chosen after the 12 mohm that pulses at four temperatures gave of a Panasonic NCR18650PF (35 mV at its 2.9 Ah); the file
-that they calibrate has 15.4 mohm by now, where 0.03 V are 10.7. From nought, which no cell has, a fit at one temperature
+that they calibrate has 15.4 mohm now, where 0.03 V are 10.7. From nought, which no cell has, a fit at one temperature
 takes films for contacts, and films grow in the cold: of that cell's pulses at 0 and -10 degC a file of its C/20, 1C
 discharge and a drive at 25 degC then misses 70 and 137 mV, from here 55 and 112, both with films of 60 kJ/mol.
 In `aesi bench calibrate --set evaluations=8`, whose truth has contacts of 8 mohm, it finds 5.6 [1.7, 9.5] mohm, with

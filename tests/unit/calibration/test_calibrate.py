@@ -14,7 +14,7 @@ from aesi.calibration import calibrate
 from aesi.calibration.fit import problem
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.parameters import Free, free_parameters
-from aesi.calibration.posterior import sampled
+from aesi.calibration.posterior import PosteriorSamples, sampled
 from aesi.calibration.records.conditions import Conditions, Prior
 from aesi.calibration.result import at_bounds, intervals
 from aesi.calibration.start import size_assumed, sized
@@ -222,6 +222,12 @@ def test_the_posterior_says_how_far_the_linear_intervals_were_off(found):
     assert "times as wide as the linear ones" in posterior.sentence
     assert "too short" in posterior.sentence
     assert posterior.accepted > 0.05
+
+
+def test_a_posterior_kept_to_itself_that_it_takes_losses_between_days_to_be_linear():
+    posterior = PosteriorSamples(np.zeros((1, 1)), {}, {"negative.rate": 1.1}, 0.2, 5.0)
+    assert "losses" not in posterior.sentence
+    assert "losses between dated records are taken to be linear" in replace(posterior, dated=True).sentence
 
 
 def test_a_posterior_of_too_few_samples_is_refused(found):
