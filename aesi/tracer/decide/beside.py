@@ -76,7 +76,7 @@ def judged_beside(path: Path, thresholds: Thresholds) -> Verdict:
 
 def left_v(path: Path, one: FittedHypothesis, rows: BoolArray) -> float:
     """What a hypothesis leaves beyond noise of some rows, in blocks that it has not seen, V RMS."""
-    return beyond(rms(held_out_residual(path.blocks, one)[rows]), path.problem.noise_v)
+    return beyond(rms(held_out_residual(path.blocks, one)[rows]), rms(path.problem.white_v[rows]))
 
 
 def _relative_sd(problem: InverseProblem, good: BoolArray) -> float:
