@@ -59,12 +59,14 @@ class RefittedForest:
     ) -> RefittedIntervals:
         """Take up the end of the calibration residuals, one (n_i,) array a record, V; the current is not used.
 
-        Raises InputError as `Method.fit`, FitError where the longest record holds fewer than two windows.
+        Raises InputError as `Method.fit`, FitError where no record holds two windows without a gap.
         """
         self.check(alpha, window)
         records = checked_records(residuals)
-        finite = [record[np.isfinite(record)] for record in records]
-        longest = max(finite, key=len, default=np.empty(0))
+        runs = [
+            record[rows] for record in records for rows in np.ma.clump_unmasked(np.ma.masked_invalid(record))
+        ]
+        longest = max(runs, key=len, default=np.empty(0))
         if len(longest) < 2 * window:
             raise FitError(
                 f"{self.name} has {len(longest)} calibration residuals in a row and needs {2 * window}; give a "
