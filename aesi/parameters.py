@@ -31,18 +31,23 @@ class Spread:
 class Parameter:
     """One scalar parameter.
 
-    `default` is the value at which an effect is typically seen; `neutral` is the value at which it vanishes
-    (None where it has none). `log` asks for a search on a logarithmic scale. `expected` is the standard deviation
-    of its distance from neutral (or from the default; of the logarithm where `log`) where small ones are likelier
-    than large ones, None where all within bounds are alike. It and `spread` go with the capacity to the power of
-    `capacity_power`, and are those of a cell of one ampere-hour: of a current 1, of a resistance -1. `even` says that
-    the voltage moves with its square, as with a standard deviation, which a fit then moves: from nought it could not
-    move the parameter itself. `linear` says that the voltage is all but linear in it, so that a fit need not take its
-    slope anew at every step. `low_is_limit` says that the lower bound stands for nought, which a logarithmic scale does
-    not reach: to end there is a value like others, and nought itself may be given. `spread` says by how much cell files
-    are off in it, so that a hypothesis about something else may move it by that much. `counted` says how a value stands
-    to what the cell file declares of the same: by itself, `added` to it, or a `share` of it. `shift_of` names what it
-    is a shift of, as a discovery writes that with its unit (`declared_degc`); empty where it is none.
+    default : the value at which an effect is typically seen.
+    bounds : the least and the greatest value, in `unit`; source : where they are from.
+    log : a search goes on a logarithmic scale.
+    even : the voltage moves with its square, as with a standard deviation. A fit then moves the square: from nought it
+    could not move the parameter itself.
+    neutral : the value at which an effect vanishes, None where it has none.
+    expected : standard deviation of the distance from neutral (or from the default; of the logarithm where `log`)
+    where small ones are likelier than large ones, None where all within bounds are alike.
+    capacity_power : the power of the capacity that `expected` and `spread`, which are those of a cell of one
+    ampere-hour, go with: of a current 1, of a resistance -1.
+    linear : the voltage is all but linear in it, so that a fit need not take its slope anew at every step.
+    low_is_limit : the lower bound stands for nought, which a logarithmic scale does not reach. To end there is a value
+    like others, and nought itself may be given.
+    spread : by how much cell files are off in it, so that a hypothesis about something else may move it by that much.
+    counted : how a value stands to what the cell file declares of the same: by itself, `added` to it, or a `share` of
+    it.
+    shift_of : what it is a shift of, as a discovery writes that with its unit (`declared_degc`); empty where of none.
     """
 
     default: float

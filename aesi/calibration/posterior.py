@@ -69,7 +69,7 @@ def check_posterior(steps: int) -> None:
     if not steps:
         return
     if find_spec("emcee") is None:
-        raise InputError("--posterior needs emcee: pip install 'aesi[posterior]'.")
+        raise InputError("--posterior needs emcee: pip install emcee.")
     if steps < FEWEST_STEPS:
         raise InputError(
             f"--posterior {steps}: at least {FEWEST_STEPS} samples of each walker, some hundreds to be of use."

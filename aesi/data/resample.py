@@ -115,16 +115,26 @@ def run_within(rows: int, most: int) -> int:
 
 
 def in_runs(measurement: Measurement, run: int) -> Measurement:
-    """`decimate` by the number of rows in each run; itself where that is one."""
+    """`decimate` by the number of rows in each run; itself where that is one.
+
+    The averages hold since the row before, whatever the rows did: a current that was declared to run straight between
+    them is declared so from then on, which keeps the charge.
+    """
     if run == 1:
         return measurement
     n = len(measurement)
     left = (n - 1) % run
     last = "the last row, no whole run, was" if left == 1 else f"the last {left} rows, no whole run, were"
-    note = f"Decimated from {n:,} to {{rows:,}} rows: runs of {run} rows, {{how}}" + (
-        f"; {last} left out." if left else "."
-    )
-    return _onto(measurement, measurement.time_s[::run], note, "backward")
+    straight = measurement.hold == "linear"
+    note = f"Decimated from {n:,} to {{rows:,}} rows: runs of {run} rows, {{how}}"
+    note += ", over which the current is constant from here on" if straight else ""
+    note += f"; {last} left out." if left else "."
+    stamps = measurement.time_s[::run]
+    few = _onto(measurement, stamps, note, "backward")
+    if not straight:
+        return few
+    current = BetweenStamps(measurement.time_s, stamps).linear(measurement.current_a)
+    return replace(few, current_a=current, hold="backward")
 
 
 def _onto(measurement: Measurement, stamps: Array, note: str, hold: Hold) -> Measurement:

@@ -127,10 +127,10 @@ class Averaged(Measurement):
 
 
 def averaged_over(data: Measurement, step_s: float) -> Measurement:
-    """At most one sample in `step_s`: centred averages of current, voltage and temperature.
+    """About one sample in `step_s`: centred averages of current, voltage and temperature over so many rows as are
+    nearest to it at the median interval.
 
-    Records sampled more slowly than 0.75 of `step_s` on average, and those shorter than a window, are returned as they
-    are.
+    Records of which that is less than two rows, and those no longer than one window, are returned as they are.
     """
     if len(data) < 2:
         return data

@@ -61,8 +61,10 @@ def impedance(
     """Impedance of `cell` at rest.
 
     frequency_hz : (n,) Hz, positive.  soc : state of charge by the declared windows; where an effect moved these, the
-    cell rests at the same voltage in the new ones, as in `simulate`.  effects : as there; of one that acts on the
-    voltage, what it answers to a current at once.  model : as there, "espm" unless another is named.
+    cell rests at the same voltage in the new ones, as in `simulate`.  temperature_degc : of the whole cell, 25 unless
+    given, whatever its file declares.  effects : as in `simulate`; of one that acts on the voltage, what it answers to
+    a current at once. A fault of the instruments that write a record is none of the cell, and leaves Z as it is.
+    model : as there, "espm" unless another is named.
     Returns (n,) ohm, complex; the imaginary part is negative where capacitive.
     Raises DataError for frequencies or a state that have none, InputError for what is no Cell, no effect, no state of
     charge or no temperature of a cell.

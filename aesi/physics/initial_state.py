@@ -26,7 +26,7 @@ from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.rest.open_circuit import CHARGED_V, GIVEN_SD, READING_V, OpenCircuit
-from aesi.physics.rest.voltage import first_rows_v, freed_of_instruments
+from aesi.physics.rest.voltage import first_rows_v, freed_of_instruments, freed_of_series
 from aesi.physics.simulation import ModelName, model_with
 from aesi.physics.start.load import FLOWED_S, LoadedStart
 from aesi.physics.start.relaxing import Rest, resting_rows, settled_voltage
@@ -145,51 +145,58 @@ class _Start:
     def _at_rest(self) -> InitialState:
         capacity_ah = self.cell.capacity_ah
         rest = resting_rows(self.record, REST_C_RATE * capacity_ah, ONE_STATE * capacity_ah, self.hold)
-        begins = first_rows_v(rest.rows.voltage_v)
-        read = freed_of_instruments(self.model, self.effects, begins)
-        if self.open_circuit.charged(read):
-            return self._full(read, f"rests at {begins:.3f} V", begins)
-        voltage, sd_v = settled_voltage(self.open_circuit, rest.rows, self.model_name)
-        true = freed_of_instruments(self.model, self.effects, voltage)
-        moved = rest.rows.charge_ah / capacity_ah  # before it, the cell was as much fuller and higher
-        higher_v = self._rise_v(true, moved)
-        unlike = [READING_V, sd_v, *([self._long_drop_v(rest, true), higher_v] if rest.flows else ())]
-        spread = float(np.linalg.norm(unlike))
-        soc, sd = self.open_circuit.reading(true, spread)
-        soc, low, high = (end + moved for end in (soc, *self.open_circuit.ends(true, spread)))
-        words = f"{self.record.name} rests at {begins:.3f} V"
-        if max(abs(voltage - begins), sd_v) > READING_V:
-            words += f", relaxing to {voltage:.3f} +/- {sd_v:.3f} V"
-        words += f": state of charge {soc:.4f} +/- {sd:.4f}"
-        if sd > OTHER_STATE:
-            words += "; give --soc0 if it is known"
+        begins_v = first_rows_v(rest.rows.voltage_v)
+        terminal_v = freed_of_instruments(self.model, self.effects, begins_v)
+        if self.open_circuit.charged(terminal_v):
+            return self._full(terminal_v, f"rests at {begins_v:.3f} V", begins_v)
+        settled_v, settled_sd_v = settled_voltage(self.open_circuit, rest.rows, self.model_name)
+        ocv_v = self._freed_of_series(freed_of_instruments(self.model, self.effects, settled_v))
+        # Before what these rows move, the cell was as much fuller and higher.
+        moved = float(rest.rows.discharged_ah(self.hold)[-1]) / capacity_ah
+        ocv_rise_before_v = self._rise_v(ocv_v, moved)
+        voltage_sds_v = [READING_V, settled_sd_v]
+        if rest.flows:
+            voltage_sds_v += [self._long_drop_v(rest, ocv_v), ocv_rise_before_v]
+        spread_v = float(np.linalg.norm(voltage_sds_v))
+        soc, sd = self.open_circuit.reading(ocv_v, spread_v)
+        low, high = self.open_circuit.ends(ocv_v, spread_v)
         return InitialState(
-            self._declared(soc),
+            self._declared(soc + moved),
             sd,
             "rest",
-            words + ".",
-            rest_voltage_v=voltage + higher_v,
-            ends=(self._declared(low), self._declared(high)),
+            self._rest_words(begins_v, settled_v, settled_sd_v, soc + moved, sd),
+            rest_voltage_v=settled_v + ocv_rise_before_v,
+            ends=(self._declared(low + moved), self._declared(high + moved)),
         )
 
-    def _rise_v(self, true_v: float, moved: float) -> float:
-        """V that the open-circuit voltage lay above `true_v` before `moved` of the charge had flowed."""
-        soc = self.open_circuit.soc_at(true_v)
+    def _rest_words(
+        self, begins_v: float, settled_v: float, settled_sd_v: float, soc: float, sd: float
+    ) -> str:
+        words = f"{self.record.name} rests at {begins_v:.3f} V"
+        if max(abs(settled_v - begins_v), settled_sd_v) > READING_V:
+            words += f", relaxing to {settled_v:.3f} +/- {settled_sd_v:.3f} V"
+        words += f": state of charge {soc:.4f} +/- {sd:.4f}"
+        return f"{words}{'; give --soc0 if it is known' if sd > OTHER_STATE else ''}."
+
+    def _rise_v(self, ocv_v: float, moved: float) -> float:
+        """V that the open-circuit voltage lay above `ocv_v` before `moved` of the charge had flowed."""
+        soc = self.open_circuit.soc_at(ocv_v)
         return self.open_circuit.voltage_at(soc + moved) - self.open_circuit.voltage_at(soc)
 
-    def _long_drop_v(self, rest: Rest, true_v: float) -> float:
+    def _long_drop_v(self, rest: Rest, ocv_v: float) -> float:
         """V that the model drops by a current below that of a load once it has flowed for long.
 
-        true_v : that the rows seem to relax to.
+        ocv_v : that the rows seem to relax to.
         Not for rows that a load ends sooner, which are of a cell that rested: by what C/58 drops once it has flowed for
         long, three drives of a Panasonic at -20 degC would start within 0.05 instead of 0.0009.
         """
-        return self.load.drop(true_v, float(rest.rows.current_a.mean()), FLOWED_S[-1])
+        return self.load.drop(ocv_v, float(rest.rows.current_a.mean()), FLOWED_S[-1])
 
     def _under_load(self) -> InitialState:
-        first = freed_of_instruments(self.model, self.effects, float(self.record.voltage_v[0]))
+        terminal = freed_of_instruments(self.model, self.effects, float(self.record.voltage_v[0]))
+        first = self._freed_of_series(terminal, self.current_a)
         drops = [self.load.drop(first, self.current_a, before_s) for before_s in FLOWED_S]
-        begun = first + drops[0]
+        begun = terminal + drops[0]
         said = f"starts under {self.current_a:.3g} A at {self.record.voltage_v[0]:.3f} V"
         if self.open_circuit.charged(begun, drops[0]):
             words = (
@@ -204,9 +211,13 @@ class _Start:
         )
         return InitialState(self._declared(soc), sd, "load", words)
 
+    def _freed_of_series(self, terminal_v: float, current_a: float = 0.0) -> float:
+        return freed_of_series(self.open_circuit, self.model, self.effects, terminal_v, current_a)
+
     def _full(self, true_v: float, how: str, rest_v: float | None, drop_v: float = 0.0) -> InitialState:
-        """drop_v : of `true_v`, what the model adds to the voltage as it was read."""
-        inside, sd = self.open_circuit.soc_at(true_v), self.open_circuit.full_sd(true_v)
+        """true_v : at the terminals.  drop_v : of it, what the model adds to the voltage as it was read."""
+        ocv_v = self._freed_of_series(true_v)
+        inside, sd = self.open_circuit.soc_at(ocv_v), self.open_circuit.full_sd(ocv_v)
         above_v = true_v - self.cell.upper_voltage_v
         near = f"within {1e3 * CHARGED_V:.0f} mV of"
         doubt = ""

@@ -28,8 +28,8 @@ from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Record, Trace, as_cell_saw, check_states
 from aesi.physics.espm.plain import run_plain
 from aesi.physics.model import EspmModel
-from aesi.physics.rest.open_circuit import initial_soc
-from aesi.physics.rest.voltage import freed_of_instruments
+from aesi.physics.rest.open_circuit import OpenCircuit
+from aesi.physics.rest.voltage import freed_of_instruments, freed_of_series
 from aesi.records import Hold, Run
 from aesi.records.checked import check_row, check_times, numbers
 
@@ -302,11 +302,12 @@ def _kelvin(temperature_degc: Numbers | None, time: Array) -> Array | None:
 def _soc_from_rest(
     model: EspmModel, effects: Sequence[ActiveEffect], kelvin: Array | None, rest_voltage_v: float | None
 ) -> float:
-    """State of charge from the rest voltage at the first temperature, freed of what instrument faults add to it."""
+    """State of charge from the rest voltage at the first temperature, freed of what effects add to it."""
     if rest_voltage_v is None:
         raise DataError("give soc0, or rest_voltage_v measured at rest before the record.")
-    true_v = freed_of_instruments(model, effects, rest_voltage_v)
-    return initial_soc(model.cell, true_v, None if kelvin is None else float(kelvin[0]))
+    terminal_v = freed_of_instruments(model, effects, rest_voltage_v)
+    open_circuit = OpenCircuit(model.cell, None if kelvin is None else float(kelvin[0]))
+    return open_circuit.soc_at_rest(terminal_v, freed_of_series(open_circuit, model, effects, terminal_v))
 
 
 def _series(cell: Cell, rows: Array) -> dict[str, Array]:

@@ -92,7 +92,7 @@ def calibrate_files(
     read = [note for m in measurements for note in m.notes]
     content = calibration_content(found, [*effects_left(given), *read, *told], posterior, spectra)
     cell_file, data, text, page = calibration_files(out)
-    write_whole(cell_file, json.dumps(found.cell.to_bpx(), indent=1) + "\n")
+    write_whole(cell_file, json.dumps(found.cell.to_bpx(), indent=1, allow_nan=False) + "\n")
     write_whole(data, json.dumps(content, indent=1, allow_nan=False) + "\n")
     write_whole(text, to_text(content))
     _write_page(page, found, content, spectra)

@@ -149,7 +149,7 @@ def _options_of(cell: Cell, active: ActiveEffect) -> _Pybamm | None:
 
 
 def _bpx(cell: Cell) -> str:
-    return json.dumps(cell.to_bpx(), indent=1) + "\n"
+    return json.dumps(cell.to_bpx(), indent=1, allow_nan=False) + "\n"
 
 
 def _said(effect: ActiveEffect) -> str:

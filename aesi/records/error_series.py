@@ -96,8 +96,8 @@ class FreeRun:
     error_v : (n,) V, the predicted error; held at its last value inside the range after a divergence.
     diverged_at : the first sample at which the prediction left ten times the trained range, or None.
     outside : (n,) True where an input lies outside the range the model was trained on.
-    excess : (n,) how far the sample lies from what the model was fitted to, 0 where not at all: of its leverage, in
-    units of that of the fitted rows (`aesi.sparse.leverage`); None where the model cannot tell.
+    excess : (n,) how far the sample lies from what the model was fitted to, 0 where not at all: of the root of its
+    leverage, in units of that of the fitted rows (`aesi.sparse.leverage`); None where the model cannot tell.
     """
 
     error_v: Array

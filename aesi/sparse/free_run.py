@@ -11,7 +11,7 @@ import numpy as np
 
 from aesi.numerics.compiled import kept_njit
 from aesi.numerics.typing import Array, BoolArray, IntArray
-from aesi.sparse.terms.basis import FUNCTIONS, clipped_values, slope, value
+from aesi.sparse.terms.basis import FUNCTIONS, clipped_values, value
 
 LIMIT = 10.0
 """A prediction beyond this many times the trained half-range counts as diverged."""
@@ -101,20 +101,6 @@ def ahead(drive: Array, functions: IntArray, measured: Array, steps: int, clip: 
     return out
 
 
-@kept_njit()
-def gains(drive: Array, functions: IntArray, measured: Array, clip: bool) -> Array:
-    """(n,) the slope of e'[k] -> e'[k + 1] at each measured error; above one the map amplifies."""
-    n = drive.shape[1]
-    out = np.zeros(n)
-    for k in range(n):
-        x = measured[k]
-        if clip and abs(x) > 1.0:
-            continue
-        for q in range(len(functions)):
-            out[k] += slope(functions[q], x) * drive[q, k]
-    return out
-
-
 def remember(given: Array, memory: float, start: float) -> Array:
     """Free run of a model without feedback: (n,) what the inputs give, and what is left of the first error.
 
@@ -132,11 +118,12 @@ def remember_ahead(given: Array, memory: float, measured: Array, steps: int) -> 
     return np.asarray(given + memory ** (samples - known) * left[known])
 
 
-def held(scaled: Array) -> tuple[Array, int]:
-    """The series with its last value inside LIMIT held from the first beyond it; and where that is, or -1."""
+def held(scaled: Array, start: float) -> tuple[Array, int]:
+    """The series, which comes after `start`, with its last value inside LIMIT held from the first beyond it; and where
+    that is, or -1."""
     beyond = np.flatnonzero(~(np.abs(scaled) <= LIMIT))
     if not len(beyond):
         return scaled, -1
     first = int(beyond[0])
-    last = scaled[first - 1] if first else 0.0
+    last = scaled[first - 1] if first else start
     return np.append(scaled[:first], np.full(len(scaled) - first, last)), first

@@ -1,6 +1,6 @@
 """How far a sample lies from those that a regression was fitted to: its leverage.
 
-    h(x)**2 = theta(x)' (Theta' W Theta + lambda1 1)^-1 theta(x)                                         (1)
+    h(x)**2 = theta(x)' (Theta' W Theta + lambda1 1)^-1 theta(x), the leverage                           (1)
     excess  = max(h / h_u - 1, 0),     h_u the upper quartile of h over the training rows                 (2)
 
 h is, in units of the noise, the standard error of the fitted value at x. It sees what the ranges of the inputs do
@@ -21,17 +21,17 @@ from aesi.numerics.typing import Array
 from aesi.sparse.stridge import triangle
 
 UPPER_QUARTILE = 0.75
-"""Of the leverage of the fitted rows: above it a row lies at their edge."""
+"""Of h at the fitted rows: above it a row lies at their edge."""
 LEAST_RIDGE = 1e-12
 """Of the largest squared diagonal: collinear terms and no ridge leave directions without any information."""
 
 
 @dataclass(frozen=True, eq=False)
 class Leverage:
-    """root : (m, m) upper triangle R with R'R the matrix inverted in (1).  typical : h_u of (2)."""
+    """root : (m, m) upper triangle R with R'R the matrix inverted in (1).  upper_quartile : h_u of (2)."""
 
     root: Array
-    typical: float
+    upper_quartile: float
 
     @classmethod
     def of(cls, factor: Array, lambda1: float, theta: Array) -> Self:
@@ -39,15 +39,15 @@ class Leverage:
         top = float(np.max(np.sum(factor**2, axis=0)))
         ridge = np.sqrt(max(lambda1, LEAST_RIDGE * top)) * np.eye(len(theta))
         root = triangle(np.vstack([factor, ridge]))
-        return cls(root, float(np.quantile(_height(root, theta), UPPER_QUARTILE)))
+        return cls(root, float(np.quantile(_standard_error(root, theta), UPPER_QUARTILE)))
 
     def excess(self, theta: Array) -> Array:
         """(n,) of (2), >= 0; theta : (m, n)."""
-        return np.asarray(np.maximum(_height(self.root, theta) / self.typical - 1.0, 0.0))
+        return np.asarray(np.maximum(_standard_error(self.root, theta) / self.upper_quartile - 1.0, 0.0))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values and an array."""
-        return {"root": self.root, "typical": self.typical}
+        return {"root": self.root, "typical": self.upper_quartile}
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Self:
@@ -55,5 +55,6 @@ class Leverage:
         return cls(np.asarray(data["root"], dtype=float), float(data["typical"]))
 
 
-def _height(root: Array, theta: Array) -> Array:
+def _standard_error(root: Array, theta: Array) -> Array:
+    """(n,) h of (1), the root of the leverage: standard error of the fitted value over that of the noise."""
     return np.asarray(np.linalg.norm(solve_triangular(root, theta, trans="T"), axis=0))

@@ -136,14 +136,6 @@ class SparseModel:
             return np.ones(len(series))
         return self.fade.kept(*self._place(self._variables(series), series))
 
-    def gain(self, series: ErrorSeries) -> Array:
-        """(n,) slope of the map e[k] -> e[k + 1] along a record; stable where its size is below one."""
-        if not self.has_feedback:
-            return np.full(len(series), self.memory)
-        drive = self._drive(self._variables(series), series)
-        measured = self.scaling.error_to_scaled(series.error_v)
-        return free_run.gains(drive, self._functions, measured, self._clip)
-
     def to_dict(self) -> dict[str, Any]:
         """Plain values, and an array in the leverage; the terms by their factors (variable, function) and, to be read,
         by name."""
@@ -218,7 +210,7 @@ class SparseModel:
                 drive[:, :-1], self._functions, scaled0, self._clip, free_run.LIMIT
             )
         else:
-            scaled, diverged = free_run.held(free_run.remember(drive[0, :-1], self.memory, scaled0))
+            scaled, diverged = free_run.held(free_run.remember(drive[0, :-1], self.memory, scaled0), scaled0)
         return np.append(start, self.scaling.error_to_volts(scaled)), diverged
 
     def _ahead(self, drive: Array, error_v: Array, steps: int) -> Array:
@@ -244,16 +236,7 @@ class SparseModel:
                 for mine in (self.library.feedbacks == q for q in self._functions)
             ]
         )
-        return (
-            drive
-            if self.fade is None
-            else self._zero + self._weight(variables, series) * (drive - self._zero)
-        )
-
-    @property
-    def _zero(self) -> float:
-        """The scaled error at which the physics is exact."""
-        return float(self.scaling.error_to_scaled(np.array(0.0)))
+        return drive if self.fade is None else self._weight(variables, series) * drive
 
     def _weight(self, variables: Array, series: ErrorSeries) -> Array:
         """(n,) what is left of the correction."""

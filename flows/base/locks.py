@@ -16,7 +16,8 @@ _told: set[str] = set()
 
 
 class ProcessLock:
-    """A lock on a file, which is made; it stays behind, since two could hold one that is removed.
+    """A lock on a file, which is made; it stays behind, since two could hold one that is removed. Who removes it has to
+    bear that.
 
     Where its file system has no locks nothing keeps others out. That is said, once a process: `where`, and what it does
     not keep a second process from (`doing`).

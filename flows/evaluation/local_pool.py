@@ -33,14 +33,16 @@ class _Process:
     process: Any
     pipe: Connection
     tag: Any = None
-    deadline_s: float | None = None  # of the candidate in work, on the monotonic clock
+    built: bool = False
+    busy: bool = False
+    deadline_s: float | None = None  # of the candidate in work, on the monotonic clock; none while it builds
 
 
 class LocalPool:
     """`workers` processes of this machine.
 
     build : makes the evaluating function, inside the process.
-    timeout_s : wall time after which a candidate has failed and its process is replaced.
+    timeout_s : wall time after which a candidate has failed and its process is replaced, from when that has built.
     memory_mb : address space a process may take beyond what it starts with (Linux).
     """
 
@@ -56,7 +58,7 @@ class LocalPool:
 
     @property
     def idle(self) -> int:
-        return sum(process.deadline_s is None for process in self._processes)
+        return sum(not process.busy for process in self._processes)
 
     @property
     def busy(self) -> int:
@@ -65,31 +67,32 @@ class LocalPool:
     def start(self, tag: Any, genome: Any) -> None:
         """Evaluate the genome in an idle process; its outcome will carry the tag."""
         for i, one in enumerate(self._processes):
-            if one.deadline_s is not None:
+            if one.busy:
                 continue
             try:
                 one.pipe.send(genome)
             except OSError:  # it died while idle
                 one = self._processes[i] = self._replace(one)
                 one.pipe.send(genome)
-            one.tag, one.deadline_s = tag, time.monotonic() + self._timeout_s
+            one.tag, one.busy = tag, True
+            if one.built:
+                one.deadline_s = time.monotonic() + self._timeout_s
             return
         raise RuntimeError("no process is idle; collect before starting more")
 
     def collect(self, timeout_s: float) -> list[tuple[Any, Any]]:
         """(tag, outcome) of what has finished or been lost, after at most `timeout_s`."""
-        busy = [one for one in self._processes if one.deadline_s is not None]
+        busy = [one for one in self._processes if one.busy]
         if not busy:
             return []
-        nearest = min(one.deadline_s for one in busy if one.deadline_s is not None)
-        ready = wait([one.pipe for one in busy], timeout=max(0.0, min(timeout_s, nearest - time.monotonic())))
+        now = time.monotonic()
+        left_s = [one.deadline_s - now for one in busy if one.deadline_s is not None]
+        ready = wait([one.pipe for one in busy], timeout=max(0.0, min([timeout_s, *left_s])))
         found = []
         for i, one in enumerate(self._processes):
-            if one.deadline_s is None:
-                continue
             if one.pipe in ready:
-                found.append((one.tag, self._receive(i, one)))
-            elif time.monotonic() >= one.deadline_s:
+                found += self._received(i, one)
+            elif one.deadline_s is not None and time.monotonic() >= one.deadline_s:
                 found.append((one.tag, Failed(f"took longer than {self._timeout_s:g} s", of_machine=True)))
                 self._processes[i] = self._replace(one)
         return found
@@ -100,15 +103,20 @@ class LocalPool:
             _end(one)
         self._processes = []
 
-    def _receive(self, i: int, one: _Process) -> Any:
+    def _received(self, i: int, one: _Process) -> list[tuple[Any, Any]]:
+        """(tag, outcome) of what it was at work on; none where it says that it has built."""
+        tag = one.tag
         try:
-            outcome = one.pipe.recv()
+            said = one.pipe.recv()
         except (EOFError, OSError):
             one.process.join(5)
             self._processes[i] = self._replace(one)
-            return Failed(f"its process was lost ({_how(one.process.exitcode)})", of_machine=True)
-        one.tag = one.deadline_s = None
-        return outcome
+            return [(tag, Failed(f"its process was lost ({_how(one.process.exitcode)})", of_machine=True))]
+        if not one.built:
+            one.built, one.deadline_s = True, time.monotonic() + self._timeout_s
+            return []
+        one.tag, one.busy, one.deadline_s = None, False, None
+        return [(tag, said)]
 
     def _replace(self, one: _Process) -> _Process:
         _end(one)
@@ -140,18 +148,19 @@ def _leaving_objects_to_us() -> Iterator[None]:
 
 
 def _serve(pipe: Connection, build: Callable[[], Evaluate], memory_mb: float, parent: int) -> None:
-    """Life of a process: build, then one genome in and one outcome out, until the other end is gone."""
+    """Life of a process: build and say so, then one genome in and one outcome out, until the other end is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it is not held back
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     threading.Thread(target=_leave_with, args=(parent,), daemon=True).start()
     limit_memory(memory_mb)
     evaluate = build()
-    while True:
-        try:
+    try:
+        pipe.send(None)
+        while True:
             genome = pipe.recv()
             pipe.send(guarded(evaluate, genome))
-        except (EOFError, OSError):
-            os._exit(0)
+    except (EOFError, OSError):
+        os._exit(0)
 
 
 def _leave_with(parent: int) -> None:

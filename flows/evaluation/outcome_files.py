@@ -42,6 +42,8 @@ class FileOutcomes:
     def release(self, key: str) -> None:
         lock = self._locks.pop(key, None)
         if lock is not None:
+            # So that no file a candidate is left. Whoever opened it just now may then hold a claim beside another's:
+            # the candidate is evaluated twice, to the same outcome, which is put whole.
             with suppress(OSError):  # Windows keeps a file that is open
                 lock.path.unlink(missing_ok=True)
             lock.release()

@@ -74,20 +74,16 @@ def search(
     *,
     storage: str | Path | BaseStorage | None = None,
     name: str = "aesi",
-    shared: bool = False,
     on_candidate: OnCandidate | None = None,
-    evaluate_one: Callable[[Problem, Genome], Outcome] = evaluate,
     evaluate_many: EvaluateMany | None = None,
 ) -> SearchResult:
     """Search until the study holds `n_trials` finished trials; continue what `storage` already holds.
 
-    storage : None keeps the study in memory; a path is a journal file; a URL (with ://) a database. Workers
-    that share a storage and `name` share the study.
-    shared : other processes work on the study now; then indices under evaluation are marked in the storage
-    (a candidate that two take in the same instant is evaluated twice).
+    storage : None keeps the study in memory; a path is a journal file; a URL (with ://) a database. Of one
+    process at a time; several share the evaluation of a study (`evaluate_many`), not the study.
     on_candidate : called with index, genome and outcome as each is evaluated.
-    evaluate_one : what evaluates a candidate; evaluate_many, if given, evaluates a generation instead.
-    The same seed gives the same candidates, interrupted or not, as long as one process searches.
+    evaluate_many : what evaluates a generation; by default one candidate after the other is evaluated here.
+    The same seed gives the same candidates, interrupted or not.
     Raises ConfigError for a space of another library. Exceptions of the evaluation are bugs: what the generation has
     finished is stored, and they propagate.
     """
@@ -100,7 +96,7 @@ def search(
     study = _open(storage, name, sampler)
 
     def one_by_one(genomes: Sequence[Genome]) -> Iterable[tuple[int, Outcome]]:
-        return ((k, evaluate_one(problem, genome)) for k, genome in enumerate(genomes))
+        return ((k, evaluate(problem, genome)) for k, genome in enumerate(genomes))
 
     while (missing := n_trials - len(study.get_trials(deepcopy=False, states=FINISHED))) > 0:
         _generation(
@@ -110,7 +106,6 @@ def search(
             evaluate_many or one_by_one,
             settings.constraints,
             on_candidate,
-            shared,
         )
     return SearchResult.of(study, space.size, settings.weights)
 
@@ -122,15 +117,9 @@ def _generation(
     evaluate_many: EvaluateMany,
     constraints: Constraints,
     on_candidate: OnCandidate | None,
-    shared: bool,
 ) -> None:
-    asked: list[tuple[int, Genome]] = []
-    claims: dict[int, int] = {}
-    for index in _next_indices(study, sampler.size, most):
-        genome = sampler.propose(study, index)
-        asked.append((index, genome))
-        if shared:
-            claims[index] = _claim(study, sampler, genome, index)
+    indices = _next_indices(study, sampler.size, most)
+    asked = [(index, sampler.propose(study, index)) for index in indices]
     outcomes: dict[int, Outcome] = {}
     try:
         for position, outcome in evaluate_many([genome for _, genome in asked]):
@@ -142,24 +131,11 @@ def _generation(
         for position, (index, genome) in enumerate(asked):
             if position in outcomes:
                 study.add_trial(_finished(sampler, genome, index, outcomes[position], constraints))
-        for number in claims.values():
-            study.tell(number, state=TrialState.FAIL)
-
-
-def _claim(study: Study, sampler: TermSampler, genome: Genome, index: int) -> int:
-    """Number of a running trial that tells other workers which index is taken; it fails when that is over."""
-    study.add_trial(sampler.write(genome, index, TrialState.RUNNING))
-    mine = [
-        t
-        for t in study.get_trials(deepcopy=False, states=[TrialState.RUNNING])
-        if t.user_attrs[INDEX] == index
-    ]
-    return mine[-1].number
 
 
 def _next_indices(study: Study, population: int, most: int) -> list[int]:
     """The lowest free indices, within one generation so that the next one has all of its parents."""
-    trials = study.get_trials(deepcopy=False, states=(*FINISHED, TrialState.RUNNING))
+    trials = study.get_trials(deepcopy=False, states=FINISHED)
     taken = {trial.user_attrs[INDEX] for trial in trials}
     free = [index for index in range(len(trials) + most) if index not in taken][:most]
     return [index for index in free if index // population == free[0] // population]

@@ -44,15 +44,6 @@ class Trial:
     reason: str | None
 
 
-@dataclass(frozen=True)
-class Pick:
-    """Which trial the fitness takes under given weights."""
-
-    weights: FitnessWeights
-    trial: Trial
-    fitness: float
-
-
 @dataclass(frozen=True, eq=False)
 class SearchResult:
     """All finished trials of a study, and what to choose from them."""
@@ -90,28 +81,29 @@ class SearchResult:
             get_param_importances(self.study, target=lambda trial: -trial.user_attrs[RECORD]["fitness"])
         )
 
-    def best(self, weights: FitnessWeights | None = None) -> Pick:
+    def best(self) -> Trial:
         """The trial of highest fitness; the earlier one on a tie.
 
         Raises FitError, with the reasons counted, where no trial is feasible.
         """
-        weights = weights or self.weights
         front = self.front()
         if not front:
             raise FitError(self._nothing_feasible())
-        scored = [(fitness(t.losses, self.library_size, weights), -t.number, t) for t in front if t.losses]
-        score, _, trial = max(scored, key=lambda entry: entry[:2])
-        return Pick(weights, trial, score)
+        return max(front, key=lambda trial: (self._fitness(trial), -trial.number))
 
     def fittest(self, share: float) -> tuple[int, ...]:
         """Numbers of the feasible trials of highest fitness, a share of all trials and at least one; the best first.
 
         Raises FitError as `best` does.
         """
-        first = self.best().trial.number
+        first = self.best().number
         ranked = sorted(self.feasible, key=lambda trial: (-trial.numbers["fitness"], trial.number))
         others = [trial.number for trial in ranked if trial.number != first]
         return (first, *others[: max(1, round(share * len(self.trials))) - 1])
+
+    def _fitness(self, trial: Trial) -> float:
+        assert trial.losses is not None
+        return fitness(trial.losses, self.library_size, self.weights)
 
     def _nothing_feasible(self) -> str:
         reasons = Counter(trial.reason or "a correlation below its constraint" for trial in self.trials)

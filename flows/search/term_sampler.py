@@ -8,7 +8,7 @@ storage); crossover and mutation of the mask are ten lines of numpy. A trial is 
 finished, instead of attribute by attribute. `aesi bench search` measures what this costs beside it.
 
 Every candidate has an index in the search, stored with its trial. Random numbers come from (seed, index): a
-search is the same whether it was interrupted or not, and workers that share a study draw different points.
+search is the same whether it was interrupted or not, and never draws the same point again.
 The generation is the index over the population size, so pruned trials count, and a generation can be asked
 for as a whole.
 """

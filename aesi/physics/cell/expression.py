@@ -61,8 +61,9 @@ def compile_expression(text: str) -> Function:
 
 
 def _part(node: ast.expr, text: str) -> Operand:
-    if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and node.value is not True:
-        return np.float64(node.value)
+    value = node.value if isinstance(node, ast.Constant) else None
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return np.float64(value)
     if isinstance(node, ast.Name) and node.id == VARIABLE:
         return lambda x: x
     if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:

@@ -27,7 +27,11 @@ def add_side_currents(e, t, n, thermal, psi, given, salt):  # type: ignore[no-un
 
 @compiled
 def newton_direction(p, t, n, spread, chi, total, psi, given, salt, half):  # type: ignore[no-untyped-def]
-    """Newton's step: d_given, d_psi, d_y, d_salt, and the new potentials of both collectors."""
+    """Newton's step: d_given, d_psi, d_y, d_salt into `n`, and the new potentials of both collectors.
+
+    chi : V.  total : (2,) A/m2, delithiation positive.  psi : (places,) V.  given : (places,) A/m2.  salt : over rest.
+    Returns phi_n, phi_p, V.
+    """
     places = 2 * half
     for r in range(places):
         first = 0 if r < half else half

@@ -168,7 +168,11 @@ class DfnTrial(NamedTuple):
 
 
 class NewtonScratch(NamedTuple):
-    """Scratch of Newton's method: by unit pot, slope, by_salt, d_y and the start value y_in; by place the others."""
+    """Scratch of Newton's method, and its start values y_in and psi_in.
+
+    By unit: pot V, slope V per y, by_salt V, d_y and y_in as y.  By place: slack, shift, d_given A/m2, conductance
+    A/(V m2), d_psi, psi_in V, d_salt over rest.
+    """
 
     pot: Array
     slope: Array

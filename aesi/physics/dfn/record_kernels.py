@@ -8,7 +8,7 @@ from aesi.physics.dfn.diffusion_kernels import renew, salt_forcing
 from aesi.physics.dfn.local_kernels import equilibrium, row_lookup
 from aesi.physics.dfn.output_kernels import left_range, record, record_profile
 from aesi.physics.dfn.stepping_kernels import advance, hold_layers, hold_metal, settle, take_back
-from aesi.physics.espm.kernels import FASTMATH, compiled, lookup, slot_of
+from aesi.physics.espm.kernels import FASTMATH, ROUND_OFF, compiled, lookup, parts_of, slot_of
 from aesi.physics.espm.transport_kernels import (
     all_inside,
     arrhenius,
@@ -26,8 +26,6 @@ FIRST_LENGTH = 0.25
 RMS off under pulses to 3C, a quarter of one first leaves 0.05."""
 TEMPERATURE_STEP_K = 0.01
 """Rates of diffusion are renewed where the temperature has moved by this much (0.04 % of a rate at 30 kJ/mol)."""
-ROUND_OFF = 1e-9
-"""Of a step: less than this before the sample is no step any more."""
 
 
 @compiled
@@ -57,7 +55,7 @@ def run_porous(  # type: ignore[no-untyped-def]
         if jumped:
             jump(current[k - 1], current[k], p, s, e, state, t, newton, half, t_k)
             last_dt = 0.0
-        parts = min(max(1, math.ceil(whole / drive.substep - 1e-9)), drive.most) if k > 0 else 0
+        parts = parts_of(whole, drive.substep, drive.most) if k > 0 else 0
         turned = False
         if e.has_layers and k > 0:
             slope_before, slope = slope, 0.0 if drive.backward else (current[k] - current[k - 1]) / whole

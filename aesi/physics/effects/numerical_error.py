@@ -20,7 +20,7 @@ PARAMETERS = {
         "dimensionless",
         bounds=(1.0, 4.0),
         neutral=1.0,
-        source="a fourfold refinement is converged to round-off",
+        source="a fourfold refinement leaves microvolts",
         description="n, rounded to halves",
     )
 }

@@ -5,14 +5,12 @@ is constant over the step and found from the electrode's equations at its end: d
 kept to round-off.
 """
 
-import math
-
 import numpy as np
 from numba import njit
 
 from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K
 from aesi.physics.espm.electrode_kernels import local_conductivity, region_drops, solve_electrode
-from aesi.physics.espm.kernels import FASTMATH, compiled, lookup, open_circuit, slot_of
+from aesi.physics.espm.kernels import FASTMATH, compiled, lookup, open_circuit, parts_of, slot_of
 from aesi.physics.espm.layout import StepEnd
 from aesi.physics.espm.transport_kernels import (
     all_inside,
@@ -54,7 +52,7 @@ def run_general(  # type: ignore[no-untyped-def]
     fault_at, fault, driest, voltage = -1, 0, 1.0, 0.0
     for k in range(time.shape[0]):
         whole = time[k] - time[k - 1] if k > 0 else 0.0
-        parts = min(max(1, math.ceil(whole / drive.substep)), drive.most) if k > 0 else 1
+        parts = parts_of(whole, drive.substep, drive.most) if k > 0 else 1
         dt, slot = whole / parts, 0
         for part in range(parts):
             end_share = (part + 1.0) / parts

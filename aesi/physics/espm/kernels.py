@@ -26,6 +26,9 @@ not see. A porous electrode's salt tends to nought where that of a uniform react
 at 10 degC: 56 mol/m3 against -104 at the wall)."""
 SMALLEST_EXPONENT = -10.0
 """Of the salt that is left: products of its powers stay above what a number can hold."""
+ROUND_OFF = 1e-9
+"""Of a step or of a part of it: stamps are rounded, and what is longer or left by less than this is no part of its own.
+A step of 1 s that was 2e-13 s too long was halved, which moves the voltage by up to 0.18 mV."""
 LARGEST_RATIO = 1e12
 """Above it the product of ten factors would leave the range of a number."""
 
@@ -37,6 +40,12 @@ def lookup(table, position):  # type: ignore[no-untyped-def]
     s = min(max(position, 0.0), 1.0) * last
     i = min(int(s), last - 1)
     return table[i] + (s - i) * (table[i + 1] - table[i])
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def parts_of(step, longest, most):  # type: ignore[no-untyped-def]
+    """Into how many equal parts a step is taken that are not longer than `longest`, at most `most`."""
+    return min(max(1, math.ceil(step / longest - ROUND_OFF)), most)
 
 
 @njit(inline="always", fastmath=FASTMATH)

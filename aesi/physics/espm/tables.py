@@ -10,11 +10,16 @@ import numpy as np
 from aesi.errors import CellError
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell, Electrode
-from aesi.physics.cell.relations import LEAST_TRANSPORT, WORKING_SPAN, Constant, Relation, tabulated
+from aesi.physics.cell.relations import (
+    LEAST_TRANSPORT,
+    OCP_POINTS,
+    WORKING_SPAN,
+    Constant,
+    Relation,
+    tabulated,
+    without_poles,
+)
 
-OCP_POINTS = 8193
-"""Four times as many points move the voltage by less than 1e-4 mV RMS under the load of `aesi bench espm`, and so for
-the electrolyte's."""
 RATE_POINTS = 513
 """Courses of rates are smooth in their logarithm; a point every 0.2 % of stoichiometry follows them."""
 ELECTROLYTE_POINTS = 2049
@@ -35,9 +40,7 @@ def ocp_table(ocp: Relation, side: str, what: str = "open-circuit potential") ->
     values = tabulated(ocp, 0.0, 1.0, OCP_POINTS)
     if np.isfinite(values).all():
         return values
-    values = values.copy()
-    values[0] = values[1] if not np.isfinite(values[0]) else values[0]
-    values[-1] = values[-2] if not np.isfinite(values[-1]) else values[-1]
+    values = without_poles(values)
     if not np.isfinite(values).all():
         bad = float(np.flatnonzero(~np.isfinite(values))[0]) / (OCP_POINTS - 1)
         raise CellError(

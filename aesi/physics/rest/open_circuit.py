@@ -34,8 +34,7 @@ def initial_soc(cell: Cell, voltage_v: float, kelvin: float | None = None) -> fl
     kelvin : K; None is the cell file's initial temperature.
     Voltages up to `BEYOND_V` beyond full and empty belong to such a cell. Raises DataError outside, naming the range.
     """
-    open_circuit = OpenCircuit(cell, kelvin)
-    return 1.0 if open_circuit.charged(voltage_v) else open_circuit.reading(voltage_v, READING_V)[0]
+    return OpenCircuit(cell, kelvin).soc_at_rest(voltage_v, voltage_v)
 
 
 class OpenCircuit:
@@ -59,6 +58,11 @@ class OpenCircuit:
     def soc_at(self, voltage_v: float) -> float:
         """State of charge of an open-circuit voltage, held at the ends of the range."""
         return float(np.interp(voltage_v, self.ocv, self.soc))
+
+    def soc_at_rest(self, terminal_v: float, ocv_v: float) -> float:
+        """State of charge of a resting cell: 1 of a full charge, by its terminals, else that of the open-circuit
+        voltage, which effects in series may keep apart from them.  Raises DataError as `reading` does."""
+        return 1.0 if self.charged(terminal_v) else self.reading(ocv_v, READING_V)[0]
 
     def voltage_at(self, soc: float) -> float:
         """V, the open-circuit voltage."""

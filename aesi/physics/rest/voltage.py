@@ -1,4 +1,4 @@
-"""The voltage of a cell at rest: as it was read, and freed of what instrument faults added to it."""
+"""The voltage of a cell at rest: as it was read, freed of instrument faults, and of what effects add in series."""
 
 from __future__ import annotations
 
@@ -9,11 +9,15 @@ import numpy as np
 from aesi.numerics.typing import Array
 from aesi.physics.effect import ActiveEffect, Trace
 from aesi.physics.model import EspmModel
+from aesi.physics.rest.open_circuit import OpenCircuit
 
 CALM_ROWS = 60
 """First rows of a rest that say where a charge has ended."""
 MOVING_V = 4e-3
 """A voltage that moves more over these is that of the last of them. A convention: a full cell falls by 6 to 30 mV."""
+
+ROUNDS = 4
+"""Fixed-point iterations of a voltage in series and the state of charge, of which it depends little."""
 
 
 def first_rows_v(rest_v: Array) -> float:
@@ -32,3 +36,52 @@ def freed_of_instruments(model: EspmModel, effects: Sequence[ActiveEffect], volt
             trace = Trace(model, one, one, np.array([voltage_v]), {})
             true = true - (active.act(active.effect.on_reading, trace) - voltage_v)
     return float(true[0])
+
+
+def freed_of_series(
+    open_circuit: OpenCircuit,
+    model: EspmModel,
+    effects: Sequence[ActiveEffect],
+    terminal_v: float,
+    current_a: float = 0.0,
+) -> float:
+    """A terminal voltage without what effects add in series with the cell at the first row, such as a hysteresis.
+
+    open_circuit : of the model's cell.  current_a : that flows in this row.
+    """
+    series = [active for active in effects if active.effect.on_voltage is not None]
+    cell_v = terminal_v
+    for _ in range(ROUNDS if series else 0):
+        soc = open_circuit.soc_at(cell_v)
+        cell_v = terminal_v - _in_series_v(open_circuit, model, series, cell_v, soc, current_a)
+    return cell_v
+
+
+def _in_series_v(
+    open_circuit: OpenCircuit,
+    model: EspmModel,
+    effects: Sequence[ActiveEffect],
+    cell_v: float,
+    soc: float,
+    current_a: float,
+) -> float:
+    """V that the effects add to `cell_v` where a record begins at a state of charge, in the windows of the model."""
+    cell = model.cell
+    theta_n, theta_p = cell.stoichiometries(soc)
+    states = {
+        "c_sp": theta_p * cell.positive.c_max_mol_m3,
+        "c_sn": theta_n * cell.negative.c_max_mol_m3,
+        "c_e0": cell.electrolyte.c0_mol_m3,
+        "c_eL": cell.electrolyte.c0_mol_m3,
+        "soc": soc,
+        "temperature_k": open_circuit.kelvin,
+    }
+    row, voltage = np.zeros(1), np.array([cell_v])
+    series = {name: np.array([value]) for name, value in states.items()}
+    for active in effects:
+        assert active.effect.on_voltage is not None
+        trace = Trace(model, row, np.array([current_a]), voltage, series)
+        added = active.act(active.effect.on_voltage, trace)
+        voltage = voltage + added.voltage_v
+        series.update(added.series)
+    return float(voltage[0]) - cell_v

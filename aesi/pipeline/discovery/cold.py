@@ -41,7 +41,8 @@ def with_cold_admitted(case: Case) -> Case:
     Raises DataError for a record that cannot be of the cell, whatever its temperature; where the temperature of the
     surroundings is not among what is tried, or the record holds its temperature, at that which is declared or measured.
     """
-    given, searched = case.declared(), COLD.id in case.tried()
+    declared, searched = case.declared(), COLD.id in case.tried()
+    given = replace(declared, model=case.model or declared.model)
     return case.with_each(lambda record: _admitted(given, record, case.soc0, searched))
 
 
@@ -99,9 +100,17 @@ def _error_v(
     record = replace(record, current_a=record.current_a / size)  # all else of a cell goes with its area
     hold = record.hold_taken
     try:
-        start = initial_state(given.cell, record, soc0, hold, effects, shared=True)
+        start = initial_state(given.cell, record, soc0, hold, effects, shared=True, model=given.model)
         run = simulate(
-            given.cell, record.time_s, record.current_a, start.soc, effects, None, hold, on_depletion="clip"
+            given.cell,
+            record.time_s,
+            record.current_a,
+            start.soc,
+            effects,
+            None,
+            hold,
+            on_depletion="clip",
+            model=given.model,
         )
     except AesiError:
         return float("inf")

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,15 +41,18 @@ TrainingDrive = tuple[str, slice]
 """Record and rows of a training drive."""
 
 
-Piece = tuple[int, slice]
-"""Place of a training drive, and rows of it."""
+class Piece(NamedTuple):
+    """drive : place of a training drive among them.  rows : of that drive."""
+
+    drive: int
+    rows: slice
 
 
 @dataclass(frozen=True)
 class Pieces:
-    """parts : what the search leaves out in turn (`cuts`).  drives : whole drives, where the parts are not these."""
+    """folds : what the search leaves out in turn (`cuts`).  drives : whole drives, where the folds are not these."""
 
-    parts: tuple[Piece, ...]
+    folds: tuple[Piece, ...]
     drives: tuple[Piece, ...]
 
 
@@ -78,39 +82,39 @@ class TrainingDrives:
 
         fitted : to all training rows."""
         pieces = self.pieces()
-        refitted = [self._refitted(fitted, piece) for piece in pieces.parts]
-        slopes = np.array([self._slope(*each) for each in zip(refitted, pieces.parts, strict=True)])
-        places = np.array([place for place, _ in pieces.parts])
-        parted = [
+        refitted = [self._refitted(fitted, piece) for piece in pieces.folds]
+        slopes = np.array([self._slope(*each) for each in zip(refitted, pieces.folds, strict=True)])
+        drives = np.array([piece.drive for piece in pieces.folds])
+        folds = [
             self._left_out(physics.carried(carried_over(np.delete(slopes, number))), piece)
-            for number, (physics, piece) in enumerate(zip(refitted, pieces.parts, strict=True))
+            for number, (physics, piece) in enumerate(zip(refitted, pieces.folds, strict=True))
         ]
-        whole = [
+        wholes = [
             self._left_out(
-                self._refitted(fitted, drive).carried(carried_over(slopes[places != drive[0]])), drive
+                self._refitted(fitted, whole).carried(carried_over(slopes[drives != whole.drive])), whole
             )
-            for drive in pieces.drives
+            for whole in pieces.drives
         ]
-        return fitted.carried(carried_over(slopes)), LeftOutDrives(tuple(parted), tuple(whole))
+        return fitted.carried(carried_over(slopes)), LeftOutDrives(tuple(folds), tuple(wholes))
 
     def _left_out(self, physics: PhysicsModels, piece: Piece) -> HeldOutDrive:
-        return HeldOutDrive.of(self.under(physics), *piece)
+        return HeldOutDrive.of(self.under(physics), piece.drive, piece.rows)
 
     def pieces(self) -> Pieces:
         """What is left out in turn."""
         count = cuts(self.config.data)
         lengths = [rows.stop - rows.start for _, rows in self.drives]
         return Pieces(
-            tuple((place, rows) for place, n in enumerate(lengths) for rows in parts(n, count)),
-            tuple((place, slice(0, n)) for place, n in enumerate(lengths)) if count > 1 else (),
+            tuple(Piece(drive, rows) for drive, n in enumerate(lengths) for rows in parts(n, count)),
+            tuple(Piece(drive, slice(0, n)) for drive, n in enumerate(lengths)) if count > 1 else (),
         )
 
     def as_they_are(self, train: tuple[ErrorSeries, ...]) -> LeftOutDrives:
         """Under physics that is the same for all: as declared, or of a single drive."""
         pieces = self.pieces()
         made = [
-            tuple(HeldOutDrive.of(train, place, rows) for place, rows in each)
-            for each in (pieces.parts, pieces.drives)
+            tuple(HeldOutDrive.of(train, piece.drive, piece.rows) for piece in each)
+            for each in (pieces.folds, pieces.drives)
         ]
         return LeftOutDrives(made[0], made[1] if len(train) > 1 else ())
 
@@ -140,9 +144,8 @@ class TrainingDrives:
 
     def _rows(self, piece: Piece) -> TrainingDrive:
         """The record that a piece is of, and its rows there."""
-        place, part = piece
-        name, rows = self.drives[place]
-        return name, slice(rows.start + part.start, rows.start + part.stop)
+        name, rows = self.drives[piece.drive]
+        return name, slice(rows.start + piece.rows.start, rows.start + piece.rows.stop)
 
 
 def series_under(

@@ -10,6 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from aesi.numerics.blocks import coverage
 from aesi.numerics.files.whole import write_whole
 from aesi.physics import ModelName
 from aesi.pipeline.experiment.config import ExperimentConfig
@@ -170,7 +171,7 @@ def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
         bootstrap=BootstrapView(
             lengths=tuple(b - a for a, b in result.problem.spans),
             block=result.problem.block,
-            unique_fraction=(result.problem.counts > 0).mean(axis=1),
+            unique_fraction=coverage(result.problem.counts),
         ),
         settings={
             "lambda1": f"{genome.lambda1:.3g}",

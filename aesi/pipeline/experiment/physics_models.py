@@ -32,7 +32,7 @@ from aesi.records import ErrorSeries, Hold, Measurement
 DECLARED = "ESPM"
 RECALIBRATED = "ESPM recalibrated"
 FREE = {"ESPM, one resistor": RESISTOR, "ESPM, initial state fitted": INITIAL_STATE, RECALIBRATED: ALL}
-"""Name -> the knobs that are fitted."""
+"""Name -> the parameters that are fitted, by their places in PRIORS."""
 PHYSICS_NAMES = (DECLARED, *FREE)
 
 

@@ -29,13 +29,15 @@ SOC0, CONTACT, FILM = "soc0", "contact", "film"
 
 @dataclass(frozen=True)
 class FileParameter:
-    """owner : an effect of the catalogue, or SOC0, CONTACT or FILM.  deviation : of its value, of its logarithm where
-    `log`; of the contact resistance in V at a current of 1C.  energy_j_mol : deviation of the activation energy of a
-    rate, or of the film of an electrode (its name)."""
+    """owner : an effect of the catalogue, or SOC0, CONTACT or FILM.
+    name : of its parameter; the side of an electrode, of a film.
+    prior_sd : of the value, of ln(value) where `log`; of the contact resistance in V at a current of 1C.
+    energy_j_mol : standard deviation of the activation energy of a rate or a film, 0 where there is none.
+    """
 
     owner: str
     name: str
-    deviation: float
+    prior_sd: float
     log: bool = False
     energy_j_mol: float = 0.0
 
@@ -54,7 +56,7 @@ POTENTIALS = "ocp_shape"
 POTENTIAL_SHARE = 0.6
 """Of the spread that the catalogue gives for half cells of other makes."""
 BALANCE = ("active_material_loss_negative", "active_material_loss_positive", "lithium_inventory_loss")
-KNOBS = (
+PRIORS = (
     FileParameter(SOC0, "shift", 0.001),
     FileParameter(CONTACT, "resistance_ohm", 0.03),
     *(
@@ -69,19 +71,19 @@ KNOBS = (
 )
 FILMS = tuple(FileParameter(FILM, side, STEP, True, FILM_ENERGY_SD) for side in ("negative", "positive"))
 """No fit moves them, which at one temperature are like contacts; they change with it as rates do."""
-ENERGIES_J_MOL = np.array([knob.energy_j_mol / knob.deviation for knob in (*KNOBS, *FILMS)])
+ENERGIES_J_MOL = np.array([prior.energy_j_mol / prior.prior_sd for prior in (*PRIORS, *FILMS)])
 """(n_slopes,) deviation of each activation energy over that of the logarithm of its rate; 0 where there is none."""
-ALL = tuple(range(len(KNOBS)))
+ALL = tuple(range(len(PRIORS)))
 INITIAL_STATE = (0,)
 RESISTOR = (1,)
-"""Its place, and that of the initial state, in KNOBS."""
+"""Places in PRIORS of what a fit moves: everything, the state of charge at the start alone, the contact alone."""
 
 
 @dataclass(frozen=True)
 class PhysicsStart:
     """A cell and its effects; `shift` is added to every record's state of charge at the start, by the declared cell.
 
-    deviations : of the knobs that were free, where the fit ended.  missed_v : V, the error of the model that a
+    deviations : of the parameters that were free, where the fit ended.  missed_v : V, the error of the model that a
     recalibration allowed for; None of physics that is not from one.
     """
 
@@ -115,14 +117,14 @@ class PhysicsStart:
 def deviating(
     declared: Cell, effects: tuple[ActiveEffect, ...], free: Sequence[int] | Array, z: Array, model: ModelName
 ) -> PhysicsStart:
-    """The declared physics with its free knobs, or films, moved by z (n_free,) deviations."""
+    """The declared physics with its free parameters, or films, moved by z (n_free,) deviations."""
     x = np.zeros(len(ENERGIES_J_MOL))
     x[np.array(free)] = z
     values: dict[str, dict[str, float]] = {}
-    for knob, deviations in zip((*KNOBS, *FILMS), x, strict=True):
+    for prior, deviations in zip((*PRIORS, *FILMS), x, strict=True):
         if deviations != 0.0:
-            moved = float(deviations) * knob.deviation
-            values.setdefault(knob.owner, {})[knob.name] = float(np.exp(moved)) if knob.log else moved
+            moved = float(deviations) * prior.prior_sd
+            values.setdefault(prior.owner, {})[prior.name] = float(np.exp(moved)) if prior.log else moved
     shift = values.pop(SOC0, {}).get("shift", 0.0)
     volts_at_1c = values.pop(CONTACT, {}).get("resistance_ohm", 0.0)
     films = values.pop(FILM, {})
@@ -151,7 +153,7 @@ def slopes_v(
     model: ModelName,
     voltage_v: Array,
 ) -> Array:
-    """(n, n_slopes) V a deviation, how the voltage_v (n,) of the record under the cell moves with each knob and film.
+    """(n, n_slopes) V a deviation, how the voltage_v (n,) of the record under the cell moves with PRIORS and FILMS.
 
     soc0 : in the windows of the cell.  Where a neighbour runs empty it is clipped (`simulate`).
     """

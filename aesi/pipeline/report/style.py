@@ -19,8 +19,8 @@ SKY, ORANGE, PURPLE, GREY = "#56B4E9", "#E69F00", "#CC79A7", "#8c8c8c"
 MEASURED, PHYSICS = INK, VERMILLION
 MODEL_COLOURS = (BLUE, GREEN, PURPLE, ORANGE, SKY)
 STATE_COLOURS = {"before": VERMILLION, "recalibrated": ORANGE, "after": BLUE}
-KIND_COLOURS = {"physics": BLUE, "parameter": GREEN, "instrument": ORANGE, "placebo": GREY}
-KIND_SYMBOLS = {"physics": "circle", "parameter": "diamond", "instrument": "square", "placebo": "x"}
+KIND_COLOURS = {"physics": BLUE, "parameter": GREEN, "instrument": ORANGE}
+KIND_SYMBOLS = {"physics": "circle", "parameter": "diamond", "instrument": "square"}
 """Kinds differ in shape too, for prints in grey."""
 
 DIVERGING = "PuOr_r"

@@ -15,7 +15,7 @@ from aesi.records import Role
 
 Row = Mapping[str, Any]
 
-KIND_ORDER = ("physics", "parameter", "instrument", "placebo")
+KIND_ORDER = ("physics", "parameter", "instrument")
 
 
 @dataclass(frozen=True, eq=False)

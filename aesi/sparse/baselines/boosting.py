@@ -23,7 +23,7 @@ from aesi.sparse import free_run
 from aesi.sparse.baselines.single import Judge
 from aesi.sparse.fade import Fade
 from aesi.sparse.search.evaluate import fitness
-from aesi.sparse.search.judge import Judged, on_validation, runs_without_feedback
+from aesi.sparse.search.judge import Fit, Judged, on_validation, runs_without_feedback
 from aesi.sparse.search.problem import Problem
 from aesi.sparse.terms.inputs import with_inputs
 from aesi.sparse.terms.scaling import Scaling
@@ -106,7 +106,7 @@ def _tried(problem: Problem, leaves: int, seed: int, judge: Judge) -> Iterator[_
             Fade(runs.amplitudes[0], problem.region) if problem.options.fade else None,
         )
         (valid,) = on_validation(problem, runs, (model,))
-        folds = runs.judge(problem, 0)
+        folds = runs.judge(problem, Fit.FOLD)
         losses = folds.loss, valid.loss, 0.0
         yield _Boosted(fitness(losses, len(problem.library), judge.weights), model, valid, folds.pearson)
 

@@ -66,7 +66,7 @@ def evaluate_sindy_c(
 def _row(genome: Genome, outcome: Single | Failed, judge: Judge) -> dict[str, Any]:
     genes = genome.to_dict()
     if isinstance(outcome, Failed):
-        return {**genes, "failed": outcome.reason}
+        return {"genome": genes, "failed": outcome.reason}
     losses = dict(zip(("loss_left_out", "loss_valid", "terms"), outcome.losses, strict=True))
     return {
         "genome": genes,

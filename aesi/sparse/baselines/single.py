@@ -14,7 +14,7 @@ from aesi.sparse.model import SparseModel
 from aesi.sparse.search.evaluate import FitnessWeights, faded, fitness, sparse_model
 from aesi.sparse.search.evolution import HasFitness, ranked
 from aesi.sparse.search.genome import Genome
-from aesi.sparse.search.judge import Judged, fold_runs, on_validation
+from aesi.sparse.search.judge import Fit, Judged, fold_runs, on_validation
 from aesi.sparse.search.problem import Problem
 
 FactorFit = Callable[[Array], Array]
@@ -85,7 +85,7 @@ def evaluate_single(
     fits = np.stack([fit(factor[:, columns]) for factor in problem.fold_factors])
     runs, memory = fold_runs(problem, active, fits, fits, coefficients)
     model = faded(sparse_model(problem, active, coefficients, memory, name), problem, runs.amplitudes[0])
-    folds, (valid,) = runs.judge(problem, 0), on_validation(problem, runs, (model,))
+    folds, (valid,) = runs.judge(problem, Fit.FOLD), on_validation(problem, runs, (model,))
     if not np.isfinite(folds.loss + valid.loss):
         return Failed("the model diverges in free run")
     losses = (folds.loss, valid.loss, int(np.count_nonzero(coefficients)))

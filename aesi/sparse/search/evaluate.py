@@ -14,7 +14,7 @@ from aesi.sparse.ensemble import Ensemble, best_members, combine
 from aesi.sparse.fade import Fade
 from aesi.sparse.model import SparseModel
 from aesi.sparse.search.genome import Genome
-from aesi.sparse.search.judge import FoldRuns, Judged, fold_runs, on_validation
+from aesi.sparse.search.judge import Fit, FoldRuns, Judged, fold_runs, on_validation
 from aesi.sparse.search.out_of_bag import out_of_bag
 from aesi.sparse.search.problem import Problem
 from aesi.sparse.stridge import STRidge
@@ -62,8 +62,9 @@ class Candidate:
 
     loss_oob, loss_valid : mean squared error over that of the bare physics model on the same samples, in the
     problem's regime (1 is no better than none). loss_oob is the mean over the members, see out_of_bag.py.
-    loss_valid is the mean over both ensembles, on the left-out pieces, by fits of all and of the stable terms, and
-    where there are validation records half of it is on these.
+    loss_valid is the mean over both ensembles, on the left-out pieces, by fits of all and of the stable terms (in free
+    run from the measured error and from none, see `Judged`), and where there are validation records half of it is on
+    these.
     valid_losses : that of AESI I and that of AESI II.
     loss_sparse : number of active terms of AESI I.
     fitness : 1 - (g1 loss_oob + g2 loss_valid + g3 loss_sparse / library size).
@@ -160,7 +161,7 @@ def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = 
         loss_valid=loss_valid,
         loss_sparse=count,
         fitness=fitness((loss_oob, loss_valid, count), len(problem.library), weights),
-        pearson_train=pearson(problem.target, runs.free_run[:, 2]),
+        pearson_train=pearson(problem.target, runs.free_run[:, Fit.SERVED]),
         pearson_valid=valid.pearson,
         free_run_valid_mser_pct=valid.mser_pct,
         one_step_valid_rmse_v=valid.one_step_rmse_v,
@@ -223,7 +224,9 @@ def _with_left_out(problem: Problem, runs: FoldRuns, judged: Sequence[Judged]) -
     bears out what fits it by chance. On ten made cells (40 candidates of one search each) the candidate that is picked
     with the pieces takes 78.8 % off the test's squared error, 76.6 without, the mean of five 80.3 and 78.6.
     """
-    one, stable = (0.5 * (each.loss + runs.judge(problem, column).loss) for column, each in enumerate(judged))
+    one, stable = (
+        0.5 * (each.loss + runs.judge(problem, Fit(column)).loss) for column, each in enumerate(judged)
+    )
     return one, stable
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 
 import numpy as np
 
@@ -21,9 +22,10 @@ _MOST_MEMORY = 0.9999
 
 @dataclass(frozen=True)
 class Judged:
-    """loss : mean squared error over that of the bare model, in the problem's regime; infinite if it diverges.
+    """loss : weighted squared error over that of the bare model, in the problem's regime; not finite if it diverges.
+    Of left-out pieces in free run, the mean of two runs: from the measured error, and from none.
 
-    pearson, mser_pct : in free run.  one_step_rmse_v : V.
+    pearson, mser_pct : in free run from the measured error, all samples alike.  one_step_rmse_v : V, likewise.
     """
 
     loss: float
@@ -59,9 +61,21 @@ def one_step_predictions(problem: Problem, drive: Array, functions: IntArray, ro
     return np.einsum("qkj,qk->kj", drive, problem.error_functions[functions, rows])
 
 
+class Fit(IntEnum):
+    """Whose predictions a column of `FoldRuns` holds.
+
+    FOLD, STABLE : of a fit without the fold, to all terms and to the stable ones; they stand for AESI I and II.
+    SERVED : AESI I itself, which has seen the fold.
+    """
+
+    FOLD = 0
+    STABLE = 1
+    SERVED = 2
+
+
 @dataclass(frozen=True, eq=False)
 class FoldRuns:
-    """(n, 3) scaled predictions in each regime: by the fold's fit, by its refit of the stable terms, and by AESI I.
+    """(n, 3) scaled predictions in each regime, a column each `Fit`.
 
     from_none : free run by the inputs alone, no measured error at its start; `free_run` for models with feedback.
     Corrections fade in all of them by nearness and amplitude, not by leverage (fade.py).
@@ -75,16 +89,15 @@ class FoldRuns:
     sums: Array
     amplitudes: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
-    def judge(self, problem: Problem, column: int) -> Judged:
-        """How one of the three did over all pieces."""
+    def judge(self, problem: Problem, column: Fit) -> Judged:
+        """How one of the fits did over all pieces."""
         run = self.free_run if problem.options.regime == "free_run" else self.one_step
         truth = problem.unseen_target
-        bare = truth - problem.zero
         with np.errstate(invalid="ignore"):
             runs = (run, self.from_none) if problem.options.regime == "free_run" else (run,)
             squares = [problem.row_weights @ (truth - each[:, column]) ** 2 for each in runs]
-            loss = float(np.mean(squares) / (problem.row_weights @ bare**2))
-            loss_free = mse(truth, self.free_run[:, column]) / float(np.mean(bare**2))
+            loss = float(np.mean(squares) / (problem.row_weights @ truth**2))
+            loss_free = mse(truth, self.free_run[:, column]) / float(np.mean(truth**2))
             loss_step = mse(truth, self.one_step[:, column])
         return Judged(
             loss,
@@ -119,7 +132,7 @@ def fold_runs(
 
 
 def _sums(problem: Problem, given: Array) -> Array:
-    error = problem.unseen_target[:, None] - problem.zero
+    error = problem.unseen_target[:, None]
     with np.errstate(invalid="ignore", over="ignore"):
         products = np.stack([np.broadcast_to(error**2, given.shape), error * given, given**2], axis=-1)
         return np.stack([products[a:b].sum(axis=0) for a, b in problem.folds], axis=1)
@@ -139,7 +152,7 @@ def runs_without_feedback(problem: Problem, given: Array) -> tuple[FoldRuns, flo
             for column in given.T
         ]
         given = given * amplitudes
-    memory = memory_of(problem, [given[a:b, 0] for a, b in problem.folds])
+    memory = memory_of(problem, [given[a:b, Fit.FOLD] for a, b in problem.folds])
     one, free = np.empty_like(given), np.empty_like(given)
     for a, b in problem.folds:
         for j, column in enumerate(given[a:b].T):
@@ -194,4 +207,4 @@ def on_validation(problem: Problem, runs: FoldRuns, models: Sequence[ErrorModel]
     """
     if problem.split.valid:
         return tuple(on_records(model, problem.split.valid, problem) for model in models)
-    return tuple(runs.judge(problem, column) for column in range(len(models)))
+    return tuple(runs.judge(problem, Fit(column)) for column in range(len(models)))

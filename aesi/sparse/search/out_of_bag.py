@@ -28,7 +28,7 @@ def out_of_bag(problem: Problem, active: IntArray, fits: Array, resamples: IntAr
     """(models,) equation (1) of the fits (models, m) of these resamples; infinite where one diverges."""
     unseen_rows = problem.unseen_rows[:, resamples]
     squares = _squares(problem, active, fits, resamples)
-    bare = float(problem.row_weights @ (problem.target - problem.zero) ** 2) / len(problem.target)
+    bare = float(problem.row_weights @ problem.target**2) / len(problem.target)
     return comparable(squares, unseen_rows, problem.unseen_sizes) / bare
 
 

@@ -28,7 +28,7 @@ from aesi.sparse.search.rows import (
     nearness_of_left_out,
     training_rows,
 )
-from aesi.sparse.search.unseen import judged_unseen, unseen_errors
+from aesi.sparse.search.unseen import refits_physics_per_fold, unseen_errors
 from aesi.sparse.terms.library import Library
 from aesi.sparse.terms.scaling import Outside
 
@@ -112,7 +112,7 @@ class Problem(TrainingRows, Factors):
         left_out : the training records under physics that was fitted without each fold, where there is such a one:
         then what is learnt without a fold, and judged on it, is the error of that physics.
         Raises DataError where there is nothing to learn from: no records, records of different sampling, an
-        error or all inputs constant, NaN, or fewer rows than library terms.
+        error or all inputs constant, NaN, or fewer rows than library terms; or where `left_out` is not of the folds.
         """
         options = options or Options()
         train, valid, notes = prepared_series(split, options.inputs, library)
@@ -123,10 +123,11 @@ class Problem(TrainingRows, Factors):
         n = len(rows.target)
         block = _checked_block(options.block, rows.spans)
         folds = _checked_pieces(left_out_pieces(rows.spans, options.fold, options.cuts), options.fold)
-        if not judged_unseen(options.fold, options.feedback, len(left_out), len(folds)):
+        drives = options.fold is None and len(rows.spans) > 1
+        if not refits_physics_per_fold(drives, options.feedback, len(left_out), len(folds)):
             left_out = ()
         unseen = unseen_errors(left_out, rows.scaling, rows.error, rows.target, folds)
-        row_weights = balanced_weights(rows.spans, rows.target - rows.zero) if options.balance else np.ones(n)
+        row_weights = balanced_weights(rows.spans, rows.target) if options.balance else np.ones(n)
         counts = moving_block_weights(
             rows.spans, block, options.resamples, np.random.default_rng(options.seed)
         )

@@ -43,11 +43,6 @@ class TrainingRows:
     temperature_degc: Array
     region: TrainedRegion
 
-    @property
-    def zero(self) -> float:
-        """The scaled error at which the physics model is exact."""
-        return float(self.scaling.error_to_scaled(np.array(0.0)))
-
     def theta(self, which: IntArray) -> Array:
         """(n_terms, n) the given terms along the training rows."""
         return np.asarray(

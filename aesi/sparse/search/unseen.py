@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aesi.errors import DataError
 from aesi.numerics.blocks import Span
 from aesi.numerics.typing import Array
 from aesi.records import HeldOutDrive
@@ -29,13 +30,22 @@ class UnseenErrors:
     target: Array
 
 
-def judged_unseen(fold: object, feedback: bool, parts: int, folds: int) -> bool:
-    """Are folds judged by the error of physics that has not seen them?
+def refits_physics_per_fold(drives: bool, feedback: bool, parts: int, folds: int) -> bool:
+    """Is each fold judged by the error of physics that was fitted without it?
 
-    Not where they are pieces of a `fold` length, or terms hold the error itself, and only where there is a left-out
-    part for each.
+    drives : whether folds are whole records or parts of them; there is no such physics of pieces of rows.
+    feedback : whether terms may hold the error itself: then all is judged by the physics that is served.
+    parts : of how many folds there is such physics; none where one physics serves all.
+    Raises DataError where there are others than one for each of the folds.
     """
-    return fold is None and not feedback and parts == folds
+    if not drives or feedback or not parts:
+        return False
+    if parts != folds:
+        raise DataError(
+            f"physics was fitted without {parts} parts of the training records, but the search leaves out {folds} in "
+            "turn; give one for each, cut as the search cuts the records."
+        )
+    return True
 
 
 def unseen_errors(

@@ -99,6 +99,21 @@ def test_eating_memory_is_an_outcome(pool):
     assert fine == 10**6
 
 
+def test_building_the_problem_took_of_the_time_of_the_first_candidate():
+    def build():
+        time.sleep(2.0)
+        return behave
+
+    pool = LocalPool(build, workers=1, timeout_s=1.0, memory_mb=500)
+    try:
+        assert outcomes(pool, [("return", 1), ("sleep", 60)]) == [
+            1,
+            Failed("took longer than 1 s", of_machine=True),
+        ]
+    finally:
+        pool.close()
+
+
 def test_a_lost_process_costs_one_candidate(pool):
     result = outcomes(pool, [("die", 0), ("return", 1), ("die", 0), ("return", 2)])
     assert [isinstance(one, Failed) for one in result] == [True, False, True, False]

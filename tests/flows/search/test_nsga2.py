@@ -1,4 +1,4 @@
-"""The search: deterministic, resumable and shared."""
+"""The search: deterministic and resumable."""
 
 import numpy as np
 import optuna
@@ -14,6 +14,11 @@ def genomes(result):
     return [trial.genome for trial in result.trials]
 
 
+def by(evaluate_one):
+    """What evaluates a generation one candidate after the other."""
+    return lambda batch: ((k, evaluate_one(genome)) for k, genome in enumerate(batch))
+
+
 def test_the_same_seed_gives_the_same_search(problem):
     one, two = (search(problem, 12, seed=3, settings=SearchSettings(4)) for _ in range(2))
     assert genomes(one) == genomes(two)
@@ -26,15 +31,15 @@ def test_an_interrupted_search_goes_on_as_if_it_had_not_been(problem, tmp_path):
     journal = tmp_path / "study" / "journal.log"
     calls = 0
 
-    def stops(p, genome):
+    def stops(genome):
         nonlocal calls
         calls += 1
         if calls == 7:
             raise KeyboardInterrupt
-        return evaluate(p, genome)
+        return evaluate(problem, genome)
 
     with pytest.raises(KeyboardInterrupt):
-        search(problem, 12, seed=3, storage=journal, settings=SearchSettings(4), evaluate_one=stops)
+        search(problem, 12, seed=3, storage=journal, settings=SearchSettings(4), evaluate_many=by(stops))
     resumed = search(problem, 12, seed=3, storage=journal, settings=SearchSettings(4))
     assert genomes(resumed) == genomes(whole)
     assert [t.losses for t in resumed.trials] == [t.losses for t in whole.trials]
@@ -74,11 +79,11 @@ def test_warm_start_and_failures_are_in_the_study(problem):
 
 
 def test_a_bug_in_the_evaluation_is_not_swallowed(problem):
-    def broken(p, genome):
+    def broken(genome):
         raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
-        search(problem, 4, seed=0, evaluate_one=broken)
+        search(problem, 4, seed=0, evaluate_many=by(broken))
 
 
 def test_all_infeasible_is_one_clear_error(problem):
@@ -88,7 +93,7 @@ def test_all_infeasible_is_one_clear_error(problem):
 
 
 def test_all_failed_is_one_clear_error(problem):
-    result = search(problem, 3, seed=0, evaluate_one=lambda p, g: Failed("out of luck"))
+    result = search(problem, 3, seed=0, evaluate_many=by(lambda _: Failed("out of luck")))
     with pytest.raises(FitError, match="3 x out of luck"):
         result.best()
 
@@ -97,12 +102,13 @@ def test_of_two_candidates_alike_the_earlier_one_is_picked(problem):
     good = Genome.whole(problem.library, 1e-2, 1e-3, 0.5, 2, 2, feedback=False)
     result = search(problem, 2, seed=0, settings=SearchSettings(2, warm_start=(good, good)))
     assert result.trials[0].losses == result.trials[1].losses
-    assert result.best().trial.number == 0
+    assert result.best().number == 0
     assert result.fittest(1.0) == (0, 1)
 
 
 def test_the_front_is_not_dominated_and_the_pick_lies_on_it(problem):
-    result = search(problem, 30, seed=1, settings=SearchSettings(10))
+    settings = SearchSettings(10, weights=FitnessWeights(0.3, 0.6, 0.1))
+    result = search(problem, 30, seed=1, settings=settings)
     front = result.front()
     assert front
     for trial in front:
@@ -110,14 +116,15 @@ def test_the_front_is_not_dominated_and_the_pick_lies_on_it(problem):
             all(a <= b for a, b in zip(o.losses, trial.losses, strict=True)) and o.losses != trial.losses
             for o in result.feasible
         )
-    best = result.best(FitnessWeights(0.3, 0.6, 0.1))
-    assert best.trial in front
-    assert best.fitness == pytest.approx(
-        max(
-            1 - 0.3 * t.losses[0] - 0.6 * t.losses[1] - 0.1 * t.losses[2] / len(problem.library)
-            for t in front
+    best = result.best()
+    assert best in front
+
+    def score(trial):
+        return (
+            1 - 0.3 * trial.losses[0] - 0.6 * trial.losses[1] - 0.1 * trial.losses[2] / len(problem.library)
         )
-    )
+
+    assert score(best) == pytest.approx(max(score(trial) for trial in front))
 
 
 def test_parents_are_the_elite_of_all_earlier_generations(problem):
@@ -140,37 +147,19 @@ def test_evolution_beats_the_random_start(problem):
     assert max(score[10:]) > max(score[:10])
 
 
-def test_two_workers_share_a_study_without_drawing_the_same_point(problem, tmp_path):
+def test_a_study_in_a_database_goes_on_with_other_candidates(problem, tmp_path):
     url = f"sqlite:///{tmp_path / 'study.db'}"
-    first = search(problem, 4, seed=0, storage=url, settings=SearchSettings(4), shared=True)
-    both = search(problem, 8, seed=0, storage=url, settings=SearchSettings(4), shared=True)
+    first, both = (search(problem, n, seed=0, storage=url, settings=SearchSettings(4)) for n in (4, 8))
     assert [trial.number for trial in both.trials] == list(range(8))
     assert genomes(both)[:4] == genomes(first)
     assert len(set(genomes(both))) == 8
-
-
-def test_what_another_worker_evaluates_now_is_left_alone(problem, tmp_path):
-    journal = tmp_path / "study.log"
-    started = []
-
-    def meanwhile(p, genome):
-        if not started:
-            started.append(True)
-            other = search(problem, 2, seed=0, storage=journal, settings=SearchSettings(4), shared=True)
-            assert [trial.number for trial in other.trials] == [4, 5]
-        return evaluate(p, genome)
-
-    both = search(
-        problem, 6, seed=0, storage=journal, settings=SearchSettings(4), shared=True, evaluate_one=meanwhile
-    )
-    assert [trial.number for trial in both.trials] == [0, 1, 2, 3, 4, 5]
 
 
 def test_the_fittest_are_a_share_of_all_and_begin_with_the_pick(problem):
     result = search(problem, 30, seed=1, settings=SearchSettings(10))
     numbers = result.fittest(0.1)
     assert len(set(numbers)) == len(numbers) == 3
-    assert numbers[0] == result.best().trial.number
+    assert numbers[0] == result.best().number
     fitnesses = {trial.number: trial.numbers["fitness"] for trial in result.feasible}
     others = [value for number, value in fitnesses.items() if number not in numbers]
     assert min(fitnesses[number] for number in numbers) >= max(others)

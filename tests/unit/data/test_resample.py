@@ -98,3 +98,11 @@ def test_a_current_that_runs_straight_was_resampled_as_a_staircase():
     assert held.notes[-1].endswith("current averaged over each interval, voltage interpolated between rows.")
     dense = to_even(measurement(np.arange(0.0, 10.5, 0.5), np.arange(0.0, 10.5, 0.5)), 1.0, "linear")
     np.testing.assert_allclose(dense.current_a[1:], dense.time_s[1:] - 0.5)  # averages of the second before
+
+
+def test_a_ramp_declared_straight_between_rows_lost_charge_where_it_was_thinned():
+    ramp = measurement(np.arange(101.0), np.arange(101.0)).held("linear")
+    few = decimate(ramp, 11)
+    taken_ah, given_ah = (m.discharged_ah(m.hold_taken)[-1] for m in (few, ramp))
+    assert taken_ah == pytest.approx(given_ah, rel=1e-12)
+    assert "constant from here on" in few.notes[0]

@@ -30,6 +30,7 @@ def test_values_follow_the_rules_of_arithmetic():
         "x if x else 1",
         "'text'",
         "True",
+        "x * False",
         "x; x",
         "x // 2",
         "",

@@ -312,3 +312,22 @@ def test_a_voltage_that_is_not_known_further_on_made_a_start_that_is_no_number(c
 def test_a_start_that_is_no_state_of_charge_was_taken_as_given(soc0):
     with pytest.raises(InputError, match="is not a state of charge"):
         initial_state(LG_M50, resting(3.7), soc0)
+
+
+@pytest.mark.parametrize("low_soc_excess", [0.0, 0.5])
+def test_an_effect_in_series_was_taken_for_open_circuit_voltage_at_rest(low_soc_excess):
+    effects = [
+        CATALOGUE["ocv_hysteresis"].activate(magnitude_v=0.03, start=1.0, low_soc_excess=low_soc_excess)
+    ]
+    run = simulate(LG_M50, [0.0, 1.0], [0.0, 0.0], effects=effects, rest_voltage_v=3.7)
+    assert run.voltage_v[0] == pytest.approx(3.7, abs=1e-6)
+    found = initial_state(LG_M50, resting(3.7), effects=effects)
+    assert found.soc == pytest.approx(float(run.series["soc"][0]), abs=1e-9)
+
+
+def test_an_effect_in_series_was_taken_for_a_drop_of_the_load():
+    effects = [CATALOGUE["ocv_hysteresis"].activate(magnitude_v=-0.03, rate=1.0, start=1.0)]
+    time, current = np.arange(60.0), np.full(60, 5.0)
+    run = simulate(LG_M50, time, current, 0.6, effects)
+    found = initial_state(LG_M50, record(time, current, run.voltage_v), effects=effects)
+    assert (found.basis, found.soc) == ("load", pytest.approx(0.6, abs=0.005))

@@ -1,5 +1,7 @@
 """Constitutive relations: values, scaling, and the way into a file."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,6 @@ from aesi.physics.cell.relations import (
     Constant,
     Expression,
     LookupTable,
-    PowerSeries,
     Product,
     Scaled,
     Sum,
@@ -17,6 +18,7 @@ from aesi.physics.cell.relations import (
     tabulated,
     to_bpx,
 )
+from aesi.physics.espm.tables import ocp_table
 
 X = np.linspace(0.0, 1.0, 7)
 TABLE = LookupTable((0.0, 0.5, 1.0), (1.0, 3.0, 2.0))
@@ -27,7 +29,7 @@ def test_a_table_is_straight_between_its_points_and_constant_beyond():
 
 
 def test_sums_products_and_factors():
-    mix = Sum(Scaled(TABLE, 2.0), Product(Constant(3.0), PowerSeries((1.0, 0.0, 2.0))))
+    mix = Sum(Scaled(TABLE, 2.0), Product(Constant(3.0), Expression("1 + 2 * x ** 2")))
     assert mix(X) == pytest.approx(2.0 * TABLE(X) + 3.0 * (1.0 + 2.0 * X**2))
     assert tabulated(mix, 0.0, 1.0, 7) == pytest.approx(mix(X))
 
@@ -45,13 +47,32 @@ def test_a_factor_of_one_changes_nothing_and_factors_join():
         Expression("exp(x) - 2"),
         TABLE,
         Scaled(Expression("x ** 2"), 0.3),
-        Sum(Expression("x"), PowerSeries((0.1, -0.2))),
+        Sum(Expression("x"), Scaled(Constant(0.1), -2.0)),
+        Scaled(Expression("x ** 2"), np.float64(0.3)),
         Product(Expression("x"), TABLE),
     ],
 )
 def test_what_a_file_holds_reads_back_as_the_same_function(item):
     back = relation(to_bpx(item), "test")
-    assert back(X) == pytest.approx(item(X), abs=1e-6)  # mixtures with tables become tables of 1,025 points
+    assert back(X) == pytest.approx(item(X), abs=1e-6)  # mixtures with tables become tables
+
+
+def test_what_effects_add_to_a_potential_with_a_pole_was_written_as_infinite():
+    mixed = Sum(Expression("3.6 - x + 0.002 * log((1 - x) / x)"), LookupTable((0.1234, 0.7), (0.0, 0.01)))
+    held = json.loads(json.dumps(to_bpx(mixed), allow_nan=False))
+    assert np.array_equal(ocp_table(relation(held, "OCP"), "positive"), ocp_table(mixed, "positive"))
+
+
+def test_sums_of_tables_are_written_by_their_own_points():
+    mixed = Sum(TABLE, Scaled(LookupTable((0.123, 0.7), (0.0, 1.0)), 2.0))
+    assert to_bpx(mixed)["x"] == [0.0, 0.123, 0.5, 0.7, 1.0]
+    fine = np.linspace(-0.1, 1.1, 1001)
+    assert relation(to_bpx(mixed), "OCP")(fine) == pytest.approx(mixed(fine), abs=1e-15)
+
+
+def test_a_mixture_that_is_not_finite_inside_is_refused_in_one_sentence():
+    with pytest.raises(CellError, match="not finite at 0, between -1 and 1"):
+        to_bpx(Sum(Expression("log(x ** 2)"), TABLE), -1.0, 1.0)
 
 
 @pytest.mark.parametrize(

@@ -303,3 +303,13 @@ def test_an_entropy_that_ends_at_the_limits_was_told_as_an_open_circuit_potentia
         CellError, match="the entropic change coefficient of the negative electrode is not fin"
     ):
         simulate(odd, [0.0, 1.0], [1.0, 1.0], 0.5, temperature_degc=[10.0, 10.1], model=model)
+
+
+@pytest.mark.parametrize("effects", [(), ("concentration_dependent_diffusivity",)])
+def test_a_step_that_its_stamps_round_up_was_taken_in_one_part_more(effects):
+    active = [CATALOGUE[name].activate() for name in effects]
+    even = np.arange(300.0)
+    rounded = even + 2e-13 * np.arange(300)
+    current = np.repeat(np.random.default_rng(5).normal(2.5, 6.0, 30), 10)
+    exact, near = (simulate(LG_M50, time, current, 0.8, active, hold="backward") for time in (even, rounded))
+    assert near.voltage_v == pytest.approx(exact.voltage_v, abs=1e-8)

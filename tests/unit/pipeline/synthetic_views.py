@@ -168,7 +168,7 @@ def discovery_view(n=4000, seed=0, verdict="found"):
                 discovery_row("ambient_temperature", "parameter", 405.0, 1.2),
                 discovery_row("series_resistance", "physics", 120.0, 4.6),
                 discovery_row("voltage_sensor_offset", "instrument", 14.0, 6.0),
-                discovery_row("placebo", "placebo", 3.0, 6.2),
+                discovery_row("clock_skew", "instrument", 3.0, 6.2),
             ],
         },
         traces=tuple(

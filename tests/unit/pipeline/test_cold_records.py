@@ -12,6 +12,7 @@ from aesi.errors import DataError
 from aesi.physics.belongs import check_measured
 from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.calibrate import scaled_to
+from aesi.pipeline.discovery import cold
 from aesi.pipeline.discovery.cases import case_of_files
 from aesi.pipeline.discovery.cold import with_cold_admitted
 from aesi.pipeline.discovery.discover import Case
@@ -83,3 +84,19 @@ def test_a_cell_that_does_not_answer_to_temperature_and_a_record_that_tells_its_
     still = still.with_positive(diffusivity_ea_j_mol=0.0, rate_ea_j_mol=0.0, film_ea_j_mol=0.0)
     still = still.with_electrolyte(conductivity_ea_j_mol=0.0, diffusivity_ea_j_mol=0.0)
     assert "Ah leave the cell" in refused(still, cold)
+
+
+@pytest.mark.parametrize(("asked", "model"), [("dfn", "dfn"), (None, "espm")])
+def test_a_discovery_by_the_porous_electrode_asked_the_single_particle_for_the_cold(
+    hg2, monkeypatch, asked, model
+):
+    used = set()
+
+    def noted(*args, **options):
+        used.add(options["model"])
+        return aesi.simulate(*args, **{**options, "model": "espm"})
+
+    monkeypatch.setattr(cold, "simulate", noted)
+    (record,) = with_cold_admitted(Case(HG2, (discharged(hg2, -40.0),), model=asked)).measurements
+    assert any("at some -15 degC" in note for note in record.notes)
+    assert used == {model}

@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 from small_experiment import BPX
 
+from aesi.errors import SimulationError
 from aesi.numerics.metrics import rms
 from aesi.physics import Cell, simulate
+from aesi.pipeline.experiment import recalibrate as recalibration
 from aesi.pipeline.experiment.config import parse_experiment
 from aesi.pipeline.experiment.load import load
 from aesi.pipeline.experiment.physics_models import DECLARED, RECALIBRATED
 from aesi.pipeline.experiment.recalibrate import MODEL_ERROR_V, SETTLED, FitRecord, recalibrate
-from aesi.pipeline.product.deviations import INITIAL_STATE
+from aesi.pipeline.product.deviations import INITIAL_STATE, deviating
 from aesi.records import Measurement
 
 CELL = Cell.from_bpx(BPX)
@@ -87,3 +89,18 @@ def test_an_initial_state_that_is_fitted_alone_is_the_charge_of_all_records():
     declared = recalibrate(CELL, (), {}, "linear")
     assert 0.5 - OFF < found.soc0(0.5) < 0.5 - 0.5 * OFF
     assert left_v(found, low["one"]) < 0.5 * left_v(declared, low["one"])
+
+
+def test_a_model_that_fails_on_one_side_ended_the_fit(monkeypatch):
+    record = discharged("one", -OFF)
+
+    def failing(declared, effects, free, z, model):
+        if max(z) > 0.0:
+            raise SimulationError("it runs into volts")
+        return deviating(declared, effects, free, z, model)
+
+    everywhere = recalibrate(CELL, (), {"one": record}, "linear", INITIAL_STATE)
+    monkeypatch.setattr(recalibration, "deviating", failing)
+    found = recalibrate(CELL, (), {"one": record}, "linear", INITIAL_STATE)
+    assert everywhere.shift < -0.3 * OFF
+    assert found.shift == pytest.approx(everywhere.shift, rel=0.01)

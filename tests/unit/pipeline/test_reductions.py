@@ -63,7 +63,7 @@ def test_without_validation_records_the_pieces_count_that_candidates_are_judged_
     _, loaded, problem, candidate = searched(record)
     shares = valid_shares(problem, loaded.left_out)
     scale = problem.scaling.error_volts_per_unit
-    corrected = scale**2 * np.sum((problem.unseen_target - problem.zero) ** 2)
+    corrected = scale**2 * np.sum(problem.unseen_target**2)
     declared = sum(np.sum(series.left_by("ESPM")[1:] ** 2) for series in loaded.split.train)
     assert shares["mser_pct"] == pytest.approx(corrected / declared)
     assert valid_reductions(candidate, shares)["mser_pct"] > 99.0
@@ -88,7 +88,7 @@ def test_the_error_that_a_candidate_is_judged_by_was_that_of_physics_that_the_se
     )
     loaded = load(config)
     problem = build_problem(loaded, config)
-    by_search = (problem.scaling.error_volts_per_unit * (problem.unseen_target - problem.zero)) ** 2
+    by_search = (problem.scaling.error_volts_per_unit * problem.unseen_target) ** 2
     declared = sum(
         float(np.sum(part.take(rows).left_by("ESPM") ** 2))
         for (part, rows) in (fold_samples(problem, a, b) for a, b in problem.folds)

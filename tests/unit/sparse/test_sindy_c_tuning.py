@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from aesi.records import Failed
 from aesi.sparse import FitnessWeights, Genome
-from aesi.sparse.baselines import Judge, tuned_sindy_c
+from aesi.sparse.baselines import Judge, sindy_c, tuned_sindy_c
+from aesi.sparse.baselines.sindy_c import evaluate_sindy_c
 from aesi.sparse.search.evolution import fittest
 from aesi.sparse.search.genome_space import GenomeSpace
 
@@ -23,6 +25,18 @@ def test_sindy_c_was_tuned_by_other_weights_than_the_search(problem):
             assert row["fitness"] == pytest.approx(1.0 - row["loss_left_out"])
     other = rows(problem, Judge(FitnessWeights(oob=0.0, valid=1.0, sparse=0.0)))
     assert other[0]["fitness"] == pytest.approx(1.0 - other[0]["loss_valid"])
+
+
+def test_a_row_that_failed_held_its_genome_in_another_shape(problem, monkeypatch):
+    outcomes = iter([Failed("no term survives")])
+
+    def evaluate(problem, genome, weights):
+        return next(outcomes, None) or evaluate_sindy_c(problem, genome, weights)
+
+    monkeypatch.setattr(sindy_c, "evaluate_sindy_c", evaluate)
+    first, second, *_ = rows(problem, Judge())
+    assert set(first) == {"genome", "failed"}
+    assert first["genome"].keys() == second["genome"].keys()
 
 
 def test_a_candidate_below_the_correlations_ranks_below_all_that_keep_to_them(problem):

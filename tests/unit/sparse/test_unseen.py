@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from sparse_records import make_record
 
+from aesi.errors import DataError
 from aesi.records import HeldOutDrive, Split
 from aesi.sparse import Candidate, Genome, Options, Problem, STRidge, evaluate
 from aesi.sparse.search.fold_models import fold_models
@@ -30,6 +31,13 @@ def left_out() -> list[HeldOutDrive]:
 
 def problem(left) -> Problem:
     return Problem.build(Split(DRIVES, (), ()), OPTIONS, left_out=left)
+
+
+def test_physics_of_too_few_folds_was_passed_over_in_silence():
+    with pytest.raises(
+        DataError, match="without 2 parts of the training records, but the search leaves out 3"
+    ):
+        problem(left_out()[:2])
 
 
 def candidate(of: Problem) -> Candidate:

@@ -15,7 +15,7 @@ from aesi.conformal.parameter_spread import covariance_root, spread
 from aesi.numerics.typing import Array, BoolArray
 from aesi.numerics.visited import Visited
 from aesi.pipeline.experiment.recalibrate import MEMORY_S, MODEL_ERROR_V
-from aesi.pipeline.product.deviations import ENERGIES_J_MOL, KNOBS
+from aesi.pipeline.product.deviations import ENERGIES_J_MOL, PRIORS
 from aesi.records import ErrorModel, ErrorSeries, FreeRun
 from aesi.sparse import SparseModel
 from aesi.sparse.yardsticks import Bare
@@ -160,7 +160,7 @@ def _root(
     left_out: ErrorSeries | None = None,
     rows: slice = WHOLE,
 ) -> Array | None:
-    """Of the knobs, by the training records without the given rows of one of them, where that is one; None without
+    """Of the parameters, by the training records without the given rows of one of them, where that is one; None without
     slopes.
 
     missed_v : what a fit to these rows allowed for; None where none was made, which would begin with the least."""
@@ -168,7 +168,7 @@ def _root(
     for record in train:
         if record.slopes_v is not None:
             held = left_out is not None and record.name == left_out.name
-            slopes.append(record.slopes_v[_others(len(record), rows) if held else slice(None), : len(KNOBS)])
+            slopes.append(record.slopes_v[_others(len(record), rows) if held else slice(None), : len(PRIORS)])
     error_v = MODEL_ERROR_V if missed_v is None else missed_v
     return covariance_root(slopes, train[0].dt_s / (MEMORY_S * error_v**2)) if slopes else None
 

@@ -17,7 +17,7 @@ from aesi.pipeline.experiment.candidate import method
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.intervals.bands import WHOLE, OutOfSampleErrors, Unseen
-from aesi.records import LeftOutDrives
+from aesi.records import ErrorModel, LeftOutDrives
 from aesi.sparse import ENSEMBLES, Candidate, Problem, SparseModel
 from aesi.sparse.search.fold_models import fold_models, with_leverage
 from aesi.sparse.yardsticks import Bare
@@ -47,7 +47,18 @@ def _conformalised(
     config: ExperimentConfig,
     left_out: LeftOutDrives,
 ) -> Fitted:
-    model = one.model
+    pairs, drives, model = _unseen_predictions(one.model, problem, chosen, left_out)
+    one = replace(one, model=model)
+    if not pairs:
+        return replace(one, notes=(f"{one.model.name} saw every record, so it has no calibrated intervals.",))
+    return _calibrated(one, pairs, drives, problem, config)
+
+
+def _unseen_predictions(
+    model: ErrorModel, problem: Problem, chosen: Candidate, left_out: LeftOutDrives
+) -> tuple[list[Unseen], list[Unseen], ErrorModel]:
+    """Validation records and left-out parts, and whole left-out drives, each with a model that has not seen it; and the
+    model as it is served."""
     pairs: list[Unseen] = []
     drives: list[Unseen] = []
     if isinstance(model, SparseModel) and model.name in ENSEMBLES:
@@ -61,10 +72,13 @@ def _conformalised(
         if not left_out.parts:
             pairs += [(model, series, WHOLE) for series in problem.split.train]
     # By the model that is served: its leverage takes part in how a correction fades.
-    pairs = [(model, series, WHOLE) for series in problem.split.valid] + pairs
-    one = replace(one, model=model)
-    if not pairs:
-        return replace(one, notes=(f"{one.model.name} saw every record, so it has no calibrated intervals.",))
+    return [(model, series, WHOLE) for series in problem.split.valid] + pairs, drives, model
+
+
+def _calibrated(
+    one: Fitted, pairs: Sequence[Unseen], drives: Sequence[Unseen], problem: Problem, config: ExperimentConfig
+) -> Fitted:
+    """With what can be calibrated on them, and a note of what cannot."""
     intervals, bands, notes = None, None, []
     compared: dict[str, Calibrated | RefittedIntervals] = {}
     try:

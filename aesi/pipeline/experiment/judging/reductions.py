@@ -17,7 +17,7 @@ from aesi.pipeline.experiment.physics_models import DECLARED, RECALIBRATED
 from aesi.records import ErrorSeries, LeftOutDrives
 from aesi.sparse import Candidate, Problem
 from aesi.sparse.search.fold_models import fold_samples
-from aesi.sparse.search.unseen import judged_unseen
+from aesi.sparse.search.unseen import refits_physics_per_fold
 
 AGAINST = {"mser_pct": DECLARED, "mser_recalibrated_pct": RECALIBRATED}
 """How a reduction is called -> the physics whose error it is of, in the rows of models and of candidates alike."""
@@ -45,8 +45,9 @@ def _judged_pieces(problem: Problem, left_out: LeftOutDrives) -> Iterator[ErrorS
     if problem.split.valid:
         yield from (record.take(slice(1, None)) for record in problem.split.valid)
         return
-    options = problem.options
-    unseen = judged_unseen(options.fold, options.feedback, len(left_out.parts), len(problem.folds))
+    unseen = refits_physics_per_fold(
+        problem.folds_are_drives, problem.options.feedback, len(left_out.parts), len(problem.folds)
+    )
     for number, (a, b) in enumerate(problem.folds):
         record, rows = fold_samples(problem, a, b)
         yield (left_out.parts[number].series if unseen else record).take(rows)

@@ -29,8 +29,6 @@ def ranking_figure(candidates: Sequence[Row], titles: Mapping[str, str], chosen:
         f"are odds of ten to one. In the shaded part, up to {ALIKE_NATS:g}, two say the same, and what needs less to "
         "say it is believed. What stands beside another effect shares the score of both."
     )
-    if any(row["kind"] == "placebo" for row in rows):
-        caption += " The placebo has parameters but no physics."
     fig = style.figure("Hypotheses, behind the best", caption, max(240, 130 + 20 * (len(rows) + 1)))
     behind = {_label(row, titles, chosen): best - row["score"] for row in rows} | {DECLARED: best}
     kinds = {row["kind"] for row in rows}
