@@ -63,9 +63,8 @@ class RefittedForest:
         """
         self.check(alpha, window)
         records = checked_records(residuals)
-        runs = [
-            record[rows] for record in records for rows in np.ma.clump_unmasked(np.ma.masked_invalid(record))
-        ]
+        parts = [part for one in records for part in np.split(one, np.flatnonzero(~np.isfinite(one)))]
+        runs = [part[np.isfinite(part)] for part in parts]  # each but a record's first begins with its gap
         longest = max(runs, key=len, default=np.empty(0))
         if len(longest) < 2 * window:
             raise FitError(
