@@ -63,13 +63,15 @@ def _films_ohm(cell: Cell) -> float:
 
 
 def health_intervals(found: Calibration) -> Mapping[str, tuple[float, float]]:
-    """95 % interval of each quantity: the covariance of the fit, carried through to first order."""
+    """95 % interval of each quantity: the covariance of the fit, carried through to first order; from an upper bound,
+    beyond which no value moves, by slopes towards the inside."""
     at = np.array(astuple(health_of(rewound(found.model, found.x))))
     slopes = np.zeros((len(at), len(found.x)))
     for j in range(len(found.x)):
+        h = STEP if found.x[j] + STEP <= found.model.high[j] else -STEP
         there = found.x.copy()
-        there[j] += STEP
-        slopes[:, j] = (np.array(astuple(health_of(rewound(found.model, there)))) - at) / STEP
+        there[j] += h
+        slopes[:, j] = (np.array(astuple(health_of(rewound(found.model, there)))) - at) / h
     reach = NINETY_FIVE * np.sqrt(np.einsum("ij,jk,ik->i", slopes, found.covariance, slopes))
     middle = np.array(astuple(health_of(found.cell)))
     return {

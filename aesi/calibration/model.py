@@ -230,8 +230,8 @@ class Model:
         return np.concatenate([*misfits, self.spectra.misfits(cell), x])
 
     def jacobian(self, x: Array) -> Array:
-        """(rows + frequencies + n, n) slopes of `residual`: one-sided differences, and for records in closed form those
-        over the knots of potentials."""
+        """(rows + 2 frequencies + n, n) slopes of `residual`: one-sided differences, and for records in closed form
+        those over the knots of potentials."""
         cell = self.cell_at(x)
         runs = [self.run(i, cell, x) for i in range(len(self.records))]
         blocks = [np.zeros((len(r.rows), self.layout.size)) for r in self.records]

@@ -1,11 +1,14 @@
 """Posterior samples of a calibration, drawn by emcee, to check the intervals of the linearised fit.
 
-The potentials' knots, the states of charge, the ages and the cycler's zero enter the voltage all but linearly; they are
-integrated out in closed form about each sample, so that the walkers move in the global parameters alone:
+The potentials' knots, the cycler's zero, and the states of charge, the active material and the silicon of each record
+enter the voltage all but linearly; they are integrated out in closed form about each sample, so that the walkers move
+in the global parameters alone:
 
     log p(z) = -1/2 (r' r - b' H^-1 b) - 1/2 log det H,      H = J_l' J_l + 1,   b = J_l' r
 
 r the weighted residuals at z with the linear ones where the fit put them, J_l their slopes.
+What a cell lost between dated records is not linear: it is |e|, whose slope over its coordinate is 0.07, 0.63 and 0.91
+at -2, 0 and 2 (`Ageing.slopes`). Its interval is that of the slope at the fit.
 Foreman-Mackey et al., PASP 125 (2013) 306, doi:10.1086/670067.
 """
 
@@ -31,13 +34,16 @@ SPREAD = 0.5
 @dataclass(frozen=True, eq=False)
 class PosteriorSamples:
     """samples : (n, parameters) working coordinates.  intervals : 95 %, from them.  off : name -> width over that of
-    the linear interval.  accepted : share of proposals.  autocorrelation : steps, nan where the chain is too short."""
+    the linear interval.  accepted : share of proposals.  autocorrelation : steps, nan where the chain is too short.
+    dated : were losses between dated records among what is taken to be linear?
+    """
 
     samples: Array
     intervals: dict[str, Interval]
     off: dict[str, float]
     accepted: float
     autocorrelation: float
+    dated: bool = False
 
     @property
     def sentence(self) -> str:
@@ -49,9 +55,12 @@ class PosteriorSamples:
             if not np.isfinite(self.autocorrelation)
             else f"a sample repeats itself over {self.autocorrelation:.0f} steps"
         )
+        losses = (
+            "; losses between dated records are taken to be linear, which they are not" if self.dated else ""
+        )
         return (
             f"posterior of {len(self.samples)} samples: intervals {np.median(widths):.2f} times as wide as the linear "
-            f"ones in the median, most off {worst} ({self.off[worst]:.2f} times); {chain}."
+            f"ones in the median, most off {worst} ({self.off[worst]:.2f} times); {chain}{losses}."
         )
 
 
@@ -115,4 +124,4 @@ def _summary(found: Calibration, samples: Array, accepted: float, autocorrelatio
             free.value(float(middle)), free.value(float(low)), free.value(float(high)), free.unit, free.source
         )
         off[free.name] = float((high - low) / (2.0 * NINETY_FIVE * np.sqrt(found.covariance[j, j])))
-    return PosteriorSamples(samples, out, off, accepted, autocorrelation)
+    return PosteriorSamples(samples, out, off, accepted, autocorrelation, found.model.ageing.dated)

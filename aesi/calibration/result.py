@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aesi.calibration.model import Model
+from aesi.calibration.parameters import Free
 from aesi.constants import MV_PER_V
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
@@ -168,7 +169,7 @@ def _stand_ins(model: Model, x: Array) -> tuple[str, ...]:
 
 
 def information_weights(model: Model, x: Array) -> Array:
-    """(rows + frequencies + n,) factors on `Model.residual` that make it count as much as it says of its own.
+    """(rows + 2 frequencies + n,) factors on `Model.residual` that make it count as much as it says of its own.
 
     What is left of a record after the fit repeats itself: n rows of first autocorrelation rho are as many as
     n (1 - rho)/(1 + rho).
@@ -221,10 +222,15 @@ def undetermined(model: Model, jacobian: Array) -> tuple[Open, ...]:
 
 
 def at_bounds(model: Model, x: Array) -> tuple[str, ...]:
-    """Names of the parameters that ended on a bound of their range."""
+    """Names of the parameters that ended on a bound of their range; nought is where a resistance may end."""
     width = BOUND_SHARE * (model.high - model.low)
     return tuple(
         f.name
         for j, f in enumerate(model.free)
-        if model.high[j] - x[j] < width[j] or (x[j] - model.low[j] < width[j] and f.low != 0.0)
+        if model.high[j] - x[j] < width[j]
+        or (x[j] - model.low[j] < width[j] and not _nought(f, model.low[j]))
     )
+
+
+def _nought(free: Free, z: float) -> bool:
+    return abs(free.value(z)) < ROUND_OFF * free.sd

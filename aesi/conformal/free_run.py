@@ -101,11 +101,17 @@ class FreeRunBands:
         records : the name of the record that each array is of, where several are of one (its rows numbered alike): no
         piece is scored by a scale that is fitted to its own rows under another model. By default each is of its own.
 
-        Raises InputError for arrays that do not match, FitError for too few pieces or errors all zero.
+        Raises InputError for arrays that do not match, FitError for too few pieces, or none that shares no row with
+        one, and for errors all zero.
         """
         if not errors_by_horizon:
             raise InputError("no horizon to calibrate; give errors for at least one.")
         lengths = [len(each) for each in next(iter(errors_by_horizon.values()))]
+        _check_lengths(lengths, spread_v=spread_v, inside=inside, excess=excess)
+        if records is not None and len(records) != len(lengths):
+            raise InputError(
+                f"{len(records)} names of records for the errors of {len(lengths)}; give one a record."
+            )
         spreads = spread_v or [np.zeros(n) for n in lengths]
         columns = [covariates(p, x) for p, x in zip(spreads, excess or [None] * len(spreads), strict=True)]
         usable = inside or [np.ones(n, dtype=bool) for n in lengths]
@@ -216,9 +222,22 @@ class FreeRunBands:
         columns = covariates(spread_v, excess)
         halves = np.array([band.half_width(columns) for band in self.horizons])
         # What an earlier measurement takes off the calibrated width, it takes off what the temperature leaves open too.
-        halves *= np.hypot(1.0, ndtri(1 - self.alpha / 2) * thermal_v / halves[-1])
+        open_v, whole = ndtri(1 - self.alpha / 2) * thermal_v, halves[-1]
+        share = np.hypot(1.0, open_v / np.where(whole > 0.0, whole, 1.0))
+        halves = np.where(whole > 0.0, halves * share, np.hypot(halves, open_v))
         half = _between(halves, [band.horizon_s for band in self.horizons], elapsed_s) + reach_v
         return -half, half
+
+
+def _check_lengths(lengths: Sequence[int], **given: Sequence[Array | BoolArray | None] | None) -> None:
+    for name, arrays in given.items():
+        if arrays is None:
+            continue
+        rows = [n if one is None else len(one) for n, one in zip(lengths, arrays, strict=False)]
+        if len(arrays) != len(lengths) or rows != list(lengths):
+            raise InputError(
+                f"the errors and {name} differ in length; give one array a record, one row a sample."
+            )
 
 
 def _slopes(series: ErrorSeries, count: int) -> Array:

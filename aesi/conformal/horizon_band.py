@@ -17,10 +17,10 @@ from aesi.numerics.typing import Array, BoolArray, IntArray, SavedState
 WHOLE_DRIVE = math.inf
 """The horizon of a prediction from the start of a record to its end."""
 N_PIECES = 8
-"""Records that hold more than an eighth of the usable rows are cut into pieces of about that length, so that each piece
-can be scored by a scale fitted to the others. Over the development splits in `aesi bench splits` the bands of AESI I
-score 46.1 mV on the NMC drive with 8 and 16, 47.7 mV with 4, and cover 96.3 % of the LG M50T's with 4 and 8, 66.9 %
-with 16."""
+"""Records that hold an eighth of the usable rows one and a half times or more are cut into pieces of about that length,
+so that each piece can be scored by a scale fitted to the others. Over the development splits in `aesi bench splits` the
+bands of AESI I score 46.1 mV on the NMC drive with 8 and 16, 47.7 mV with 4, and cover 96.3 % of the LG M50T's with 4
+and 8, 66.9 % with 16."""
 MIN_PIECES = 3
 """Least pieces of a band, since fewer cannot say how much one differs from the next. Where the rows inside the trained
 range give fewer, all rows are used and the band is marked `extrapolated`; where these do too, there is none. With 6 no
@@ -129,7 +129,8 @@ def calibrated_band(
     stretches : how many stretches of the rows err independently over a whole drive; by default, and where they are too
     few to be told apart, the pieces that they are cut into.
     records : of which record each is, where several are of one: a part of a drive and the whole of it.
-    Raises InputError where lengths differ, FitError for too few pieces or errors all zero.
+    Raises InputError where lengths differ, FitError for too few pieces, or none that shares no row with one, and for
+    errors all zero.
     """
     if not [len(e) for e in errors] == [len(c) for c in columns] == [len(i) for i in inside]:
         raise InputError(
@@ -147,9 +148,14 @@ def calibrated_band(
         )
     if not any(piece.sizes.any() for piece in pieces):
         raise FitError(f"the errors at {horizon:g} s are zero; calibrate on predictions of measured voltage.")
-    scales = [
-        _scale([other for other in pieces if not other.shares_rows_with(piece)], alpha) for piece in pieces
-    ]
+    others = [[other for other in pieces if not other.shares_rows_with(piece)] for piece in pieces]
+    for piece, rest in zip(pieces, others, strict=True):
+        if not rest:
+            raise FitError(
+                f"no piece is left that shares no row with one of {piece.record}, so that nothing can scale its errors "
+                f"at {horizon:g} s; give errors of another record, or of other rows."
+            )
+    scales = [_scale(rest, alpha) for rest in others]
     scores = [piece.sizes / scale(piece.columns) for piece, scale in zip(pieces, scales, strict=True)]
     counts = np.array([float(score.size) for score in scores])
     independent = float(np.maximum(1, counts * dt_s // (FORGOTTEN * horizon)).sum())

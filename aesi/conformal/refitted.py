@@ -59,12 +59,13 @@ class RefittedForest:
     ) -> RefittedIntervals:
         """Take up the end of the calibration residuals, one (n_i,) array a record, V; the current is not used.
 
-        Raises InputError as `Method.fit`, FitError where the longest record holds fewer than two windows.
+        Raises InputError as `Method.fit`, FitError where no record holds two windows without a gap.
         """
         self.check(alpha, window)
         records = checked_records(residuals)
-        finite = [record[np.isfinite(record)] for record in records]
-        longest = max(finite, key=len, default=np.empty(0))
+        parts = [part for one in records for part in np.split(one, np.flatnonzero(~np.isfinite(one)))]
+        runs = [part[np.isfinite(part)] for part in parts]  # each but a record's first begins with its gap
+        longest = max(runs, key=len, default=np.empty(0))
         if len(longest) < 2 * window:
             raise FitError(
                 f"{self.name} has {len(longest)} calibration residuals in a row and needs {2 * window}; give a "

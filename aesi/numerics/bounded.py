@@ -189,10 +189,12 @@ def slope_within(
     backward; to the other side where the function has no value.
 
     function : x -> (n,), None where it has no value.  here : (n,) at x.  bounds : of x[j]; the step is at most a
-    quarter of what they span.  None where there is a value on neither side.
+    quarter of what they span.  None where there is a value on neither side, or no room between the bounds.
     """
     low, high = bounds
     size = min(step, 0.25 * (high - low))
+    if size == 0.0:
+        return None
     for h in (size, -size) if x[j] + size <= high else (-size, size):
         moved = x.copy()
         moved[j] += h

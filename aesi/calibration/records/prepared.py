@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aesi.calibration.records.thinning import thinned
+from aesi.calibration.records.thinning import WINDOW_S, thinned
 from aesi.calibration.records.zero import is_slow
 from aesi.calibration.start import flowing
 from aesi.constants import ZERO_CELSIUS_K
@@ -84,7 +84,7 @@ def prepared(
 def _prepared(
     cell: Cell, data: Measurement, soc0: float | None, shared: bool, model: ModelName, least: float
 ) -> Prepared:
-    window_s = max(1.0, float(data.time_s[-1] - data.time_s[0]) / MOST_ROWS)
+    window_s = max(WINDOW_S, float(data.time_s[-1] - data.time_s[0]) / MOST_ROWS)
     thin = thinned(data, cell.capacity_ah, window_s)
     start = initial_state(cell, data, soc0, data.hold_taken, shared=shared, model=model)
     slow = is_slow(thin.data, cell.nominal_capacity_ah)

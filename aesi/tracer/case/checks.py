@@ -26,8 +26,8 @@ LEAST_C_RATE = 0.02
 are off by. A convention, like the rate below which a current counts as a rest (`aesi.physics.initial_state`)."""
 FOREIGN_CELL_V = 0.25
 """A model of the right chemistry, however badly parametrised, is closer than this to the voltage in the median. The
-file of an LG M50, sized to cells of other makes, errs by 50 to 110 mV RMS on their drives from 10 to 40 degC
-(`aesi bench cells`, declared). At 0 degC and below it errs by 100 to 300 mV."""
+file of an LG M50, sized to cells of other makes, errs by 50 to 115 mV RMS on their drives from 10 to 40 degC
+(`aesi bench cells`, declared; docs/cells.md). At 0 degC and below it errs by 100 mV and more, 468 at worst."""
 CONDITIONS = 5
 """Of an unmeasured quantity, over its range: a cell at -10 degC whose temperature nobody gives is off by 290 mV."""
 

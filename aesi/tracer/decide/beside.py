@@ -17,7 +17,7 @@ from aesi.numerics.typing import BoolArray
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.decide.carry_over import ORDINARY_C, range_fault
 from aesi.tracer.decide.evidence import MEASURED_EFFECTS, Answer, Evidence, with_confidence
-from aesi.tracer.decide.verdict import Thresholds, Verdict, best_gain, beyond, look_alikes
+from aesi.tracer.decide.verdict import MOST_SDS, Thresholds, Verdict, best_gain, beyond, look_alikes
 from aesi.tracer.decide.written import limits_of
 from aesi.tracer.likelihood.fit import FittedHypothesis, held_out_residual
 from aesi.tracer.likelihood.model_state import ModelState
@@ -68,13 +68,15 @@ def judged_beside(path: Path, thresholds: Thresholds) -> Verdict:
     )
     if left > allowed:
         reason += f", beyond {1e3 * allowed:.1f} mV no chance: not all of what is different is explained"
+        if not named:
+            margin = float(np.log(left / allowed)) if allowed > 0.0 else MOST_SDS
         return Verdict("unknown", named, groups, 0.0, left, allowed, reason, max(margin, 0.0))
     return Verdict("found" if named else "none", named, groups, 0.0, left, allowed, reason, margin)
 
 
 def left_v(path: Path, one: FittedHypothesis, rows: BoolArray) -> float:
     """What a hypothesis leaves beyond noise of some rows, in blocks that it has not seen, V RMS."""
-    return beyond(rms(held_out_residual(path.blocks, one)[rows]), path.problem.noise_v)
+    return beyond(rms(held_out_residual(path.blocks, one)[rows]), rms(path.problem.white_v[rows]))
 
 
 def _relative_sd(problem: InverseProblem, good: BoolArray) -> float:

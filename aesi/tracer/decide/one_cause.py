@@ -7,11 +7,9 @@ name; what it stands for is told as its look-alikes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 from aesi.physics.effect import Effect
-from aesi.tracer.decide.verdict import GROUP_SIZE
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import fitted_hypothesis
 from aesi.tracer.search.path import Path, Step
@@ -35,13 +33,10 @@ def in_one(path: Path, archive: Archive) -> tuple[Path, tuple[str, ...]]:
     if best is None or best is chosen:
         return path, ()
     step = Step((path.base,), (), (best,), best)
-    return replace(path, steps=(*path.steps, step), chosen=best), _group(best.hypothesis, chosen.hypothesis)
+    group = (*best.hypothesis, *chosen.hypothesis)
+    return replace(path, steps=(*path.steps, step), chosen=best), group
 
 
 def _tolerated(effect: Effect) -> bool:
     """Whether cell files declare what the effect moves, with a tolerance."""
     return any(p.spread is not None for p in effect.parameters.values())
-
-
-def _group(found: Sequence[str], before: Sequence[str]) -> tuple[str, ...]:
-    return (*found, *before)[:GROUP_SIZE]

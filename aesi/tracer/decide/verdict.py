@@ -107,6 +107,9 @@ def unexplained_v(problem: InverseProblem, blocks: Blocks, one: Explanation, all
     the noise and `allowed_v`, and little where it is far more so: a potential with nine coefficients cannot be known
     where no other block has been.
 
+    The noise is taken off in full all the same: with w = s**2/(s**2 + sd**2) and s**2 = noise**2 + allowed**2 a right
+    hypothesis has E[r**2] = s**2 + sd**2, so that E[w r**2] = s**2 whatever sd is, and `allowed_v` is left.
+
     allowed_v : V beyond the noise that a right hypothesis may leave.
     """
     usual = PRIORS[problem.trust].median

@@ -71,7 +71,8 @@ def _tested(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis) -> b
 def worst_ratio(one: Option, options: Sequence[Option]) -> float:
     """The largest ratio, over records left out, of what this model leaves of one to what the best model leaves."""
     least = np.min([other.left_out.by_record for other in options], axis=0)
-    return float(np.max(np.array(one.left_out.by_record) / least))
+    told = np.isfinite(least)  # where no model runs, none is better than another
+    return float(np.max(np.array(one.left_out.by_record)[told] / least[told], initial=0.0))
 
 
 def carries_best(options: Sequence[Option]) -> Option:

@@ -10,8 +10,11 @@ import hashlib
 import inspect
 import json
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from itertools import chain
 from pathlib import Path
+from types import CodeType
 
 import numpy as np
 
@@ -91,23 +94,38 @@ def context_of(problem: InverseProblem) -> str:
 
 
 def identity(effect: Effect) -> str:
-    """What an effect is: id, parameters with bounds and spreads, and the code of the file that defines it."""
+    """What an effect is: id, parameters with bounds and spreads, and the code of the file that defines it, with the
+    values that its functions are bound to."""
     places = (effect.on_model, effect.on_record, effect.on_voltage, effect.on_reading)
-    return f"{effect.id} {_parameters(effect.parameters)} {[_code(place) for place in places]}"
+    return f"{effect.id} {_parameters(effect.parameters)} {[_told(place) for place in places]}"
 
 
 def _parameters(parameters: Mapping[str, object]) -> str:
     return repr(sorted((name, repr(p)) for name, p in parameters.items()))
 
 
-def _code(function: object) -> str:
-    if function is None:
-        return ""
-    while hasattr(function, "func"):  # functools.partial
-        function = function.func
+def _told(value: object) -> str:
+    """A value, the same in every process: a function by its code and what it is bound to."""
+    if isinstance(value, partial):
+        bound = [_told(one) for one in (*value.args, *chain.from_iterable(sorted(value.keywords.items())))]
+        return f"{_told(value.func)} of {bound}"
+    if isinstance(value, np.ndarray):
+        return repr(value.tolist())
+    if isinstance(value, CodeType):
+        return f"{value.co_code.hex()} {value.co_names} {[_told(one) for one in value.co_consts]}"
+    if isinstance(value, frozenset):
+        return repr(sorted(map(repr, value)))
+    return _code(value) if callable(value) else repr(value)
+
+
+def _code(function: Callable[..., object]) -> str:
+    """Text of the file that defines a function; of one that no file holds, what it was compiled to."""
+    cells = [repr(cell.cell_contents) for cell in getattr(function, "__closure__", None) or ()]
     try:
         module = inspect.getmodule(function)
-        file = inspect.getsourcefile(function) if module is None else module.__file__  # type: ignore[arg-type]
-        return Path(file).read_text(encoding="utf-8") if file else repr(function)
+        file = inspect.getsourcefile(function) if module is None else getattr(module, "__file__", None)
+        if file:
+            return f"{Path(file).read_text(encoding='utf-8')} {cells}"
     except (OSError, TypeError):
-        return getattr(getattr(function, "__code__", None), "co_code", b"").hex()
+        pass  # no file: it was typed in
+    return f"{_told(getattr(function, '__code__', repr(function)))} {cells}"

@@ -20,7 +20,7 @@ from aesi.tracer.likelihood.surrogates import admission_nats
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import as_declared, base_of, fitted_hypothesis, from_within
 from aesi.tracer.search.grown import ended, growths_on, promising_first
-from aesi.tracer.search.path import Path, Report, Step, beyond_noise, unseen_rmse_v
+from aesi.tracer.search.path import Path, Report, Step, excess_mean_square_v2, unseen_rmse_v
 from aesi.tracer.search.plausible import most_plausible, plausibility
 from aesi.tracer.search.reach import REACH, within_reach
 
@@ -154,7 +154,7 @@ class _ForwardSearch:
 
     def hopeless(self, chosen: FittedHypothesis) -> bool:
         """Does the hypothesis leave so much that another effect more will not do?"""
-        left, without = (beyond_noise(self.problem, self.blocks, fit) for fit in (chosen, self.base))
+        left, without = (excess_mean_square_v2(self.problem, self.blocks, fit) for fit in (chosen, self.base))
         return left > HOPELESS_SHARE * without
 
     def _step(

@@ -83,6 +83,6 @@ def unseen_rmse_v(blocks: Blocks, one: Explanation) -> float:
     return rms(held_out_residual(blocks, one)[blocks.compared])
 
 
-def beyond_noise(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis) -> float:
-    """V**2 beyond the noise on unseen data."""
+def excess_mean_square_v2(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis) -> float:
+    """V**2, mean square of the residual on blocks that were left out less the noise's, at least nought."""
     return max(unseen_rmse_v(blocks, fit) ** 2 - problem.noise_v**2, 0.0)

@@ -5,6 +5,7 @@ import warnings
 from copy import copy
 from dataclasses import replace
 from datetime import date
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,10 +13,10 @@ import pytest
 from aesi.calibration import calibrate
 from aesi.calibration.fit import problem
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
-from aesi.calibration.parameters import free_parameters
-from aesi.calibration.posterior import sampled
+from aesi.calibration.parameters import Free, free_parameters
+from aesi.calibration.posterior import PosteriorSamples, sampled
 from aesi.calibration.records.conditions import Conditions, Prior
-from aesi.calibration.result import intervals
+from aesi.calibration.result import at_bounds, intervals
 from aesi.calibration.start import size_assumed, sized
 from aesi.errors import DataError, InputError
 from aesi.physics import simulate
@@ -74,6 +75,17 @@ def test_the_state_of_health_holds_the_true_one_within_its_intervals(found, trut
     assert low < true.resistance_mohm < high
     low, high = intervals["capacity_ah"]
     assert high - low < 0.5 * true.capacity_ah
+
+
+def test_what_ended_on_its_upper_bound_was_taken_for_known_in_the_state_of_health(found):
+    at = [free.name for free in found.model.free].index("negative.full_stoichiometry")
+    width = []
+    for inside in (0.0, 0.1):
+        x = found.x.copy()
+        x[at] = found.model.high[at] - inside
+        low, high = health_intervals(replace(found, x=x))["inventory_ah"]
+        width.append(high - low)
+    assert width[0] == pytest.approx(width[1], rel=1e-2)
 
 
 def test_the_size_of_a_cell_is_said_to_be_the_files_where_no_record_is_a_full_discharge(found, records):
@@ -212,6 +224,12 @@ def test_the_posterior_says_how_far_the_linear_intervals_were_off(found):
     assert posterior.accepted > 0.05
 
 
+def test_a_posterior_kept_to_itself_that_it_takes_losses_between_days_to_be_linear():
+    posterior = PosteriorSamples(np.zeros((1, 1)), {}, {"negative.rate": 1.1}, 0.2, 5.0)
+    assert "losses" not in posterior.sentence
+    assert "losses between dated records are taken to be linear" in replace(posterior, dated=True).sentence
+
+
 def test_a_posterior_of_too_few_samples_is_refused(found):
     pytest.importorskip("emcee")
     with pytest.raises(InputError, match="--posterior 2: at least 4 samples"):
@@ -292,6 +310,15 @@ def test_a_resistance_of_nought_was_written_as_what_round_off_left(found):
     told = intervals(found.model, x, found.covariance)["contact.resistance"]
     assert told.value == 0.0
     assert told.low == 0.0 < told.high
+
+
+def test_a_parameter_on_a_lower_bound_was_passed_over_where_its_kind_may_be_nought():
+    energy = Free("negative.rate_energy", 55e3, 12e3, "J/mol", "", low=0.0)
+    full = Free("negative.full_stoichiometry", 0.9, 0.015, "1", "", low=0.0)
+    contact = Free("contact.resistance", 0.01, 0.007, "ohm", "", low=0.0)
+    low, high = np.transpose([one.bounds for one in (energy, full, contact)])
+    model = SimpleNamespace(free=(energy, full, contact), low=low, high=high)
+    assert at_bounds(model, low) == (energy.name, full.name)
 
 
 def test_a_start_given_against_the_voltage_bent_the_file_with_no_more_than_a_note(start, records):

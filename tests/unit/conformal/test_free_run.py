@@ -265,6 +265,31 @@ def test_covariates_of_another_length_are_refused() -> None:
         FreeRunBands.fit({1.0: [np.ones(3000)]}, DT, [np.ones(10)])
 
 
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        ({"excess": [np.zeros(40)]}, "the errors and excess differ in length"),
+        ({"excess": [np.zeros(40), None, np.zeros(39)]}, "the errors and excess differ in length"),
+        ({"records": ["a"]}, "1 names of records for the errors of 3"),
+    ],
+)
+def test_an_excess_or_a_name_too_few_was_no_sentence(given, sentence) -> None:
+    with pytest.raises(InputError, match=sentence):
+        FreeRunBands.fit({1.0: [np.ones(40)] * 3}, DT, **given)
+
+
+def test_pieces_of_the_same_rows_alone_ended_in_an_empty_array() -> None:
+    with pytest.raises(FitError, match="no piece is left that shares no row with one of a"):
+        FreeRunBands.fit({1.0: [np.ones(40)] * 3}, DT, records=["a"] * 3)
+
+
+def test_the_band_of_errors_that_are_mostly_nought_was_no_number() -> None:
+    error = np.where(np.arange(3000) % 20 == 0, 1e-3, 0.0)
+    bands = FreeRunBands.fit({1.0: [error]}, DT)
+    np.testing.assert_array_equal(bands.at(1.0, np.zeros(2))[1], 0.0)
+    np.testing.assert_allclose(bands.at(1.0, np.zeros(2), thermal_v=1e-3)[1], 1.645e-3, rtol=1e-3)
+
+
 def test_missing_predictions_are_left_out() -> None:
     error, spread = drive(1)
     late = error.copy()

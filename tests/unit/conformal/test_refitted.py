@@ -52,3 +52,10 @@ def test_a_gap_is_bridged_by_the_marginal_interval(series):
 def test_too_few_residuals_are_refused():
     with pytest.raises(FitError, match="needs 400; give a shorter window"):
         RefittedForest().fit([np.random.default_rng(0).normal(size=300)], 0.1, 200)
+
+
+def test_residuals_on_both_sides_of_a_gap_were_taken_for_neighbours():
+    record = np.random.default_rng(4).standard_normal(2000)
+    record[::20] = np.nan
+    with pytest.raises(FitError, match="19 calibration residuals in a row and needs 200"):
+        RefittedForest().fit([record], window=100)

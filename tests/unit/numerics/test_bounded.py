@@ -143,3 +143,7 @@ def test_a_step_is_at_most_a_quarter_of_what_the_bounds_span():
     asked = []
     slope_within(lambda x: asked.append(x[0]), np.array([0.5]), np.zeros(1), 0, (0.5, 0.54), 1.0)
     assert asked == pytest.approx([0.51])
+
+
+def test_bounds_without_room_between_them_gave_a_slope_of_no_number():
+    assert slope_within(lambda x: 2.0 * x, np.array([0.5]), np.ones(1), 0, (0.5, 0.5), 1e-3) is None

@@ -11,7 +11,7 @@ from aesi.physics.effects import CATALOGUE
 from aesi.tracer import discover
 from aesi.tracer.case.free_parameter import acting_on, of_all_records
 from aesi.tracer.case.problem import BESIDE_TIMES
-from aesi.tracer.decide.beside import judged_beside
+from aesi.tracer.decide.beside import judged_beside, left_v
 from aesi.tracer.decide.verdict import Thresholds
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.search.archive import context_of
@@ -156,6 +156,14 @@ def test_without_good_records_nothing_is_told_apart(cell, tried, make):
     assert alone.active({"soc0": {"0": 0.9}}) == alone.fixed
 
 
+def test_the_noise_of_one_kind_of_record_was_taken_off_the_error_of_the_other(monkeypatch):
+    rows, residual_v = np.array([True, True, False, False]), np.array([5e-3, -5e-3, 13e-3, -13e-3])
+    monkeypatch.setattr("aesi.tracer.decide.beside.held_out_residual", lambda blocks, one: residual_v)
+    problem = SimpleNamespace(white_v=np.array([3e-3, 3e-3, 5e-3, 5e-3]), noise_v=np.sqrt(17.0) * 1e-3)
+    path = SimpleNamespace(blocks=None, problem=problem)
+    assert [left_v(path, None, kind) for kind in (rows, ~rows)] == pytest.approx([4e-3, 12e-3])
+
+
 @pytest.mark.parametrize(("gain", "named"), [(30.0, ()), (50.0, ("a",))])
 def test_what_leaves_more_than_the_good_records_has_to_say_it_at_that_error(monkeypatch, gain, named):
     """Twice the error is a quarter of the nats: of 30 are left 7.5, where 10 were asked for."""
@@ -175,3 +183,6 @@ def test_what_leaves_more_than_the_good_records_has_to_say_it_at_that_error(monk
     monkeypatch.setattr("aesi.tracer.decide.beside.look_alikes", lambda *given: ((), 1.0))
     verdict = judged_beside(path, Thresholds())
     assert (verdict.word, verdict.effects) == ("unknown", named)
+    # Without a name the confidence of `unknown` is read off the logarithm of what is left over what may be, 8 over 4 mV
+    # and what two records of a million rows each differ by.
+    assert verdict.margin == (1.0 if named else pytest.approx(np.log(2.0), abs=2e-3))

@@ -1,6 +1,10 @@
 """Verdicts as pure functions of frozen evidence, the archive, and the map from margin to frequency."""
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,6 +19,7 @@ from aesi.tracer.case.records import prepare_all
 from aesi.tracer.decide.carry_over import LeftOut, left_out_errors, range_fault
 from aesi.tracer.decide.confidence import HIGHEST, FrequencyMap, fitted_map
 from aesi.tracer.decide.evidence import consistent, named_options
+from aesi.tracer.decide.one_cause import in_one
 from aesi.tracer.decide.verdict import (
     Thresholds,
     Verdict,
@@ -43,7 +48,7 @@ from aesi.tracer.likelihood.surrogates import FAMILY_WISE, admission_nats, large
 from aesi.tracer.search.archive import Archive, context_of, identity
 from aesi.tracer.search.fitted import base_of, fitted_hypothesis, values_without
 from aesi.tracer.search.forward import searched
-from aesi.tracer.search.path import Step
+from aesi.tracer.search.path import Path, Step
 from aesi.tracer.search.wrong_parameters import beyond_spread, with_wrong_parameters, wrong_sds
 
 
@@ -332,6 +337,9 @@ def test_what_is_written_is_never_far_worse_than_another_model_on_a_record_left_
     assert carries_best([declared, cold, both]) is both
     assert carries_best([declared, option(1.0, np.inf)]) is declared
     assert written(declared, [cold, both])[0] is both.state
+    nowhere = [option(20.0, np.inf), option(5.0, np.inf)]  # of a record that none runs on nothing is told
+    assert carries_best(nowhere) is nowhere[1]
+    assert worst_ratio(nowhere[0], nowhere) == pytest.approx(4.0)
     nearly = option(5.0, 39.0)  # its worst ratio within 5 % of the least, which is above 1.05 itself
     assert worst_ratio(nearly, [nearly, cold, both]) > worst_ratio(both, [nearly, cold, both]) > 1.05
     assert written(nearly, [cold, both])[0] is nearly.state
@@ -418,6 +426,58 @@ def test_fits_of_another_version_were_taken_for_this_one_s(path, monkeypatch):
     here = context_of(path.problem)
     monkeypatch.setattr("aesi.tracer.search.archive.source_digest", lambda: "another")
     assert context_of(path.problem) != here
+
+
+def _typed(text: str, **more: object):
+    """A function as typed into a session: no file holds it."""
+    names = {"__name__": "typed", **more}
+    exec(text, names)
+    return names["act"]
+
+
+@pytest.mark.parametrize(
+    "functions",
+    [
+        lambda: (partial(np.multiply, 1.0), partial(np.multiply, 2.0)),
+        lambda: (partial(np.full, shape=3), partial(np.full, shape=4)),
+        lambda: (_typed("act = lambda x: x * 1.1"), _typed("act = lambda x: x * 1.2")),
+        lambda: (_typed("act = lambda x: abs(x)"), _typed("act = lambda x: max(x)")),
+        lambda: tuple(_typed("def made(k):\n return lambda x: k * x\nact = made(k)", k=k) for k in (1, 2)),
+    ],
+)
+def test_an_archive_took_the_fits_of_an_effect_that_computes_something_else(functions):
+    effect = CATALOGUE["series_resistance"]
+    one, other = (identity(replace(effect, on_model=function)) for function in functions())
+    assert one != other
+
+
+def test_an_effect_that_was_typed_in_could_not_be_kept_and_is_the_same_in_every_process():
+    program = (
+        "from dataclasses import replace\nfrom aesi.physics.effects.catalogue import CATALOGUE\n"
+        "from aesi.tracer.search.archive import identity\n"
+        "def act(x):\n return (lambda y: y in {'a', 'b', 'c', 'd'})(x)\n"
+        "print(identity(replace(CATALOGUE['series_resistance'], on_model=act)))"
+    )
+    said = [
+        subprocess.run(
+            [sys.executable, "-c", program],
+            capture_output=True, text=True, check=True, env={**os.environ, "PYTHONHASHSEED": seed},
+        ).stdout
+        for seed in "12"
+    ]  # fmt: skip
+    assert said[0] == said[1]
+
+
+def test_of_three_names_that_one_cause_stands_for_the_third_was_lost(monkeypatch):
+    wrong = {name: e for name, e in CATALOGUE.items() if any(p.spread for p in e.parameters.values())}
+    names = tuple(wrong)[:3]
+    cause = next(e for e in CATALOGUE.values() if e.kind == "parameter" and e.id not in wrong)
+    one = SimpleNamespace(hypothesis=(cause.id,), at_bounds=())
+    problem = SimpleNamespace(effects={**wrong, cause.id: cause}, competing=lambda: ())
+    path = Path(problem, None, SimpleNamespace(), (), SimpleNamespace(hypothesis=names))
+    monkeypatch.setattr("aesi.tracer.decide.one_cause.fitted_hypothesis", lambda *given: one)
+    monkeypatch.setattr("aesi.tracer.decide.one_cause.most_plausible", lambda fits, many: fits[1])
+    assert in_one(path, None)[1] == (cause.id, *names)
 
 
 def test_an_archive_knows_an_effect_by_what_it_is(path, tmp_path):
