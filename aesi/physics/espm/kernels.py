@@ -28,7 +28,7 @@ SMALLEST_EXPONENT = -10.0
 """Of the salt that is left: products of its powers stay above what a number can hold."""
 ROUND_OFF = 1e-9
 """Of a step or of a part of it: stamps are rounded, and what is longer or left by less than this is no part of its own.
-A step of 1 s that was 2e-13 s too long was halved, which moves the voltage by up to 0.18 mV."""
+A step of 1 s that is 2e-13 s too long is no reason to halve it."""
 LARGEST_RATIO = 1e12
 """Above it the product of ten factors would leave the range of a number."""
 
