@@ -245,7 +245,8 @@ def _too_much(soc: Array) -> str:
     if (low := -float(np.min(soc))) > GIVEN_SD:
         said.append(f"asks for more charge than the cell has, by {100 * low:.1f} % of its capacity")
     if (high := float(np.max(soc)) - 1.0) > GIVEN_SD:
-        said.append(f"brings more charge than the cell can hold, by {100 * high:.1f} %")
+        asks = "starts with" if soc[0] == np.max(soc) else "brings"
+        said.append(f"{asks} more charge than the cell can hold, by {100 * high:.1f} %")
     return f": the record {' and '.join(said)}" if said else ""
 
 

@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.data import units
 from aesi.data.channels import headers
 from aesi.data.channels.checks import Columns, Context
@@ -148,7 +149,24 @@ def _of_number(
             f"{context.file}: {len(keep)} rows are of {name} {text}; column {context.header[name]!r} {runs}."
         )
     notes.append(f"{name} {text}: {len(keep):,} of {len(numbers):,} rows were taken as asked.")
+    holes = np.flatnonzero(np.diff(keep) > 1)
+    if len(holes):
+        missing_ah = _between_ah(data, keep)
+        notes.append(
+            f"These rows are {len(holes) + 1:,} stretches, the first up to {context.where(int(keep[holes[0]]))}: "
+            f"{missing_ah:.4g} Ah that the rows between them carried are not in the record. Where it has to go on as "
+            f"the test did, take rows that follow one another: several {name}s (FIRST:LAST), --from-s and --to-s."
+        )
     return keep_rows(data, context, keep)
+
+
+def _between_ah(data: Columns, keep: AnyArray) -> float:
+    """Ah that flowed, either way, in rows that are left out between the first and the last one kept."""
+    hours = np.diff(data["time_s"], prepend=np.nan) / SECONDS_PER_HOUR
+    left_out = np.ones(len(hours), dtype=bool)
+    left_out[keep] = False
+    left_out[: keep[0]] = left_out[keep[-1] :] = False
+    return float(np.nansum(np.abs(data["current_a"] * hours)[left_out]))
 
 
 def _window(data: Columns, context: Context, reading: Reading, notes: list[str]) -> tuple[Columns, Context]:

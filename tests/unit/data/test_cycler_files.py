@@ -12,6 +12,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from aesi.data import read_measurement
@@ -312,6 +313,20 @@ def test_a_step_of_every_export_can_be_taken(tmp_path, export):
     record = read_measurement(written(tmp_path, export), step="2:3")
     np.testing.assert_allclose(record.current_a, CURRENT[15:45], atol=1e-9)
     assert len(read_measurement(written(tmp_path, export), cycle=0)) == 45
+
+
+def test_the_charge_between_the_stretches_of_a_step_is_told(tmp_path):
+    step = np.repeat([1, 2, 1, 2], 10)
+    pulses = pd.DataFrame(
+        {"time_s": np.arange(40.0), "current_a": np.where(step == 2, 3.6, 0.0), "voltage_v": 4.0}
+    )
+    pulses["step"] = step
+    pulses.to_csv(tmp_path / "pulses.csv", index=False)
+    rests = read_measurement(tmp_path / "pulses.csv", step=1)
+    assert any("2 stretches" in note and " 0.01 Ah that the rows between" in note for note in rests.notes)
+    assert not any(
+        "stretches" in note for note in read_measurement(tmp_path / "pulses.csv", step="1:2").notes
+    )
 
 
 def test_the_battery_data_alliance_reads_the_same(tmp_path):

@@ -474,6 +474,7 @@ def test_by_how_much_a_record_emptied_or_overfilled_a_cell_was_not_told(model, d
             "asks for more charge than the cell has, by 3.6 % of its capacity.",
         ),
         (np.linspace(0.5, 1.04, len(data)), "brings more charge than the cell can hold, by 4.0 %."),
+        (np.linspace(1.02, 0.5, len(data)), "starts with more charge than the cell can hold, by 2.0 %."),
     ):
         assert any(note.endswith(f": the record {words}") for note in reached(model.cell, data, voltage, soc))
 
