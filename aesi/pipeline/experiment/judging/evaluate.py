@@ -174,7 +174,7 @@ def _free_run_intervals(
     bands = [r.bands for r in test]
     whole = _interval_figures(test, bands, residuals, one.bands.alpha)
     return {
-        "free_run_intervals": whole | _inside(bands, residuals) | _left_out(one.bands.horizons[-1]),
+        "free_run_intervals": whole | _inside_coverage(bands, residuals) | _left_out(one.bands.horizons[-1]),
         "bands_by_horizon": {
             _seconds(band.horizon_s): _horizon_figures(one, one.bands, band, test, ahead[band.horizon_s])
             for band in one.bands.horizons
@@ -220,10 +220,10 @@ def _horizon_figures(
         for r in test
     ]
     figures = _interval_figures(test, intervals, left, bands.alpha)
-    return figures | _inside(intervals, left) | _left_out(band)
+    return figures | _inside_coverage(intervals, left) | _left_out(band)
 
 
-def _inside(intervals: Sequence[Intervals | None], residuals: Sequence[Array]) -> dict[str, float]:
+def _inside_coverage(intervals: Sequence[Intervals | None], residuals: Sequence[Array]) -> dict[str, float]:
     """Coverage of the rows inside the trained range, where alone the band is calibrated; NaN without such rows."""
     covered = [
         each.covers(residual)[each.warm & np.isfinite(residual)]
