@@ -114,13 +114,19 @@ def addable(parent: Parent) -> list[str]:
     ]
 
 
+def grown_with(parent: Parent, names: Sequence[str], archive: Archive) -> list[Grown]:
+    """Where these effects end on a hypothesis, whether or not they compete in a search; without those that fail."""
+    growths = [_growth(parent, name, archive) for name in names]
+    return [one for one in ended(growths, archive) if one is not None]
+
+
 def _has_something_to_say(problem: InverseProblem, name: str) -> bool:
     """Not what infers a quantity that every record holds, nor what a file has right that was fitted to this very
     cell, nor, where good records stand beside the others, what all records of a cell share."""
     effect = problem.effects[name]
     if effect.infers is not None and all(r.data.temperature_degc is not None for r in problem.records):
         return False
-    if problem.has_good and effect.of_every_record:
+    if problem.has_good and (effect.of_every_record or effect.of_age):
         return False
     return not (problem.trust in MEASURED_CELL and effect.of_design)
 
