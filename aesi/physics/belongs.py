@@ -236,8 +236,8 @@ def _cause(ratio: float, record: Measurement) -> str:
         )
     if ratio < 1.0 / 1000.0:
         return (
-            "the time is in hours or the current in kA; give s and A, or declare it: --unit time_s=h, or --unit "
-            "current_a=kA"
+            "the time is in hours or days or the current in kA (give s and A, or declare it: --unit time_s=h or d, or "
+            "--unit current_a=kA), or the sensor of the current failed"
         )
     if ratio < 1.0 / 15.0:
         return (
