@@ -28,6 +28,9 @@ of one value of the current has a single turn by 0.01 V. A drive whose current w
 this."""
 OF_MEDIAN = 1.4826
 """Deviations in the median size of what is normally distributed."""
+FAR_ROWS = 3.0
+"""Times the median interval: what the cell did between rows further apart, as those of the rests of a test alone, is
+not known."""
 NOISES = 10.0
 """Times the noise of the voltage, which a turn is beyond."""
 
@@ -39,7 +42,9 @@ def check_dead(columns: Columns, context: Context) -> None:
     if len(voltage) < ENOUGH_STEPS:
         return
     least = max(TURN_V, NOISES * _noise_v(voltage), CLEAR_RESOLUTIONS * _resolution_v(voltage))
-    ends = np.concatenate([[-1], np.flatnonzero(np.diff(current) != 0), [len(current) - 1]])
+    step = np.diff(time)
+    goes_on = (np.diff(current) == 0) & (step <= FAR_ROWS * np.median(step))
+    ends = np.concatenate([[-1], np.flatnonzero(~goes_on), [len(current) - 1]])
     for k in np.flatnonzero(np.diff(ends) > 2 * ENOUGH_STEPS):
         begin, end = int(ends[k]) + 1, int(ends[k + 1])
         turns = _turns(voltage[begin : end + 1], least)

@@ -92,6 +92,16 @@ def test_a_noisy_voltage_and_one_that_relaxes_need_no_current(tmp_path):
     read_measurement(written(tmp_path, rests, noisy + noise))
 
 
+def test_the_rests_of_a_test_alone_are_no_dead_current(tmp_path):
+    """Between them the cell is discharged; in each of them the voltage comes back."""
+    pulse = np.where(TIME % 180.0 < 40.0, 9.0, 0.0)
+    voltage = (
+        4.0 - 0.2 * np.cumsum(pulse) / 3600.0 - 0.01 * pulse - 0.1 * np.exp(-(TIME % 180.0 - 40.0) / 30.0)
+    )
+    rests = (TIME % 180.0 >= 45.0) & (TIME % 5.0 == 0.0)
+    read_measurement(written(tmp_path, pulse[rests], voltage[rests], TIME[rests]))
+
+
 @pytest.mark.parametrize("volts", [VOLTAGE / 1000.0, VOLTAGE / 1e6])
 def test_a_cell_of_millivolts_was_taken(tmp_path, volts):
     assert "V in the median, which is that of no cell" in refusal(tmp_path, CURRENT, volts)
