@@ -84,6 +84,8 @@ ABOVE_FULL_V = 0.1
 """A voltage at rest further above that of a full cell belongs to another chemistry."""
 SMALL_C_RATE = 0.1
 """Below it a cell all but rests."""
+CONVERTED, DECLARED = " was converted from ", " as declared"
+"""In a reader's note on a unit that the user gave, which is the first suspect where a charge is that of no cell."""
 SOC_GRID = 1201
 """States of charge at which a voltage is looked up."""
 BEYOND_SOC = 0.1
@@ -196,6 +198,9 @@ def _check_capacity(cell: Cell, record: Measurement) -> None:
             f". Or it was far colder than the {_declared_degc(cell):.4g} degC that the cell's file declares: give its "
             "temperature in a column temperature_degc, or declare another in that file (Initial temperature [K])"
         )
+    declared = [note.rstrip(".") for note in record.notes if CONVERTED in note and DECLARED in note]
+    if declared:
+        fault += f". First look at what was declared: {'; '.join(declared)}"
     raise DataError(f"{fault}.")
 
 

@@ -72,14 +72,14 @@ class Rows:
 
 def overlap(one: Rows, other: Rows) -> Overlap | None:
     """What two records share; None for two tests."""
-    found = nearest(one, other)
+    found = agreement(one, other)
     return None if found is None or found.share < SAME_SHARE else found
 
 
-def nearest(one: Rows, other: Rows) -> Overlap | None:
+def agreement(one: Rows, other: Rows) -> Overlap | None:
     """How two records agree at the times on which most of the rows agree that both have once; None without enough."""
     if other.step_s < one.step_s:  # each row of the sparser is sought in the denser, not the other way round
-        found = nearest(other, one)
+        found = agreement(other, one)
         return None if found is None else _of_the_other(found)
     of_time, *digits = map(min, one.decimals, other.decimals)
     (our_keys, our_rows), (their_keys, their_rows) = one.once(*digits), other.once(*digits)

@@ -130,5 +130,8 @@ def test_one_state_of_charge_was_believed_for_every_record_of_a_run(tmp_path):
 def test_a_unit_that_was_declared_wrongly_was_told_in_options_that_a_run_does_not_have(tmp_path):
     config = experiment(write_record(tmp_path))
     data = config.data.model_copy(update={"units": {"time_s": "min"}})
-    with pytest.raises(DataError, match=r"\(in an experiment file: data\.units\)\.$"):
+    words = (
+        r"declared: .* time_s was converted from min as declared.* \(in an experiment file: data\.units\)\.$"
+    )
+    with pytest.raises(DataError, match=words):
         load(config.model_copy(update={"data": data}))
