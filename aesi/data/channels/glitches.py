@@ -1,7 +1,7 @@
 """Rows that contradict their neighbours: one value that leaps and comes back, or a voltage that goes on elsewhere.
 
 What the current explains is a multiple of what its steps do elsewhere in the record, over the rows beside: it answers
-by more near empty, and loggers write current and voltage a row apart. The figures are of 122 measured and virtual
+by more near empty, and loggers write current and voltage a row apart. The figures are of 137 measured and virtual
 records of 5 cells, -20 to 40 degC, at 0.1 to 300 s a row.
 """
 

@@ -67,3 +67,18 @@ def test_a_test_that_begins_with_what_is_fitted_is_judged_where_that_ends():
     check_distinct([fitted], [RECORD], led=True)
     with pytest.raises(DataError, match="half and day 1 hold the same rows of one test"):
         check_distinct([fitted], [RECORD])
+
+
+def test_a_second_test_in_coarse_numbers_is_another():
+    """To 10 mV and 0.1 A two tests of one protocol differ in half of the rows."""
+    coarse = [
+        replace(one, current_a=np.round(one.current_a, 1), voltage_v=np.round(one.voltage_v, 2))
+        for one in (drive("day 1", 1, 4e-3), drive("day 2", 2, 4e-3))
+    ]
+    check_distinct(coarse)
+
+
+def test_halves_that_were_rounded_up_are_the_same_test():
+    up = np.floor(RECORD.current_a * 1e3 + 0.5) / 1e3
+    with pytest.raises(DataError, match="hold the same rows of one test"):
+        check_distinct([RECORD], [replace(RECORD, name="export", current_a=up)])
