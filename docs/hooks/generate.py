@@ -1,4 +1,4 @@
-"""Pages made at build time: catalogue of effects, benchmarks, command line, and files of the repository."""
+"""Pages made at build time: effects, benchmarks, commands, keys of experiments, and files of the repository."""
 
 from __future__ import annotations
 
@@ -112,9 +112,23 @@ def dfn_curve() -> str:
     return str(_hook("curve")["curve"](lines))
 
 
+def bands() -> str:
+    """The free-run bands of virtual cells in short, from the newest recorded lines."""
+    return str(_hook("recorded")["bands"](_history()))
+
+
+def experiment() -> str:
+    """Every key of an experiment file, a table a section."""
+    from aesi.conformal import COMPARED, METHODS
+    from aesi.pipeline.experiment.config import ExperimentConfig, model_names
+
+    choices = {"models": model_names(), "conformal.method": METHODS, "conformal.compare": COMPARED}
+    return str(_hook("experiment")["tables"](ExperimentConfig, choices))
+
+
 def _hook(name: str) -> dict[str, Any]:
-    """What another file of this folder defines: mkdocs imports a hook by its path, without a package."""
-    return run_path(str(Path(__file__).with_name(f"{name}.py")))
+    """What a file of `parts/` defines: mkdocs imports a hook by its path, without a package."""
+    return run_path(str(Path(__file__).with_name("parts") / f"{name}.py"))
 
 
 def _history() -> list[Any]:
@@ -167,6 +181,8 @@ GENERATORS: dict[str, Callable[[], str]] = {
     "over time": over_time,
     "speed": speed,
     "dfn curve": dfn_curve,
+    "bands in short": bands,
+    "experiment": experiment,
     "command line": command_line,
     "contributing": contributing,
     "changelog": changelog,

@@ -8,8 +8,10 @@ import sys
 import tomllib
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from typing import get_args
 
 import pytest
+from pydantic import BaseModel
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -46,6 +48,86 @@ def test_every_command_is_on_the_command_line_page():
     )
     for command in (*commands, "worker", "ui", "bench"):
         assert f"## aesi {command}\n" in page
+
+
+def sections_of_an_experiment(section, name=""):
+    """Each section with its dotted name, by the annotations alone."""
+    yield name, section
+    for key, field in section.model_fields.items():
+        for each in (field.annotation, *get_args(field.annotation)):
+            if isinstance(each, type) and issubclass(each, BaseModel) and name != "fallback":
+                yield from sections_of_an_experiment(each, f"{name}.{key}".lstrip("."))
+
+
+def test_every_key_of_an_experiment_is_in_its_table_with_unit_default_and_meaning():
+    from aesi.pipeline.experiment.config import ExperimentConfig
+
+    page = hook("generate").experiment()
+    tables = dict(re.findall(r"^### (.*)\n\n.*\n\n((?:\|.*\n)+)", page, re.MULTILINE))
+    sections = dict(sections_of_an_experiment(ExperimentConfig))
+    assert set(tables) == {f"`{name}`" if name else "The file itself" for name in sections}
+    for name, section in sections.items():
+        lines = tables[f"`{name}`" if name else "The file itself"].splitlines()[2:]
+        rows = {line.split("`")[1]: [cell.strip() for cell in line[1:-1].split(" | ")] for line in lines}
+        assert set(rows) == set(section.model_fields) - {"base"}
+        for key, (_, kind, unit, default, meaning) in rows.items():
+            field = section.model_fields[key]
+            assert kind
+            assert len(meaning) > 8, f"{name}.{key}: {meaning}"
+            ending = key.rpartition("_")[2]
+            assert unit == {"s": "s", "mb": "MB"}.get(ending, unit), f"{name}.{key} in {unit}"
+            assert (default == "required") == field.is_required()
+            if default.startswith("`"):
+                plain = list(field.default) if isinstance(field.default, tuple) else field.default
+                assert json.loads(default.strip("`")) == plain
+
+
+def test_a_key_that_nobody_described_builds_no_table():
+    class Section(BaseModel):
+        """A section.
+
+        told : s, what it is.
+        """
+
+        told: float = 1.0
+        untold: int = 2
+
+    experiment = hook("parts/experiment")
+    assert experiment.unit_of(experiment.told(Section)["told"]) == ("s", "what it is")
+    with pytest.raises(KeyError, match="untold"):
+        experiment.tables(Section, {})
+
+
+def test_the_bands_of_virtual_cells_are_of_the_newest_run(tmp_path, monkeypatch):
+    generate = hook("generate")
+    (tmp_path / "docs").mkdir()
+    monkeypatch.setattr(generate, "ROOT", tmp_path)
+    assert "No run has been recorded" in generate.bands()
+    entry = {"machine": "a machine", "commit": "0123456789", "load": None}
+    figures = ("coverage_pct", "coverage_se_pct", "coverage_sd_pct", "worst_bin_coverage_pct", "width_mv")
+    line = dict(zip(figures, (90.04, 0.71, 3.5, 88.0, 10.0), strict=True))
+    line |= {
+        "bench": "bands",
+        "method": "scaled",
+        "cells": 24,
+        "interval_score_mv": 12.0,
+        "score_ratio": 1.234,
+    }
+    older = [{**line, "layout": "all", "horizon_s": None, "coverage_pct": 80.0}]
+    newer = [
+        {**line, "layout": "repeats", "horizon_s": 1.0},
+        {**line, "layout": "repeats", "horizon_s": 1.0, "method": "one width"},
+        {**line, "layout": "all", "horizon_s": None},
+    ]
+    entries = [
+        {**entry, "date": "2026-01-01", "lines": older},
+        {**entry, "date": "2026-02-01", "lines": newer},
+    ]
+    (tmp_path / "docs" / "benchmarks.json").write_text(json.dumps({"entries": entries}))
+    assert [row for row in generate.bands().splitlines() if row.startswith("| ")][1:] == [
+        "| all | scaled | whole drive | 90.0 ± 0.7 | 3.5 | 88.0 | 10.0 | 12.0 | 1.23 |",
+        "| repeats | scaled | 1 s | 90.0 ± 0.7 | 3.5 | 88.0 | 10.0 | 12.0 | 1.23 |",
+    ]
 
 
 def test_benchmarks_come_from_the_recorded_lines_alone(tmp_path, monkeypatch):
