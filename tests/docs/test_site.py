@@ -292,6 +292,22 @@ def test_what_the_page_of_the_cells_says_in_short_is_what_its_table_says():
     assert f"| {said(told(both, 'aged', '25degC'))} | {but_one(told(both, 'aged', *cold))} |" in short
 
 
+def test_the_figures_of_the_limits_stand_on_the_pages_that_they_link_to():
+    page = ROOT / "docs" / "limits.md"
+    rows = [
+        line
+        for line in page.read_text(encoding="utf-8").splitlines()
+        if line.startswith("| ") and "](" in line
+    ]
+    assert len(rows) > 20
+    for row in rows:
+        where, told, links = (cell.strip() for cell in row[1:-1].split(" | "))
+        pages = {page.parent / target for target in re.findall(r"\]\(([^)#]+)", links)}
+        text = " ".join(each.read_text(encoding="utf-8") for each in pages)
+        for figure in re.findall(r"(?<![\w.])\d+(?:\.\d+)?", f"{where} {told}"):
+            assert re.search(rf"(?<![\d.]){re.escape(figure)}(?!\d|\.\d)", text), f"{figure} of {row}"
+
+
 def test_every_formula_of_the_documentation_is_understood():
     change = hook("formulas").on_page_markdown
     for page in sorted((ROOT / "docs").rglob("*.md")):

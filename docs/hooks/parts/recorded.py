@@ -72,8 +72,12 @@ def bands(entries: Sequence[Entry]) -> str:
         ]
         for line in shown
     ]
-    head = ["layout", "design", "horizon", "coverage, %", *BAND_FIGURES]
-    return "\n".join([*(f"{text}\n" for text in origins), _grid([head, *rows], "---")])
+    head, *body = (
+        "| " + " | ".join(row) + " |"
+        for row in (["layout", "design", "horizon", "coverage, %", *BAND_FIGURES], *rows)
+    )
+    align = "|" + "---|" * 3 + "---:|" * (1 + len(BAND_FIGURES))
+    return "\n".join([*(f"{text}\n" for text in origins), head, align, *body, ""])
 
 
 def _is_shown(line: Line) -> bool:
