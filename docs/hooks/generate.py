@@ -90,18 +90,10 @@ def over_time() -> str:
 
 
 def speed() -> str:
-    """How fast both models are beside PyBaMM's, and how close to a fine mesh, from the newest recorded lines."""
+    """How fast it is beside its peers, and how close to a fine mesh, from the newest recorded lines."""
     from flows.benchmarks.history import latest
 
-    lines = [line for _, line in latest(_history()).values()]
-    parts = []
-    for bench, words in (("espm", "The single particle"), ("dfn", "the porous electrode")):
-        line = next((line for line in lines if line["bench"] == bench and line.get("ratio")), None)
-        if line is not None:
-            parts.append(
-                f"{words} {line['ratio']:.0f} times as fast as PyBaMM's, {line['rmse_mv']:.2g} mV RMSE off a fine mesh"
-            )
-    return "; ".join(parts) or "No run has been recorded"
+    return str(_hook("speed")["speed"]([line for _, line in latest(_history()).values()]))
 
 
 def dfn_curve() -> str:

@@ -96,7 +96,7 @@ def _table(
             else _limited(_words(field.annotation), field.metadata)
         )
         if dotted in choices:
-            kind = f"{kind.replace('text', 'one of')} {', '.join(f'`{each}`' for each in choices[dotted])}"
+            meaning = f"{meaning}. There are {', '.join(f'`{each}`' for each in choices[dotted])}"
         cells = (f"`{key}`", kind, unit, _default(field, inner is not None), _code(meaning))
         rows.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return rows
