@@ -312,6 +312,21 @@ def test_what_the_page_of_the_cells_says_in_short_is_what_its_table_says():
     assert f"| {said(told(both, 'aged', '25degC'))} | {but_one(told(both, 'aged', *cold))} |" in short
 
 
+def test_the_medians_that_the_page_of_the_cells_begins_with_are_those_of_its_archives():
+    page = (ROOT / "docs" / "cells.md").read_text(encoding="utf-8")
+    short, rest = page.split("## Every record")
+    table = rest.split("<!-- table of aesi bench cells, archive -->")[1].split("\n\n")[0]
+    rows = [[cell.strip() for cell in line[1:-1].split("|")] for line in table.strip().splitlines()]
+    column = rows[0].index("with temperature")
+    medians = {(row[0], row[1]): round(float(row[column].split()[0])) for row in rows[2:]}
+    said = re.findall(r"^\| (-?\d+) °C \| (\d+) \| (\d+)", short, re.MULTILINE)
+    assert [chamber for chamber, *_ in said] == ["25", "10", "0", "-10", "-20"]
+    for chamber, panasonic, hg2 in said:
+        assert medians["panasonic_ncr18650pf", f"{chamber} degC"] == int(panasonic)
+        folder = "40" if chamber == "25" else chamber
+        assert medians["lg_18650hg2", f"{folder} degC"] == int(hg2)
+
+
 @pytest.mark.parametrize(("name", "least"), [("limits.md", 25), ("index.md", 4)])
 def test_figures_in_short_stand_on_the_pages_that_they_link_to(name, least):
     page = ROOT / "docs" / name
