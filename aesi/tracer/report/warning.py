@@ -29,8 +29,8 @@ def contradicted_by_v(files: Sequence[FileOutcome], verdict: Verdict) -> float |
 
 
 def warnings(files: Sequence[FileOutcome], verdict: Verdict, rest_a: float = 0.0) -> tuple[str, ...]:
-    """Where the test part contradicts a verdict that explains the data, where the written model does worse there than
-    another one, or on what was fitted than the declared one, and where the test part has no load.
+    """Where the test part contradicts a verdict that explains the data, where the written model does worse there, or on
+    what was fitted, than another one, and where the test part has no load.
 
     rest_a : A, below which the cell rests.
     """
@@ -44,7 +44,7 @@ def warnings(files: Sequence[FileOutcome], verdict: Verdict, rest_a: float = 0.0
         )
     tests = _tests(files)
     after_mv = _left_mv(tests, "after")
-    less = {NAMES[state]: left_mv for state in OTHERS if (left_mv := _left_mv(tests, state)) < after_mv}
+    less = _less_than(tests, after_mv)
     if less:
         same = next((state for state in OTHERS if _same(tests, state)), None)
         model = "the model with what was found" if verdict.effects else NAMES["after"]
@@ -55,11 +55,14 @@ def warnings(files: Sequence[FileOutcome], verdict: Verdict, rest_a: float = 0.0
         advice = ": do not use it there." if harms else "."
         out.append(f"on the test part {model} leaves {after_mv:.2f} mV, {others}{advice}")
     fitted = [f for f in files if f.part == "fit"]
-    before_mv, after_mv = (_left_mv(fitted, state) for state in ("before", "after"))
-    if after_mv > before_mv:
+    after_mv = _left_mv(fitted, "after")
+    less = _less_than(fitted, after_mv)
+    if less.get(NAMES["recalibrated"], after_mv) * AS_GOOD >= after_mv:
+        less.pop(NAMES["recalibrated"], None)
+    if less and not _same(fitted, "before"):
         out.append(
             f"on the part that was fitted {NAMES['after']} leaves {after_mv:.2f} mV of the rows as measured, "
-            f"{NAMES['before']} {before_mv:.2f} mV."
+            f"{' and '.join(f'{words} {left_mv:.2f} mV' for words, left_mv in less.items())}."
         )
     if tests and max(float(np.max(np.abs(f.current_a))) for f in tests) < rest_a:
         out.append(
@@ -85,6 +88,11 @@ def _tests(files: Sequence[FileOutcome]) -> list[FileOutcome]:
 def _same(tests: Sequence[FileOutcome], state: State) -> bool:
     """Whether the written model is no other than that of `state`."""
     return all(np.array_equal(f.voltages["after"], f.voltages[state]) for f in tests)
+
+
+def _less_than(files: Sequence[FileOutcome], after_mv: float) -> dict[str, float]:
+    """The other models that leave less than the written one, in words, with what they leave, mV."""
+    return {NAMES[state]: left_mv for state in OTHERS if (left_mv := _left_mv(files, state)) < after_mv}
 
 
 def _left_mv(files: Sequence[FileOutcome], state: State) -> float:

@@ -202,7 +202,24 @@ def test_a_written_model_that_does_worse_on_the_test_part_is_told_in_the_first_s
     assert "worse" not in discoveries.discovery_finding(same)
 
 
-def test_an_unknown_that_is_worse_on_the_test_part_is_told_so_once(views, tmp_path):
+def test_a_written_model_that_leaves_more_of_what_it_was_fitted_to_than_a_refit_was_told_without_a_word(
+    views,
+):
+    view = views.discovery_view(200, verdict="unknown")
+    states = {name: {"fit": {"rmse_mv": left}} for name, left in (("recalibrated", 5.05), ("after", 28.46))}
+    text = discoveries.short_finding(view.discovery | states)
+    assert text.endswith("of what was fitted the written model leaves 28.46 mV, recalibrated 5.05")
+    as_good = states | {"after": {"fit": {"rmse_mv": 5.2}}}
+    assert "of what was fitted" not in discoveries.short_finding(view.discovery | as_good)
+
+
+def test_a_contradicted_temperature_is_told_in_the_first_sentence(views):
+    view = views.discovery_view(200, verdict="unknown")
+    doubted = replace(view, discovery=view.discovery | {"other_temperature": ["a", "b"]})
+    assert "; the voltage of a and b contradicts its temperature" in discoveries.discovery_finding(doubted)
+
+
+def test_an_unknown_that_is_worse_on_the_test_part_is_told_so_at_once(views, tmp_path):
     view = views.discovery_view(200, verdict="unknown")
     warning = "on the test part the written model leaves 9.30 mV, the recalibrated model 6.20 mV: do not use it there."
     left = {"after": {"fit": {"rmse_mv": 9.0}, "test": {"rmse_mv": 9.3}}, "warnings": [warning]}
@@ -210,7 +227,11 @@ def test_an_unknown_that_is_worse_on_the_test_part_is_told_so_once(views, tmp_pa
         tmp_path / "r.html", replace(view, discovery=view.discovery | left)
     ).read_text()
     header = text[text.index("<h1>") : text.index("</header>")]
-    assert header.count("on the test part") == 1
+    assert header.count("on the test part the written model leaves") == 1
+    first = header[: header.index("</h1>")]
+    assert "on the test part the written model does worse, 9.30" in " ".join(
+        first.replace("\xa0", " ").split()
+    )
     assert "data that chose nothing" not in header
 
 
