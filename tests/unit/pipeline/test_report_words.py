@@ -25,6 +25,24 @@ def test_a_harmful_correction_is_called_harmful(views):
     assert "13.2 mV to 15.7 mV" in text
 
 
+def test_an_error_of_661_mv_did_not_say_that_the_model_ran_empty(views):
+    view = views.run_view(200)
+    physics, chosen, other = view.models
+    physics, chosen = (
+        row | {"free_run": row["free_run"] | {"test_until_ran_out_rmse_mv": left}}
+        for row, left in ((physics, 240.14), (chosen, 234.84))
+    )
+    chosen |= {"test_records": {"a": {"ran_out_s": 7976.0}, "b": {}}}
+    emptied = replace(view, models=(physics, chosen, other))
+    assert runs.run_finding(emptied) == runs.run_finding(view).removesuffix(".") + (
+        "; a simulation runs empty or full on a at 7976 s, from where on an error says that it ran out, not by how "
+        f"much the model is off: before that it is 240.1 mV by ESPM and 234.8 mV by {view.chosen}."
+    )
+    assert runs.run_finding(
+        replace(emptied, models=(view.models[0], chosen | {"free_run": view.models[1]["free_run"]}))
+    ).endswith("not by how much the model is off.")
+
+
 def test_a_correction_that_does_not_beat_the_physics_it_was_learned_on_is_told_so(views):
     view = views.run_view(200)
     row = {"name": "ESPM recalibrated", "free_run": {"test_rmse_mv": 3.9}}

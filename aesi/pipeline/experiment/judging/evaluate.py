@@ -114,6 +114,9 @@ def _row(one: Fitted, judged: Mapping[Role, Sequence[_Judged]], seconds: float) 
             physics = _joined(r.series.left_by(against) for r in records)
             free[f"{role}_{key}"] = 100.0 * (1.0 - float(np.mean(left**2) / np.mean(physics**2)))
         free[f"{role}_rmse_mv"] = MV_PER_V * rmse(error, _joined(r.free.error_v for r in records))
+        runs = _joined(r.series.runs for r in records)
+        if runs.any() and not runs.all():
+            free[f"{role}_until_ran_out_rmse_mv"] = MV_PER_V * rms(left[runs])
         after = _joined(r.series.error_v[1:] for r in records)
         step[f"{role}_rmse_mv"] = MV_PER_V * rmse(after, _joined(r.one_step[1:] for r in records))
     test = judged["test"]
@@ -154,9 +157,13 @@ def _record_figures(one: Fitted, record: _Judged) -> dict[str, float | None]:
     series, model = record.series, one.model
     left, declared = series.error_v - record.free.error_v, series.left_by(DECLARED)
     kept = model.kept(series) if isinstance(model, SparseModel) else np.ones(len(series))
-    visited = trained_on(model, one.bands)
+    visited, runs = trained_on(model, one.bands), series.runs
+    ran_out = {} if runs.all() else {"ran_out_s": series.ran_out_s}
+    if ran_out and runs.any():
+        ran_out["until_ran_out_mv"] = MV_PER_V * rms(left[runs])
     return {
         "rmse_mv": MV_PER_V * rms(left),
+        **ran_out,
         "mser_pct": 100.0 * (1.0 - float(np.mean(left**2) / np.mean(declared**2))),
         **trained_figures(record.free.outside, series.temperature_degc, model, visited, kept),
     }

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from aesi.over_time import stamp
 from aesi.pipeline.product.trained import ALL_PCT, trained_sentence
 from aesi.pipeline.report.views import Row, RunView
+from aesi.pipeline.report.words.discoveries import listed
 
 NEARLY = 0.98
 """A one-step error above this share of persistence's is called no better than it."""
@@ -14,7 +16,37 @@ MOST_DIGITS = 3
 
 
 def run_finding(view: RunView) -> str:
-    """What the correction buys on the test records in free run, and what the one-step figure is worth."""
+    """What the correction buys on the test records in free run, and what is left of them before a simulation ran out,
+    where one did."""
+    return f"{_bought(view).removesuffix('.')}{_ran_out(view)}."
+
+
+def _ran_out(view: RunView) -> str:
+    """From when on the errors of test records say no more than that a model ran out, and what is left before that; from
+    '; ' on, '' where none did."""
+    model = view.model(view.chosen) or {}
+    records = {
+        name: figures["ran_out_s"]
+        for name, figures in (model.get("test_records") or {}).items()
+        if figures.get("ran_out_s") is not None
+    }
+    if not records:
+        return ""
+    where = " and ".join(f"{name} at {stamp(at_s)} s" for name, at_s in records.items())
+    text = (
+        f"; a simulation runs empty or full on {where}, from where on an error says that it ran out, not by how much "
+        "the model is off"
+    )
+    left = {
+        name: error
+        for name in dict.fromkeys((view.physics, view.corrected, view.chosen))
+        if (error := _figure(view.model(name), "free_run", "test_until_ran_out_rmse_mv")) is not None
+    }
+    told = listed([f"{error:.1f} mV by {name}" for name, error in left.items()])
+    return f"{text}: before that it is {told}" if told else text
+
+
+def _bought(view: RunView) -> str:
     model, physics = view.model(view.chosen), view.model(view.physics)
     before, after = (_figure(row, "free_run", "test_rmse_mv") for row in (physics, model))
     reduction = _figure(model, "free_run", "test_mser_pct")
