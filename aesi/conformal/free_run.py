@@ -23,7 +23,8 @@ band is wider by as much as the prediction would move if the model were extrapol
 
 No piece tells of temperatures that no fitted row had, so rows at such calibrate nothing, of any model, unless too few
 pieces are left without them. What is open of the activation energies there stands beside the calibrated width as an
-independent error (parameter_spread.py).
+independent error (parameter_spread.py). So does what is open of the state of charge that a record starts from, where it
+was read from a voltage: the pieces of a drive start where the rows before them end.
 
 Parts of a drive lie closer to what their models were fitted to than a drive that comes next, and whole drives may lie
 further away; both are left out, and calibrate together, since the scale tells how far each was.
@@ -129,16 +130,17 @@ class FreeRunBands:
         spread_v: Array,
         excess: Array | None = None,
         reach_v: Array | float = 0.0,
-        thermal_v: Array | float = 0.0,
+        open_v: Array | float = 0.0,
     ) -> tuple[Array, Array]:
         """(low, high), (n,) V relative to predictions made `horizon_s` ahead; between two calibrated horizons
         the half-width is interpolated in the logarithm of time.
 
         spread_v : (n,) of `spread`.  reach_v : (n,) what to add to the half-width, how far the prediction would move if
-        the model went on beyond its trained range.  thermal_v : (n,) of `thermal`.
+        the model went on beyond its trained range.  open_v : (n,) V, standard deviation of what no piece tells of, such
+        as `thermal`.
         """
         elapsed = np.full(len(spread_v), horizon_s)
-        return self._around(elapsed, spread_v, excess, reach_v, thermal_v)
+        return self._around(elapsed, spread_v, excess, reach_v, open_v)
 
     def along(
         self,
@@ -146,15 +148,15 @@ class FreeRunBands:
         spread_v: Array,
         excess: Array | None = None,
         reach_v: Array | float = 0.0,
-        thermal_v: Array | float = 0.0,
+        open_v: Array | float = 0.0,
     ) -> tuple[Array, Array]:
         """(low, high), (n,) V relative to a free run of n samples from a measurement at its first sample.
 
         Below the shortest horizon its band holds; from ten times the longest finite one on, that of the
-        whole drive.  spread_v, reach_v, thermal_v : as for `at`.
+        whole drive.  spread_v, reach_v, open_v : as for `at`.
         """
         elapsed = dt_s * np.arange(len(spread_v), dtype=np.float64)
-        return self._around(elapsed, spread_v, excess, reach_v, thermal_v)
+        return self._around(elapsed, spread_v, excess, reach_v, open_v)
 
     def spread(self, series: ErrorSeries) -> Array:
         """(n,) V, what the fitted rows leave open of the physics along a record; nought where that is not known.
@@ -179,7 +181,9 @@ class FreeRunBands:
     ) -> Intervals:
         """The band along a free run of a record, or of predictions `horizon_s` ahead, with their own `reach_v`;
         `warm` is False outside the trained range, of temperature too, where the band is not calibrated."""
-        where = self.spread(series), free.excess, reach_v, self.thermal(series)
+        begins_v = 0.0 if series.start_v is None else series.start_v
+        open_v = np.hypot(self.thermal(series), begins_v)
+        where = self.spread(series), free.excess, reach_v, open_v
         low, high = self.along(series.dt_s, *where) if horizon_s is None else self.at(horizon_s, *where)
         known = True if self.seen is None else self.seen.knows(series.degc_or_nan)
         return Intervals(low, high, ~free.outside & known)
@@ -217,14 +221,14 @@ class FreeRunBands:
         spread_v: Array,
         excess: Array | None,
         reach_v: Array | float,
-        thermal_v: Array | float,
+        open_v: Array | float,
     ) -> tuple[Array, Array]:
         columns = covariates(spread_v, excess)
         halves = np.array([band.half_width(columns) for band in self.horizons])
-        # What an earlier measurement takes off the calibrated width, it takes off what the temperature leaves open too.
-        open_v, whole = ndtri(1 - self.alpha / 2) * thermal_v, halves[-1]
-        share = np.hypot(1.0, open_v / np.where(whole > 0.0, whole, 1.0))
-        halves = np.where(whole > 0.0, halves * share, np.hypot(halves, open_v))
+        # What an earlier measurement takes off the calibrated width, it takes off what is open beside it too.
+        beside_v, whole = ndtri(1 - self.alpha / 2) * open_v, halves[-1]
+        share = np.hypot(1.0, beside_v / np.where(whole > 0.0, whole, 1.0))
+        halves = np.where(whole > 0.0, halves * share, np.hypot(halves, beside_v))
         half = _between(halves, [band.horizon_s for band in self.horizons], elapsed_s) + reach_v
         return -half, half
 

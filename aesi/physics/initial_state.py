@@ -25,7 +25,7 @@ from aesi.physics.arguments import check_soc
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect
-from aesi.physics.rest.open_circuit import CHARGED_V, GIVEN_SD, READING_V, OpenCircuit
+from aesi.physics.rest.open_circuit import CHARGED_V, GIVEN_SD, GOOD_READING_V, READING_V, OpenCircuit
 from aesi.physics.rest.voltage import first_rows_v, freed_of_instruments, freed_of_series
 from aesi.physics.simulation import ModelName, model_with
 from aesi.physics.start.load import FLOWED_S, LoadedStart
@@ -68,6 +68,7 @@ def initial_state(
     *,
     shared: bool = False,
     model: ModelName = "espm",
+    potentials_v: float = READING_V,
 ) -> InitialState:
     """State of charge at the first row of `record`: as given, or what its voltage says.
 
@@ -77,7 +78,8 @@ def initial_state(
     record : its temperature is used where it was measured.  soc0 : given by the user, for this record, or (`shared`)
     for several, so that one whose voltage contradicts it starts where its voltage says.
     hold : how the current runs between rows.  effects : what the cell has beyond its file.  model : that a
-    loaded start is simulated with.
+    loaded start is simulated with.  potentials_v : V, how far the potentials of the file are off, one standard
+    deviation; a fit that moves them takes `GOOD_READING_V`.
     Where the voltage is not known from some row on, the rows before it say where the record starts.
     Raises DataError where the voltage belongs to no state of this cell, or there is neither voltage nor `soc0`;
     InputError for what is no state of charge.
@@ -93,7 +95,7 @@ def initial_state(
         return _given(record, soc0, None)
     if unknown.any():
         record = record.take(slice(0, int(np.argmax(unknown))))
-    start = _Start(cell, record, hold, active, model)
+    start = _Start(cell, record, hold, active, model, potentials_v)
     if soc0 is not None:
         try:
             read = start.read()
@@ -135,12 +137,13 @@ class _Start:
         hold: Hold,
         effects: tuple[ActiveEffect, ...],
         model_name: ModelName,
+        potentials_v: float,
     ) -> None:
         self.declared, self.record, self.effects = cell, record, effects
         self.model = model_with(cell, effects)
         self.cell = self.model.cell
         self.current_a = float(record.current_a[0])
-        self.open_circuit = OpenCircuit.at_start(self.cell, record)
+        self.open_circuit = OpenCircuit.at_start(self.cell, record, potentials_v)
         self.model_name, self.hold = model_name, hold
         self.load = LoadedStart(self.open_circuit, record, hold, model_name)
 
@@ -163,7 +166,7 @@ class _Start:
         # Before what these rows move, the cell was as much fuller and higher.
         moved = float(rest.rows.discharged_ah(self.hold)[-1]) / capacity_ah
         ocv_rise_before_v = self._rise_v(ocv_v, moved)
-        voltage_sds_v = [READING_V, settled_sd_v]
+        voltage_sds_v = [self.open_circuit.potentials_v, settled_sd_v]
         if rest.flows:
             voltage_sds_v += [self._long_drop_v(rest, ocv_v), ocv_rise_before_v]
         spread_v = float(np.linalg.norm(voltage_sds_v))
@@ -182,7 +185,7 @@ class _Start:
         self, begins_v: float, settled_v: float, settled_sd_v: float, soc: float, sd: float
     ) -> str:
         words = f"{self.record.name} rests at {begins_v:.3f} V"
-        if max(abs(settled_v - begins_v), settled_sd_v) > READING_V:
+        if max(abs(settled_v - begins_v), settled_sd_v) > GOOD_READING_V:
             words += f", relaxing to {settled_v:.3f} +/- {settled_sd_v:.3f} V"
         words += f": state of charge {soc:.4f} +/- {sd:.4f}"
         return f"{words}{'; give --soc0 if it is known' if sd > OTHER_STATE else ''}."

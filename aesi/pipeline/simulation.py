@@ -155,7 +155,8 @@ def predict_file(
     used = replace(saved, hold=asked.hold or saved.hold)
     placed = _placed(used, profile, current, asked, say, saved=True)
     hybrid, record = placed.model, placed.record
-    prediction = hybrid.predict_record(record, placed.start.soc, one_step=measured)
+    start = placed.start
+    prediction = hybrid.predict_record(record, start.soc, one_step=measured, soc0_sd=start.read_sd)
     frame = prediction.to_frame()
     frame.insert(1, "current_a", profile.current_a)
     _write(out, frame)

@@ -25,6 +25,8 @@ class ErrorSeries:
     physics : name -> (n,) V, what other physics models say of the same record, for comparison.
     temperature_degc : (n,) of the cell, where it was measured.
     slopes_v : (n, k) V, by how much a deviation of each parameter moves the physics model's voltage, where known.
+    start_v : (n,) V, >= 0, what a standard deviation of the state of charge that it starts from is worth, where that
+    was read from a voltage; None elsewhere.
     missed_v : V, the error of the physics model that a recalibration allowed for, where one was made; it tells how much
     rows leave open of the parameters, of the declared cell's too.
     ran_out_s : s, from when on the physics model, or another one of `physics`, is held where it ran empty or full; an
@@ -45,6 +47,7 @@ class ErrorSeries:
     slopes_v: Array | None = None
     missed_v: float | None = None
     ran_out_s: float | None = None
+    start_v: Array | None = None
 
     def __len__(self) -> int:
         return len(self.error_v)
@@ -89,6 +92,7 @@ class ErrorSeries:
             physics={name: voltage[rows] for name, voltage in self.physics.items()},
             temperature_degc=None if self.temperature_degc is None else self.temperature_degc[rows],
             slopes_v=None if self.slopes_v is None else self.slopes_v[rows],
+            start_v=None if self.start_v is None else self.start_v[rows],
         )
 
     def left_by(self, name: str) -> Array:

@@ -17,6 +17,7 @@ from aesi.over_time import stamp
 from aesi.physics.belongs import SOC_MARGIN
 from aesi.physics.cell import Cell
 from aesi.physics.initial_state import InitialState, initial_state
+from aesi.physics.rest.open_circuit import GOOD_READING_V
 from aesi.physics.simulation import ModelName
 from aesi.records import Hold, Measurement, at_its_temperature, hold_sentence
 
@@ -86,7 +87,9 @@ def _prepared(
 ) -> Prepared:
     window_s = max(WINDOW_S, float(data.time_s[-1] - data.time_s[0]) / MOST_ROWS)
     thin = thinned(data, cell.capacity_ah, window_s)
-    start = initial_state(cell, data, soc0, data.hold_taken, shared=shared, model=model)
+    start = initial_state(
+        cell, data, soc0, data.hold_taken, shared=shared, model=model, potentials_v=GOOD_READING_V
+    )
     slow = is_slow(thin.data, cell.nominal_capacity_ah)
     if start.basis == "given":
         sd = start.sd

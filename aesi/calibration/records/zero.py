@@ -30,6 +30,7 @@ from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import DataError
 from aesi.physics.cell import Cell
 from aesi.physics.initial_state import initial_state
+from aesi.physics.rest.open_circuit import GOOD_READING_V
 from aesi.records import Measurement
 
 SLOW_C_RATE = 0.15
@@ -105,7 +106,7 @@ def _of_cycle(cell: Cell, data: Measurement) -> tuple[float, float] | None:
         return None
     try:
         began, ended = (
-            initial_state(cell, part, hold=data.hold_taken)
+            initial_state(cell, part, hold=data.hold_taken, potentials_v=GOOD_READING_V)
             for part in (data, data.take(slice(last + 1, None)))
         )
     except DataError:

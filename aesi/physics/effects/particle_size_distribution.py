@@ -20,12 +20,12 @@ from aesi.physics.model import EspmModel
 
 SIZES = 5
 """Particles that stand for the distribution, of equal parts of it."""
-RANGE = "laser diffraction of battery powders gives none to 60 %; the rest, to 80 %, is room for a fit"
+RANGE = "laser diffraction of battery powders gives none to 60 %; the rest, to 100 %, is room for a fit"
 PARAMETERS = {
     f"{side}_sd": Parameter(
         0.3,
         "dimensionless",
-        (0.0, 0.8),
+        (0.0, 1.0),
         RANGE,
         even=True,
         neutral=0.0,

@@ -16,8 +16,12 @@ from aesi.records import Measurement
 
 GIVEN_SD = 0.0005
 """Standard deviation of a state of charge that the user gives, and the least of any."""
-READING_V = 3e-3
-"""Standard deviation of a good open-circuit potential: half of what a calibration leaves of a C/20 discharge."""
+READING_V = 9e-3
+"""Standard deviation of the open-circuit voltage of a cell file, V: what calibrated and published files leave of a
+measured drive (geometric mean of eight development records of `aesi bench real`)."""
+GOOD_READING_V = 3e-3
+"""The same where the file's potentials are taken for those of the cell, since a fit of its records moves them, or tells
+what else is off: half of what a calibration leaves of a C/20 discharge."""
 CHARGED_V = 0.03
 """How far a full cell's voltage falls at rest: 6 to 30 mV in the charged records of four measured cells."""
 BEYOND_V = 0.05
@@ -41,19 +45,23 @@ class OpenCircuit:
     """The open-circuit voltage of a cell (effects folded in) at one temperature.
 
     kelvin : K; None is the cell file's initial temperature.  name : of the record whose voltages are read, if any.
+    potentials_v : V, standard deviation of this voltage.
     """
 
-    def __init__(self, cell: Cell, kelvin: float | None = None, name: str = "") -> None:
-        self.cell, self.name = cell, name
+    def __init__(
+        self, cell: Cell, kelvin: float | None = None, name: str = "", potentials_v: float = READING_V
+    ) -> None:
+        self.cell, self.name, self.potentials_v = cell, name, potentials_v
         self.kelvin = cell.initial_temperature_k if kelvin is None else kelvin
         self.soc = np.linspace(*aged_range(cell), GRID)
         self.ocv = np.maximum.accumulate(_ocv(cell, self.soc, self.kelvin))
 
     @classmethod
-    def at_start(cls, cell: Cell, record: Measurement) -> OpenCircuit:
+    def at_start(cls, cell: Cell, record: Measurement, potentials_v: float = READING_V) -> OpenCircuit:
         """At the temperature of a record's first row, where it was measured."""
         degc = record.temperature_degc
-        return cls(cell, None if degc is None else float(degc[0]) + ZERO_CELSIUS_K, record.name)
+        kelvin = None if degc is None else float(degc[0]) + ZERO_CELSIUS_K
+        return cls(cell, kelvin, record.name, potentials_v)
 
     def soc_at(self, voltage_v: float) -> float:
         """State of charge of an open-circuit voltage, held at the ends of the range."""
@@ -62,7 +70,7 @@ class OpenCircuit:
     def soc_at_rest(self, terminal_v: float, ocv_v: float) -> float:
         """State of charge of a resting cell: 1 of a full charge, by its terminals, else that of the open-circuit
         voltage, which effects in series may keep apart from them.  Raises DataError as `reading` does."""
-        return 1.0 if self.charged(terminal_v) else self.reading(ocv_v, READING_V)[0]
+        return 1.0 if self.charged(terminal_v) else self.reading(ocv_v, self.potentials_v)[0]
 
     def voltage_at(self, soc: float) -> float:
         """V, the open-circuit voltage."""
@@ -70,7 +78,9 @@ class OpenCircuit:
 
     def full_sd(self, voltage_v: float) -> float:
         """Standard deviation of the state of charge of a full cell that rests at `voltage_v`."""
-        return max(0.5 * abs(1.0 - self.soc_at(voltage_v)), self.reading(self.voltage_at(1.0), READING_V)[1])
+        return max(
+            0.5 * abs(1.0 - self.soc_at(voltage_v)), self.reading(self.voltage_at(1.0), self.potentials_v)[1]
+        )
 
     def charged(self, voltage_v: float, drop_v: float = 0.0) -> bool:
         """Is this rest voltage that of a full charge?  drop_v : of it is the model's, which may be far too much."""

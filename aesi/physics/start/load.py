@@ -13,7 +13,7 @@ import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR, ZERO_CELSIUS_K
 from aesi.numerics.typing import Array
-from aesi.physics.rest.open_circuit import READING_V, OpenCircuit
+from aesi.physics.rest.open_circuit import OpenCircuit
 from aesi.physics.simulation import ModelName, simulate
 from aesi.records import Hold, Measurement
 
@@ -51,7 +51,7 @@ class LoadedStart:
         history_v = self.drop(begun, typical_a, FLOWED_S[-1]) - self.drop(begun, typical_a, 0.0)
         since, at = [], []
         for before_s, drop in zip(FLOWED_S, drops, strict=True):
-            spread = float(np.hypot(max(history_v, READING_V), DROP_ERROR * drop))
+            spread = float(np.hypot(max(history_v, self.open_circuit.potentials_v), DROP_ERROR * drop))
             if self.open_circuit.admits(first_v + drop, spread) or not before_s:
                 since.append(before_s)
                 at.append(self.open_circuit.reading(first_v + drop, spread))

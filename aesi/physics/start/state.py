@@ -33,6 +33,12 @@ class InitialState:
     doubted: bool = False
 
     @property
+    def read_sd(self) -> float:
+        """Standard deviation of a state of charge that was read from a voltage; nought of one that was given, and of a
+        full charge, which is 1 by definition."""
+        return self.sd if self.basis in ("rest", "load") else 0.0
+
+    @property
     def against_voltage(self) -> bool:
         """Was a state of charge taken as it was given, though the record's voltage contradicts it?"""
         return self.contradicted and self.basis == "given"

@@ -143,7 +143,7 @@ def _load(config: ExperimentConfig) -> Loaded:
         notes.append(DFN_NOTE)
     series, empty = series_under(physics, records, config)
     for name, record in records.items():
-        series[name] = physics.with_slopes(series[name], record.measurement, record.soc0, hold)
+        series[name] = physics.with_slopes(series[name], record, hold)
     for name in empty:
         if name not in sources.roles["test"]:
             _refuse(physics, name, records[name], hold)
@@ -199,7 +199,7 @@ def _on_grid(
             temperature_sentence(cell, measurement, given.effects),
             *even.notes,
         ]
-        records[name] = no_rows(even, start.soc)
+        records[name] = no_rows(even, start.soc, start.read_sd)
     notes += on_temperatures(cell, (m.temperature_degc for m, _ in sources.records.values()), given.effects)
     return records, notes
 

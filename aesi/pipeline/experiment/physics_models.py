@@ -25,6 +25,7 @@ from aesi.pipeline.product.deviations import (
     PhysicsStart,
     deviating,
     slopes_v,
+    start_v,
 )
 from aesi.pipeline.product.error_series import error_series
 from aesi.records import ErrorSeries, Hold, Measurement
@@ -74,12 +75,15 @@ class PhysicsModels:
         )
         return series, bool(run.series["depleted"].any())
 
-    def with_slopes(self, series: ErrorSeries, record: Measurement, soc0: float, hold: Hold) -> ErrorSeries:
-        """The series of the record with what each parameter of the chosen physics is worth along it."""
-        chosen = self.chosen
-        start = chosen.soc0(soc0)
-        slopes = slopes_v(chosen.cell, chosen.effects, record, start, hold, chosen.model, series.model_v)
-        return replace(series, slopes_v=slopes)
+    def with_slopes(self, series: ErrorSeries, record: FitRecord, hold: Hold) -> ErrorSeries:
+        """The series of the record with what each parameter of the chosen physics, and its start, is worth along it."""
+        chosen, data = self.chosen, record.measurement
+        start = chosen.soc0(record.soc0)
+        slopes = slopes_v(chosen.cell, chosen.effects, data, start, hold, chosen.model, series.model_v)
+        begins_v = None
+        if record.soc0_sd > 0.0:
+            begins_v = start_v(chosen, data, record.soc0, record.soc0_sd, hold, series.model_v)
+        return replace(series, slopes_v=slopes, start_v=begins_v)
 
 
 def physics_models(
@@ -113,6 +117,6 @@ def without(records: Mapping[str, FitRecord], name: str, rows: slice) -> dict[st
     return {**records, name: replace(records[name], rows=seen)}
 
 
-def no_rows(measurement: Measurement, soc0: float) -> FitRecord:
+def no_rows(measurement: Measurement, soc0: float, soc0_sd: float = 0.0) -> FitRecord:
     """A record of which no fit sees anything yet."""
-    return FitRecord(measurement, soc0, np.zeros(len(measurement), dtype=bool))
+    return FitRecord(measurement, soc0, np.zeros(len(measurement), dtype=bool), soc0_sd)

@@ -82,11 +82,15 @@ GAIN = 0.05
 
 @dataclass(frozen=True, eq=False)
 class FitRecord:
-    """An evenly sampled record, its declared state of charge at the start, and the rows that a fit may look at."""
+    """An evenly sampled record, its declared state of charge at the start, and the rows that a fit may look at.
+
+    soc0_sd : standard deviation of the start where it was read from a voltage; nought elsewhere.
+    """
 
     measurement: Measurement
     soc0: float
     rows: BoolArray
+    soc0_sd: float = 0.0
 
 
 def recalibrate(

@@ -74,6 +74,7 @@ FILMS = tuple(FileParameter(FILM, side, STEP, True, FILM_ENERGY_SD) for side in 
 ENERGIES_J_MOL = np.array([prior.energy_j_mol / prior.prior_sd for prior in (*PRIORS, *FILMS)])
 """(n_slopes,) deviation of each activation energy over that of the logarithm of its rate; 0 where there is none."""
 ALL = tuple(range(len(PRIORS)))
+HALF_FULL = 0.5
 INITIAL_STATE = (0,)
 RESISTOR = (1,)
 """Places in PRIORS of what a fit moves: everything, the state of charge at the start alone, the contact alone."""
@@ -162,3 +163,15 @@ def slopes_v(
     return np.column_stack(
         [(each.simulate(record, soc0, hold).voltage_v - voltage_v) / STEP for each in moved]
     )
+
+
+def start_v(
+    physics: PhysicsStart, record: Measurement, soc0: float, soc0_sd: float, hold: Hold, voltage_v: Array
+) -> Array:
+    """(n,) V, >= 0, how far the voltage_v (n,) of the record under the physics moves where it starts a deviation
+    `soc0_sd` nearer to half full.
+
+    soc0 : as of `PhysicsStart.simulate`.  Nearer, since a cell may not start beyond full or empty.
+    """
+    nearer = soc0 - soc0_sd if soc0 > HALF_FULL else soc0 + soc0_sd
+    return np.asarray(np.abs(physics.simulate(record, nearer, hold).voltage_v - voltage_v))

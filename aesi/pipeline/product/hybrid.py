@@ -26,7 +26,7 @@ from aesi.physics.belongs import check_voltage
 from aesi.physics.cell import Soh
 from aesi.physics.depletion import RUN_ON
 from aesi.physics.effects import active_effect
-from aesi.pipeline.product.deviations import slopes_v
+from aesi.pipeline.product.deviations import PhysicsStart, slopes_v, start_v
 from aesi.pipeline.product.error_series import error_series
 from aesi.pipeline.product.model_folder import part_file, read_model, write_model
 from aesi.pipeline.product.prediction import Prediction
@@ -120,9 +120,18 @@ class HybridModel:
         return self.predict_record(record, soc0, one_step=not free, error0_v=error0_v)
 
     def predict_record(
-        self, record: Measurement, soc0: float | None = None, *, one_step: bool = False, error0_v: float = 0.0
+        self,
+        record: Measurement,
+        soc0: float | None = None,
+        *,
+        one_step: bool = False,
+        error0_v: float = 0.0,
+        soc0_sd: float = 0.0,
     ) -> Prediction:
-        """`predict` of a record, under its name: one step ahead of its voltage, or in free run, which sees none."""
+        """`predict` of a record, under its name: one step ahead of its voltage, or in free run, which sees none.
+
+        soc0_sd : standard deviation of soc0, by what it is worth the band of a free run is wider.
+        """
         measured = record.voltage_v
         if one_step and not np.isfinite(measured).all():
             row = int(np.flatnonzero(~np.isfinite(measured))[0])
@@ -141,7 +150,7 @@ class HybridModel:
         if one_step:
             prediction = self._one_step(series)
         else:
-            prediction = self._free_run(self._with_slopes(series, even, soc0), error0_v)
+            prediction = self._free_run(self._with_slopes(series, even, soc0, soc0_sd), error0_v)
         return prediction if even is record else self._back(prediction, record, soc0)
 
     def save(self, folder: str | Path) -> Path:
@@ -244,8 +253,14 @@ class HybridModel:
             raise SimulationError(f"{str(error).removesuffix(RUN_ON)}{END_BEFORE}") from None
         return error_series(record, run, self.dt_s)
 
-    def _with_slopes(self, series: ErrorSeries, record: Measurement, soc0: float) -> ErrorSeries:
-        """With what the band asks of the physics: a simulation for each parameter that data leave open."""
+    def _with_slopes(
+        self, series: ErrorSeries, record: Measurement, soc0: float, soc0_sd: float
+    ) -> ErrorSeries:
+        """With what the band asks of the physics: a simulation for each parameter left open, and for the start."""
+        if self.bands is not None and soc0_sd > 0.0:
+            physics = PhysicsStart(self.cell, self.cell, self.effects, model=self.model)
+            begins_v = start_v(physics, record, soc0, soc0_sd, self.hold, series.model_v)
+            series = replace(series, start_v=begins_v)
         if self.bands is None or self.bands.root is None:
             return series
         slopes = slopes_v(self.cell, self.effects, record, soc0, self.hold, self.model, series.model_v)

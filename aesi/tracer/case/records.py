@@ -17,6 +17,7 @@ from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.initial_state import InitialState, initial_state
+from aesi.physics.rest.open_circuit import GOOD_READING_V
 from aesi.records import Hold, Measurement, at_its_temperature, hold_sentence
 from aesi.tracer.case.thinned import ThinnedRecord, lost_v, thinned_record, thinned_together
 
@@ -147,7 +148,7 @@ def _prepared(
     shared: bool,
 ) -> PreparedRecord:
     data = record.whole
-    start = initial_state(cell, data, soc0, record.hold, given, shared=shared)
+    start = initial_state(cell, data, soc0, record.hold, given, shared=shared, potentials_v=GOOD_READING_V)
     lost = lost_v(cell, record, start.soc, given)
     thin = replace(record.thin, voltage_v=record.thin.voltage_v - lost)
     duration = float(data.time_s[-1] - data.time_s[0])

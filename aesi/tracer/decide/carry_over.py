@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -160,10 +161,16 @@ def _end(state: ModelState, rate: float, temperature: float | None) -> tuple[flo
 
 
 def full_course(cell: Cell, rate_c: float, degc: float | None) -> tuple[Measurement, float]:
-    """A full discharge (rate > 0) or charge at a constant current, without voltages, and the state of charge at its
-    first row."""
-    time: Array = np.arange(0.0, SECONDS_PER_HOUR / abs(rate_c), STEP_S)
-    current = np.full(len(time), rate_c * cell.nominal_capacity_ah)
+    """A discharge from full to empty (rate > 0) or a charge at a constant current, without voltages, and the state of
+    charge at its first row.
+
+    rate_c : 1/h, of the nominal capacity. It lasts as long as the charge between the limits of stoichiometry does,
+    which may be more than the nominal capacity: the knee of a discharge lies at its very end.
+    """
+    current_a = rate_c * cell.nominal_capacity_ah
+    steps = math.ceil(SECONDS_PER_HOUR * cell.capacity_ah / abs(current_a) / STEP_S)
+    time = STEP_S * np.arange(steps + 1, dtype=np.float64)
+    current = np.full(len(time), current_a)
     temperature = None if degc is None else np.full(len(time), degc)
     course = Measurement(time, current, np.zeros(len(time)), temperature, name="range")
     return course, 1.0 if rate_c > 0 else 0.0

@@ -287,7 +287,7 @@ def test_the_band_of_errors_that_are_mostly_nought_was_no_number() -> None:
     error = np.where(np.arange(3000) % 20 == 0, 1e-3, 0.0)
     bands = FreeRunBands.fit({1.0: [error]}, DT)
     np.testing.assert_array_equal(bands.at(1.0, np.zeros(2))[1], 0.0)
-    np.testing.assert_allclose(bands.at(1.0, np.zeros(2), thermal_v=1e-3)[1], 1.645e-3, rtol=1e-3)
+    np.testing.assert_allclose(bands.at(1.0, np.zeros(2), open_v=1e-3)[1], 1.645e-3, rtol=1e-3)
 
 
 def test_missing_predictions_are_left_out() -> None:

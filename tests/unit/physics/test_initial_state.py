@@ -13,7 +13,7 @@ from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import DataError, InputError
 from aesi.physics import Cell, initial_state, simulate
 from aesi.physics.effects import CATALOGUE
-from aesi.physics.rest.open_circuit import READING_V, OpenCircuit
+from aesi.physics.rest.open_circuit import GOOD_READING_V, READING_V, OpenCircuit
 from aesi.records import Measurement
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
@@ -140,6 +140,21 @@ def test_the_temperature_of_the_record_moves_the_reading_of_a_potential_with_ent
     cold = initial_state(nmc, resting(voltage, temperature_degc=-10.0)).soc
     assert at_reference == pytest.approx(0.5, abs=5e-4)
     assert abs(cold - at_reference) > 1e-3
+
+
+def test_a_reading_is_as_uncertain_as_the_potentials_of_the_file():
+    data = resting(float(LG_M50.rest_voltage_v(0.5)[0]))
+    good, usual = (initial_state(LG_M50, data, potentials_v=v) for v in (3e-3, READING_V))
+    slope_v = float(np.diff(LG_M50.rest_voltage_v(np.array([0.49, 0.51])))[0]) / 0.02
+    assert good.soc == usual.soc == pytest.approx(0.5, abs=5e-4)
+    # Beside how far the rest may still relax, which is the same in both.
+    more = np.sqrt(usual.sd**2 - good.sd**2)
+    assert more == pytest.approx(np.sqrt(READING_V**2 - 3e-3**2) / slope_v, rel=0.15)
+    assert good.sd > 3e-3 / slope_v
+    assert usual.read_sd == usual.sd
+    assert initial_state(LG_M50, data, 0.5).read_sd == 0.0
+    full = resting(LG_M50.upper_voltage_v - 0.01)
+    assert (initial_state(LG_M50, full).basis, initial_state(LG_M50, full).read_sd) == ("full charge", 0.0)
 
 
 def test_a_given_state_of_charge_is_believed_for_one_record_and_checked_for_several():
@@ -281,7 +296,7 @@ def test_the_rest_voltage_and_the_ends_were_those_of_the_last_row_of_a_rest(c_ra
 
 def test_a_current_too_small_for_a_load_widens_what_is_read_once_it_has_moved_charge():
     data = slow(0.5, 1 / 50, 1.0, 10.0)
-    short, long = initial_state(LG_M50, data.take(slice(0, 9))), initial_state(LG_M50, data)
+    short, long = (initial_state(LG_M50, d, potentials_v=3e-3) for d in (data.take(slice(0, 9)), data))
     assert short.soc == pytest.approx(long.soc, abs=1e-3)
     assert long.sd > 1.5 * short.sd  # its drop at C/50, 6 mV in the end, beside 3 of a potential
 
@@ -301,7 +316,7 @@ def test_a_rest_is_read_as_it_is_where_it_does_not_move_or_says_too_little():
     assert "relaxing" not in still.sentence
     assert still.rest_voltage_v == pytest.approx(3.7, abs=1e-4)
     assert "relaxing to" in drifting.sentence
-    assert drifting.rest_voltage_v > moving.voltage_v[-1] + READING_V
+    assert drifting.rest_voltage_v > moving.voltage_v[-1] + GOOD_READING_V
     few = initial_state(LG_M50, moving.take(slice(0, 5)))
     assert few.rest_voltage_v == pytest.approx(moving.voltage_v[:5].mean())
 

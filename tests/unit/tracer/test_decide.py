@@ -5,18 +5,19 @@ import subprocess
 import sys
 from dataclasses import replace
 from functools import partial
+from pathlib import Path as FilePath
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from aesi.physics import simulate
+from aesi.physics import Cell, simulate
 from aesi.physics.effects import CATALOGUE
 from aesi.records import Measurement
 from aesi.tracer.case.blocks import blocks_of
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import prepare_all
-from aesi.tracer.decide.carry_over import LeftOut, left_out_errors, range_fault
+from aesi.tracer.decide.carry_over import LeftOut, full_course, left_out_errors, range_fault
 from aesi.tracer.decide.confidence import HIGHEST, FrequencyMap, fitted_map
 from aesi.tracer.decide.evidence import consistent, named_options
 from aesi.tracer.decide.one_cause import in_one
@@ -50,6 +51,8 @@ from aesi.tracer.search.fitted import base_of, fitted_hypothesis, values_without
 from aesi.tracer.search.forward import searched
 from aesi.tracer.search.path import Path, Step
 from aesi.tracer.search.wrong_parameters import beyond_spread, with_wrong_parameters, wrong_sds
+
+CELLS = FilePath(__file__).resolve().parents[3] / "experiments" / "cells"
 
 
 @pytest.fixture
@@ -415,6 +418,19 @@ def test_a_model_that_runs_out_of_salt_where_the_declared_one_does_not_is_refuse
     assert fault(0.5) is None
     assert "a full discharge at 2C runs out of lithium or of salt" in fault(0.2)
     assert "before it reaches its voltage limit" in fault(0.2)
+
+
+@pytest.mark.parametrize("rate_c", [1.0, -0.5])
+def test_a_full_course_goes_through_the_whole_charge_of_the_cell(rate_c):
+    cell = Cell.from_bpx(CELLS / "nmc_30ah.bpx.json")  # which holds 6 % more than its nominal capacity
+    course, soc0 = full_course(cell, rate_c, None)
+    moved = course.discharged_ah("linear")[-1] / cell.capacity_ah
+    assert 1.0 <= abs(moved) < 1.01
+    run = simulate(cell, course.time_s, course.current_a, soc0, hold="linear", on_depletion="clip")
+    if rate_c > 0:
+        assert run.voltage_v.min() < cell.lower_voltage_v
+    else:
+        assert run.voltage_v.max() > cell.upper_voltage_v
 
 
 @pytest.mark.parametrize(("share", "at_fault"), [(0.79, True), (0.81, False)])

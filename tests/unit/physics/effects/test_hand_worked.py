@@ -303,7 +303,7 @@ def test_a_share_of_the_differences_between_regions_is_no_physics():
 
 
 @pytest.mark.parametrize(
-    ("name", "reach"), [("concentration_dependent_diffusivity", 10.0), ("particle_size_distribution", 0.8)]
+    ("name", "reach"), [("concentration_dependent_diffusivity", 10.0), ("particle_size_distribution", 1.0)]
 )
 def test_the_corners_of_a_wide_range_can_be_simulated(name, reach):
     # Both electrodes at a corner of their ranges, under pulses of 2C that empty the slowest particles' surfaces.
