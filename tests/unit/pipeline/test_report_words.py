@@ -60,6 +60,12 @@ def test_a_correction_that_does_not_beat_the_physics_it_was_learned_on_is_told_s
     figures = view.models[1]["free_run"] | {"test_rmse_mv": 4.0, "test_mser_recalibrated_pct": -300.0}
     refit_does = replace(view, models=(view.models[0], {**view.models[1], "free_run": figures}))
     assert "errs by 2.0 mV there: recalibrate it first" in runs.corrected_finding(refit_does)
+    first = "and nothing learnt, the ESPM errs less there: 2.0 mV."
+    assert runs.run_finding(refit_does).endswith(first)
+    none = replace(refit_does, chosen="ESPM", models=({**view.models[0], "free_run": figures},))
+    assert runs.run_finding(none).startswith("No correction of the voltage error was chosen")
+    assert runs.run_finding(none).endswith(first)
+    assert "errs less there" not in runs.run_finding(view)
 
 
 def test_training_records_of_another_cell_than_the_validation_ones_are_told_of(views):
