@@ -55,8 +55,8 @@ all wrong ones are contradicted; those that pass start under load."""
 DOUBTED_SDS = 2.0
 """A given state of charge further than OTHER_STATE from that of the voltage, and by more than so many of its deviations
 beyond the two that this may be off by, is told as doubtful. Of 147 starts under load of 14 measured records, with the
-file of their cell, 3.4 % of states given 2 points off are, 54 % of those 20 points off and 23 % of those 10; with 1 it
-is 6.8, 69 and 30 %, with 3 2.7, 43 and 17 %."""
+file of their cell, 3.4 % of states given 2 points off are, 54 % of those 20 points off and 22 % of those 10; with 1 it
+is 6.8, 69 and 29 %, with 3 2.7, 42 and 15 %."""
 
 
 def initial_state(

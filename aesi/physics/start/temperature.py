@@ -48,8 +48,8 @@ class OtherTemperature:
         return (
             f"{name}: its voltage contradicts its temperature. At {self.degc:.4g} degC, which it is taken at, {model} "
             f"leaves {MV_PER_V * self.left_v:.1f} mV, at {self.there_degc:.4g} degC {MV_PER_V * self.there_v:.1f} mV: "
-            "the sensor is at fault or not on the cell (--column temperature_degc= leaves the column out), or the cell "
-            "answers as one at that temperature would."
+            "it is in another unit (--unit temperature_degc=degF), its sensor is at fault or not on the cell (--column "
+            "temperature_degc= leaves it out), or the cell answers as one at that temperature would."
         )
 
 
