@@ -53,9 +53,12 @@ MOST_DEVIATIONS = 4.0
 
 @dataclass(frozen=True, eq=False)
 class Ageing:
-    """Prior of the records' shares, of standard normal deviates z (records,).
+    """Prior of the records' shares of active material, of standard normal deviates z (records,):
 
-    chain : (records, records) signs, which of the losses each record is away from the file.  sd : (records,) of each.
+        share_i = exp(chain_i . (sd a)),      a_j = |e_j| of a loss (1), z_j of a record without a date
+
+    chain : (records, records) the identity for records without a date; else chain[i, j] is 1 where loss j lies between
+    record i and the file's day behind it, -1 where between the file's day and record i behind that.  sd : (records,).
     silicon : (records, records) weights of the records' own logarithms of their silicon in that which a record has.
     losses : (records,) is it a loss, (1)?  day : of the file's state; None where no record has a date.
     """
@@ -86,17 +89,10 @@ class Ageing:
             )
         loaded = [d for r, d in zip(records, days, strict=True) if d is not None and not r.slow]
         day = as_of or max(loaded or told, default=None)
-        chain = np.eye(len(records))
-        sd = np.array([SLOW_SD if r.slow else LOADED_SD for r in records])
         since = np.array([0 if d is None or day is None else (d - day).days for d in days])
         losses = np.array([d is not None for d in days], dtype=bool)
-        for way in (-1, 1):
-            there = [i for i in np.flatnonzero(losses) if since[i] * way > 0 or (since[i] == 0 and way < 0)]
-            there.sort(key=lambda i: abs(since[i]))
-            for k, i in enumerate(there):
-                nearer = abs(since[there[k - 1]]) if k else 0
-                sd[i] = LOSS_SD * np.sqrt(abs(since[i]) - nearer)
-                chain[i, there[: k + 1]] = -way
+        chain, loss_sd = _chain_and_sd(since, losses)
+        sd = np.where(losses, loss_sd, [SLOW_SD if r.slow else LOADED_SD for r in records])
         return cls(chain, _silicon(records, since, losses), sd, losses, day)
 
     @property
@@ -105,13 +101,13 @@ class Ageing:
         return self.day is not None
 
     @property
-    def most(self) -> Array:
-        """(records,) bounds of the working coordinates."""
+    def bounds(self) -> Array:
+        """(records,) no working coordinate is larger than this, or less than its negative."""
         return np.where(self.losses, MOST_DEVIATIONS, MOST_AGE / np.where(self.sd > 0.0, self.sd, 1.0))
 
     @property
-    def none(self) -> Array:
-        """(records,) working coordinates of records in the file's state."""
+    def z_of_file_state(self) -> Array:
+        """(records,) working coordinates of records in the file's state; -inf of a loss, whose |e| is nought there."""
         return np.where(self.losses, -np.inf, 0.0)
 
     def share(self, index: int, z: Array) -> float:
@@ -130,6 +126,24 @@ class Ageing:
         if self.day is None:
             return ()
         return (f"the file is in the state of {self.day}.",)
+
+
+def _chain_and_sd(since: Array, dated: BoolArray) -> tuple[Array, Array]:
+    """`Ageing.chain`, and (records,) deviations of the losses of dated records, nought of the others.
+
+    The losses before the file's day are strung together away from it, and so are those after it: record i has all of
+    those from the file's day to its own, the last of which is number i.
+    since : (records,) days from the file's state.  dated : (records,).
+    """
+    chain, sd = np.eye(len(since)), np.zeros(len(since))
+    before = sorted(np.flatnonzero(dated & (since <= 0)), key=lambda i: abs(since[i]))
+    after = sorted(np.flatnonzero(dated & (since > 0)), key=lambda i: abs(since[i]))
+    for sign, outwards in ((1, before), (-1, after)):
+        for k, i in enumerate(outwards):
+            nearer = abs(since[outwards[k - 1]]) if k else 0
+            sd[i] = LOSS_SD * np.sqrt(abs(since[i]) - nearer)
+            chain[i, outwards[: k + 1]] = sign
+    return chain, sd
 
 
 def _silicon(records: Sequence[Prepared], since: Array, dated: BoolArray) -> Array:

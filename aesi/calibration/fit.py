@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from datetime import date
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -71,51 +72,78 @@ def calibrate(
     *,
     evaluations: int = EVALUATIONS,
 ) -> Calibration:
-    """Capacities, stoichiometry windows, potential, diffusion, kinetics, electrolyte and contacts, with temperature.
+    """Fit the parameters of a cell's file to records by maximum a posteriori: capacities, stoichiometry windows,
+    potentials, diffusion, kinetics, electrolyte and contacts, with temperature. Gives the new cell, values with 95 %
+    intervals (Laplace's approximation), what stays undetermined, and the errors of each record before and after.
 
-    records : at least one, of any temperatures: their column, or by `conditions`, or the cell file's; those that share
-    a name are numbered in what comes back.
+    records : at least one, current_a in A, positive on discharge, and of any temperatures: their column, or by
+    `conditions`, or the cell file's (degC); those that share a name are numbered in what comes back.
     evaluations : of each descent, at most.
     Raises DataError for records that do not fit a cell; FitError where the start cannot be simulated.
     """
     began = time.perf_counter()
     conditions = conditions or Conditions()
     model, notes = problem(cell, records, conditions)
-    x = descended(model, evaluations)
-    found, warmth = with_heat(rewound(model, x), model.records)
-    if warmth:  # how fast a winding follows its case is of the file, which is fitted as it is simulated
-        model.take_heat_of(found)
-        x = descended(model, evaluations, x)
-        found = rewound(model, x)
+    x, found, of_heat = _fitted_twice(model, evaluations)
     states = model.states(cell, x)
     scaled = model.jacobian(x) * information_weights(model, x)[:, None]
     covariance: Array = np.asarray(np.linalg.inv(scaled.T @ scaled), dtype=float)
-    left_v = {name: [rms(error) for error in model.errors_of(*state)] for name, state in states.items()}
-    shares, days = capacities(model, x), conditions.dates
+    shares = capacities(model, x)
     return Calibration(
-        cell=replace(
-            found,
-            fitted_with=model.model_name,
-            capacity_shares=tuple(shares.items()),
-            tested_on=tuple((name, day_of(days[name])) for name in shares if name in days),
-            fitted_at_k=tuple((r.name, round(_mean_kelvin(cell, r), 2)) for r in model.records),
-        ),
+        cell=_with_what_it_is_of(found, cell, model, shares, conditions.dates),
         declared=cell,
         parameters=intervals(model, x, covariance),
         undetermined=undetermined(model, scaled),
         at_bounds=at_bounds(model, x),
-        errors=tuple(
-            RecordError(r.name, _degc(r), left_v["declared"][i], left_v["fitted"][i], left_v["simulated"][i])
-            for i, r in enumerate(model.records)
-        ),
+        errors=_errors(model, states),
         capacities=shares,
         size_assumed="" if conditions.same_cell else size_assumed(cell, records),
-        notes=(*notes, *_of_priors(model, x), *_of_own(model, x), *_ran_out(model, states), *warmth),
+        notes=(*notes, *_of_priors(model, x), *_of_own(model, x), *_ran_out(model, states), *of_heat),
         seconds=time.perf_counter() - began,
         model=model,
         x=x,
         covariance=covariance,
         against_temperature=against_temperature(cell, model.records, model.model_name),
+    )
+
+
+def _fitted_twice(model: Model, evaluations: int) -> tuple[Array, Cell, tuple[str, ...]]:
+    """Where the descents end, the cell there with what its temperatures tell of heat, and a sentence on that.
+
+    Where no record tells of heat, a second descent would begin with what the first one had, and there is none.
+    """
+    x = descended(model, evaluations)
+    found, of_heat = with_heat(rewound(model, x), model.records)
+    if of_heat:  # how fast a winding follows its case is of the file, which is fitted as it is simulated
+        model.take_heat_of(found)
+        x = descended(model, evaluations, x)
+        found = rewound(model, x)
+    return x, found, of_heat
+
+
+def _with_what_it_is_of(
+    found: Cell, declared: Cell, model: Model, shares: Mapping[str, float], days: Mapping[str, date]
+) -> Cell:
+    """The fitted cell as it is written: with which model and which records it was fitted.
+
+    declared : at whose temperature records without one were taken.  shares : record -> of the capacity that is written.
+    days : by record name, of those that have one.
+    """
+    return replace(
+        found,
+        fitted_with=model.model_name,
+        capacity_shares=tuple(shares.items()),
+        tested_on=tuple((name, day_of(days[name])) for name in shares if name in days),
+        fitted_at_k=tuple((r.name, round(_mean_kelvin(declared, r), 2)) for r in model.records),
+    )
+
+
+def _errors(model: Model, states: Mapping[FitState, tuple[Cell, Array]]) -> tuple[RecordError, ...]:
+    """Of each record, what each state of the cell leaves of it."""
+    left_v = {name: [rms(error) for error in model.errors_of(*state)] for name, state in states.items()}
+    return tuple(
+        RecordError(r.name, _degc(r), left_v["declared"][i], left_v["fitted"][i], left_v["simulated"][i])
+        for i, r in enumerate(model.records)
     )
 
 

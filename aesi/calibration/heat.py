@@ -112,6 +112,7 @@ def heat_w(cell: Cell, record: Prepared) -> Array:
         cell, rows.time_s, rows.current_a, record.start.soc, (), record.kelvin - ZERO_CELSIUS_K, record.hold,
         on_depletion="clip",
     )  # fmt: skip
+    # A charge beyond full or empty, by what the start and the capacity are off by, has the potential of the end.
     soc = np.clip(run.series["soc"], 0.0, 1.0)
     theta_n, theta_p = cell.balance.stoichiometries(soc)
     entropic = cell.positive.entropic(np.asarray(theta_p)) - cell.negative.entropic(np.asarray(theta_n))

@@ -127,7 +127,7 @@ class Model:
         self.weights = [r.trusted.astype(float) / (ERROR_V * REPEATS**0.5) for r in records]
         bounds = [f.bounds for f in free] + [(-4.0, 4.0)] * (self.layout.size - len(free))
         self.low, self.high = np.array(bounds).T
-        self.high[self.layout.ages] = ageing.most
+        self.high[self.layout.ages] = ageing.bounds
         self.low[self.layout.ages] = -self.high[self.layout.ages]
         self.simulations = 0
 
@@ -199,7 +199,7 @@ class Model:
         for index, record in enumerate(self.records):
             first = 0 if record.start.basis == "full charge" else 1
             out[self.layout.own(index)[first:]] = 0.0
-        out[self.layout.ages] = self.ageing.none
+        out[self.layout.ages] = self.ageing.z_of_file_state
         return out
 
     def states(self, declared: Cell, x: Array) -> dict[FitState, tuple[Cell, Array]]:

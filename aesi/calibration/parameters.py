@@ -58,6 +58,7 @@ class Free:
         """Of the working coordinate."""
         low = -LIMIT_SD if self.factor else max(-LIMIT_SD, (self.low - self.start) / self.sd)
         high = LIMIT_SD if self.factor else min(LIMIT_SD, (self.high - self.start) / self.sd)
+        # Where the start is on a bound, as at nought of a resistance: `least_squares` wants it strictly inside.
         return min(low, -1e-9), max(high, 1e-9)
 
 

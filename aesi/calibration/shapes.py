@@ -27,7 +27,7 @@ POSITIVE_KNOTS, NEGATIVE_KNOTS = 23, 15
 ENTROPY_KNOTS = 5
 """Of the correction of an entropy, which is smoother."""
 GRID = 2049
-"""Stoichiometries at which a corrected potential is laid down, from 0 to 1."""
+"""Stoichiometries at which a potential is laid down anew, from 0 to 1."""
 LEAST_SLOPE = 5e-3
 """V per unit of stoichiometry: plateaus of graphite fall by some hundredths of a volt, formulas of them by less."""
 LOG_SLOPE_SD = 0.7

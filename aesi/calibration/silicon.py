@@ -18,6 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from aesi.calibration.shapes import GRID
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Electrode
 from aesi.physics.cell.relations import LookupTable
@@ -26,8 +27,6 @@ SILICON_V = 0.22
 """Against Li/Li+: graphite gives up its plateaus below it. A convention: the foot of the edge above."""
 SILICON_SD = 0.3
 """Of the logarithm of the share that is left. A convention, of the size of what is seen above: 0.81 and 0.63 of it."""
-GRID = 2049
-"""Stoichiometries of the potential that is laid down anew."""
 
 
 def silicon_edge(electrode: Electrode) -> float:

@@ -104,10 +104,14 @@ class RefittedIntervals:
         return Intervals(low, high, ready)
 
     def _forest(self, seen: Array, start: int) -> _Forest:
-        """Grown on the last residuals before a step, across the calibration where the record is still short."""
-        known = np.concatenate([self.before_v, seen[np.isfinite(seen)]])[-MEMORY * self.window :]
-        windows = sliding_window_view(known, self.window)
-        return _Forest.grown(windows[:-1], known[self.window :], self.alpha, self.seed + start)
+        """Grown on the last residuals before a step that have a window without a gap before them.
+
+        Where the record is still short, the calibration goes before it as if the record went on from there.
+        """
+        known = np.concatenate([self.before_v, seen])
+        windows = sliding_window_view(known, self.window + 1)
+        whole = windows[np.isfinite(windows).all(axis=1)][-(MEMORY - 1) * self.window :]
+        return _Forest.grown(whole[:, :-1], whole[:, -1], self.alpha, self.seed + start)
 
 
 @dataclass(frozen=True, eq=False)

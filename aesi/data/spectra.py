@@ -36,6 +36,27 @@ def read_spectra(path: str | Path) -> tuple[Spectrum, ...]:
     Raises DataError naming file and column.
     """
     table = open_table(path)
+    columns = _columns(table)
+    if not (columns["frequency_hz"] > 0.0).all():
+        raise DataError(f"{table.path.name}, column frequency_hz: a frequency has to be positive.")
+    _check_temperature(columns, table)
+    _check_capacitive(columns, table)
+    told_apart: list[AnyArray] = [columns[name] for name in STATES if name in columns]
+    named = LABEL in table.header
+    if named:
+        told_apart += [np.array(words) for words in table.read_text((table.header.index(LABEL),))]
+    pieces = _pieces(told_apart)
+    if not named:
+        _check_swept_once(columns["frequency_hz"], pieces, table)
+    name = record_name(table.path)
+    return tuple(_spectrum(f"{name} {k}", columns, rows) for k, rows in enumerate(pieces, start=1))
+
+
+def _columns(table: TableFile) -> dict[str, Array]:
+    """NEEDED in the units of their names, and what there is of DESCRIBED, (rows,) each.
+
+    Raises DataError for a column that is missing or there twice, for no row, and for what is no number.
+    """
     file, header = table.path.name, list(table.header)
     found = find_impedance(table)
     missing = [name for name in NEEDED if name not in found]
@@ -59,18 +80,7 @@ def read_spectra(path: str | Path) -> tuple[Spectrum, ...]:
         if not np.isfinite(values).all():
             row = int(np.flatnonzero(~np.isfinite(values))[0])
             raise DataError(f"{file}, {table.where(row)}, column {name}: not a number.")
-    if not (columns["frequency_hz"] > 0.0).all():
-        raise DataError(f"{file}, column frequency_hz: a frequency has to be positive.")
-    _check_temperature(columns, table)
-    _check_capacitive(columns, table)
-    told_apart: list[AnyArray] = [columns[name] for name in STATES if name in columns]
-    if LABEL in header:
-        told_apart += [np.array(words) for words in table.read_text((header.index(LABEL),))]
-    pieces = _pieces(told_apart)
-    if LABEL not in header:
-        _check_swept_once(columns["frequency_hz"], pieces, table)
-    name = record_name(table.path)
-    return tuple(_spectrum(f"{name} {k}", columns, rows) for k, rows in enumerate(pieces, start=1))
+    return columns
 
 
 def _check_temperature(columns: dict[str, Array], table: TableFile) -> None:

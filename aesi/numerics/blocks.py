@@ -1,4 +1,5 @@
-"""Moving blocks over several records: which rows a resample holds, and how often.
+"""Blocks of neighbouring rows: moving ones over several records, which rows a resample holds and how often; pieces that
+are left out in turn.
 
 Rows of all records are numbered through; a block never runs over the end of its record. The number of
 blocks is the number of rows over the block length, rounded up, and the last block is cut so that a resample
@@ -65,6 +66,12 @@ def pieces(spans: Sequence[Span], length: int) -> list[Span]:
         edges = np.linspace(a, b, count + 1).round().astype(int)
         cut += [(int(p), int(q)) for p, q in pairwise(edges)]
     return cut
+
+
+def dealt_folds(n: int, blocks: int, folds: int) -> IntArray:
+    """(n,) fold of each row: contiguous blocks, as long as one another, dealt out in turn, so that each fold spans the
+    record."""
+    return np.arange(n) * blocks // max(n, 1) % folds
 
 
 def leave_out_weights(cut: Sequence[Span], n: int) -> CountArray:

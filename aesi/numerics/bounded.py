@@ -25,10 +25,10 @@ class Residual(Protocol):
     """What is minimised: half the sum of its squares."""
 
     def residual(self, x: Array) -> Array | None:
-        """(m,) at x (n,), or None where the model fails."""
+        """(m,) at x (n,), or None where the model fails; a value that is not finite counts as none."""
 
     def slopes(self, x: Array, residual: Array) -> Array | None:
-        """(m, n) derivatives at x (n,), where the residual is (m,), or None where the model fails."""
+        """(m, n) derivatives at x (n,), where the residual is (m,), or None where the model fails; as above."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,23 +73,24 @@ def descend(
     """Minimise half a sum of squares within low <= x <= high.
 
     rounds : slopes are taken so many times at most.  tolerance : stops where the steps from them gain less than this.
+    Where the model fails at x0, the cost is infinite.
     slopes : (m, n) as they are near x0, to begin with; nothing is concluded from them.
     """
     x = np.clip(x0, low, high)
     residual = model.residual(x)
-    if residual is None:
+    if residual is None or not np.isfinite(residual).all():
         return Minimum(x, np.inf, 0, False, x)
     damping = 1e-3
     if slopes is not None:
         near = _Place(x, residual, slopes)
-        here, damping = _followed(model, near, low, high, tolerance, damping, fresh=False)
+        here, damping = _broyden_steps(model, near, low, high, tolerance, damping, fresh=False)
         x, residual = here.x, here.residual
     for done in range(rounds):
         taken = model.slopes(x, residual)
-        if taken is None:
+        if taken is None or not np.isfinite(taken).all():
             return Minimum(x, _half_square(residual), done, False, x)
         start = _Place(x, residual, taken)
-        here, damping = _followed(model, start, low, high, tolerance, damping, fresh=True)
+        here, damping = _broyden_steps(model, start, low, high, tolerance, damping, fresh=True)
         x, residual = here.x, here.residual
         if start.cost - here.cost < tolerance:
             return Minimum(x, here.cost, done + 1, True, start.x)
@@ -103,7 +104,7 @@ def foreseen_cost(x: Array, residual: Array, slopes: Array, low: Array, high: Ar
     return _half_square(residual + slopes @ step)
 
 
-def _followed(
+def _broyden_steps(
     model: Residual, here: _Place, low: Array, high: Array, tolerance: float, damping: float, fresh: bool
 ) -> tuple[_Place, float]:
     """Steps from one place, with its slopes and then with updates of them, while each gains; and the damping.
@@ -111,7 +112,7 @@ def _followed(
     fresh : the slopes were taken here.
     """
     for _ in range(1 + len(here.x)):
-        there, damping = _stepped(model, here, low, high, tolerance, damping, fresh)
+        there, damping = _accepted_step(model, here, low, high, tolerance, damping, fresh)
         if there is None:
             return here, damping
         gain, here, fresh = here.cost - there.cost, there, False
@@ -120,7 +121,7 @@ def _followed(
     return here, damping
 
 
-def _stepped(
+def _accepted_step(
     model: Residual, here: _Place, low: Array, high: Array, tolerance: float, damping: float, fresh: bool
 ) -> tuple[_Place | None, float]:
     """One step that gains, with slopes brought up to date, or None; and the damping for the next one.

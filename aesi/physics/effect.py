@@ -88,8 +88,8 @@ class Effect:
     in the cell.
     of_design : True for what a cell is made with and keeps (potentials, geometry, transport, kinetics); a file that was
     fitted to this very cell has it right, as far as the model goes.
-    of_every_record : True for physics by constants of the cell, and for its age: what no record is without where
-    another one of those days has it.
+    of_every_record : True for physics by constants of the cell: what no record is without where another one has it.
+    of_age : True for what a cell loses or gains as it ages: all records of the same days have it.
     ohmic : True for a drop that follows the current at once, as the declared resistance of contacts does: beside such
     an effect nothing else says that the file is off in it.
     experiment : which one shows it.  told_apart : id of another effect -> which one tells the two apart.
@@ -108,6 +108,7 @@ class Effect:
     refines: Refinement | None = None
     of_design: bool = False
     of_every_record: bool = False
+    of_age: bool = False
     ohmic: bool = False
     experiment: str = ""
     told_apart: Mapping[str, str] = field(default_factory=dict)

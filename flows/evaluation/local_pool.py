@@ -30,12 +30,18 @@ WATCH_S = 1.0
 
 @dataclass
 class _Process:
+    """tag : of the candidate in work, None where there is none.  built : has it said that it has?
+    deadline_s : of the candidate in work, on the monotonic clock; None while it builds."""
+
     process: Any
     pipe: Connection
     tag: Any = None
     built: bool = False
-    busy: bool = False
-    deadline_s: float | None = None  # of the candidate in work, on the monotonic clock; none while it builds
+    deadline_s: float | None = None
+
+    @property
+    def busy(self) -> bool:
+        return self.tag is not None
 
 
 class LocalPool:
@@ -65,7 +71,7 @@ class LocalPool:
         return len(self._processes) - self.idle
 
     def start(self, tag: Any, genome: Any) -> None:
-        """Evaluate the genome in an idle process; its outcome will carry the tag."""
+        """Evaluate the genome in an idle process; its outcome will carry the tag, anything but None."""
         for i, one in enumerate(self._processes):
             if one.busy:
                 continue
@@ -74,7 +80,7 @@ class LocalPool:
             except OSError:  # it died while idle
                 one = self._processes[i] = self._replace(one)
                 one.pipe.send(genome)
-            one.tag, one.busy = tag, True
+            one.tag = tag
             if one.built:
                 one.deadline_s = time.monotonic() + self._timeout_s
             return
@@ -115,7 +121,7 @@ class LocalPool:
         if not one.built:
             one.built, one.deadline_s = True, time.monotonic() + self._timeout_s
             return []
-        one.tag, one.busy, one.deadline_s = None, False, None
+        one.tag, one.deadline_s = None, None
         return [(tag, said)]
 
     def _replace(self, one: _Process) -> _Process:

@@ -33,8 +33,12 @@ class Thinned:
     hold: Hold
 
 
-def thinned(data: Measurement, capacity_ah: float, window_s: float = WINDOW_S) -> Thinned:
-    """The rows that a fit sees.  capacity_ah : what a step of the current is measured by."""
+def thinned(data: Measurement, capacity_ah: float, window_s: float) -> Thinned:
+    """The rows that a fit sees.
+
+    capacity_ah : what a step of the current is measured by.  window_s : rows of a record that is not steady are
+    averaged over it; `WINDOW_S` where the record is not too long.
+    """
     longest_s = float(data.time_s[-1] - data.time_s[0]) / STEADY_ROWS
     steady = condensed(data, capacity_ah, longest_s, SPACING)
     if steady is None:

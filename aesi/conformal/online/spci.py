@@ -22,6 +22,7 @@ from aesi.conformal.online.method import CalibrationData, Method
 from aesi.conformal.online.scale import Scale
 from aesi.conformal.regressors.model import FitTask, RegressorFit
 from aesi.errors import FitError
+from aesi.numerics.blocks import dealt_folds
 from aesi.numerics.typing import Array, BoolArray
 
 N_BLOCKS = 25
@@ -45,6 +46,9 @@ class SPCI(Method):
     rows_a_column: int = 10
 
     def band(self, data: CalibrationData) -> tuple[Band, Scale]:
+        """With fewer than ENOUGH_ROWS rows cross-conformal: all folds are scored, each by a regression that did not see
+        it, and one on all rows is served. From there split conformal: one fold is held out and scored, and the
+        regression that did not see it is served."""
         currents = data.currents if self.use_current else None
         history = History(data.window, self.view, currents is not None)
         rows, targets, current = stacked(data.records, currents, history)
@@ -52,14 +56,11 @@ class SPCI(Method):
         levels = level_pairs(data.alpha, self.n_betas)
         task = FitTask(rows, targets, levels, history.n_history, data.floor_v, data.rng)
         held_out = folds(len(rows))
-        scores = np.full(len(rows), np.nan)
-        for held in held_out:
-            fitted = RegressionBand(history, self.fitter(task.only(~held)))
-            scores[held] = half_width_scores(fitted, task.only(held))
-        if len(held_out) > 1:
-            fitted = RegressionBand(history, self.fitter(task))
+        of_folds = [RegressionBand(history, self.fitter(task.only(~held))) for held in held_out]
+        served = of_folds[0] if len(of_folds) == 1 else RegressionBand(history, self.fitter(task))
+        scores = cross_scores(of_folds, held_out, task)
         known = np.isfinite(scores)
-        return fitted, Scale.fit(scores[known], data.alpha, None if current is None else current[known])
+        return served, Scale.fit(scores[known], data.alpha, None if current is None else current[known])
 
     def _check_enough(self, rows: Array, history: History) -> None:
         n, p = rows.shape
@@ -74,24 +75,29 @@ class SPCI(Method):
 def stacked(
     records: list[Array], currents: list[Array] | None, history: History
 ) -> tuple[Array, Array, Array | None]:
-    """Feature rows (n, p), targets (n,) V and currents (n,) A of all records, where history and residual exist;
-    no row spans two records."""
-    rows, targets, at = [np.empty((0, history.n_history))], [], []
+    """Feature rows (n, p), targets (n,) V and currents (n,) A of all records, at least one, where history and residual
+    exist; no row spans two records."""
+    rows, targets, at = [], [], []
     for i, record in enumerate(records):
         current = None if currents is None else currents[i]
         features, ready = history.rows(record, current)
         use = ready & np.isfinite(record)
-        if i == 0:
-            rows = []
         rows.append(features[use])
         targets.append(record[use])
         if current is not None:
             at.append(current[use])
-    return (
-        np.concatenate(rows),
-        np.concatenate([*targets, np.empty(0)]),
-        None if currents is None else np.concatenate([*at, np.empty(0)]),
-    )
+    return np.concatenate(rows), np.concatenate(targets), None if currents is None else np.concatenate(at)
+
+
+def cross_scores(of_folds: list[RegressionBand], held_out: list[BoolArray], task: FitTask) -> Array:
+    """(n,) `half_width_scores` of each row by the band that did not see it, NaN of a row that all have seen.
+
+    held_out : (n,) of each band, the rows that it did not see; no row twice.
+    """
+    scores = np.full(len(task.targets), np.nan)
+    for band, held in zip(of_folds, held_out, strict=True):
+        scores[held] = half_width_scores(band, task.only(held))
+    return scores
 
 
 def half_width_scores(band: RegressionBand, task: FitTask) -> Array:
@@ -104,7 +110,7 @@ def half_width_scores(band: RegressionBand, task: FitTask) -> Array:
 def folds(n: int) -> list[BoolArray]:
     """Rows to hold out in turn, (n,) each: of N_BLOCKS contiguous runs, every fifth. One fold where that
     holds enough rows; all five, together every row once, where calibration data are short."""
-    fold = np.arange(n) * N_BLOCKS // max(n, 1) % N_FOLDS
+    fold = dealt_folds(n, N_BLOCKS, N_FOLDS)
     if n >= ENOUGH_ROWS:
         return [fold == N_FOLDS // 2]
     return [fold == i for i in range(N_FOLDS)]

@@ -83,22 +83,40 @@ def _orient(table: TableFile, data: Columns, mapped: Mapped, reading: Reading, n
             f"{table.path.name}: --state-word says what words of a column mean, and no column is known to say which "
             f'way the current flows; name it: --state "NAME". There are: {", ".join(map(repr, table.header))}.'
         )
-    current = data["current_a"]
-    asked = "state" in reading.columns
-    signed = np.nanmin(current, initial=0.0) < -ZERO_SHARE * np.nanmax(np.abs(current), initial=0.0)
-    if "state" in mapped.position and (asked or not signed):
-        (words,) = table.read_text((mapped.position["state"],))
-        way, note = signs(words, current, reading.state_words, table.path.name, mapped.header["state"])
-        if asked or np.any(way != 0):
-            data["current_a"], changes = turned(current, way, data["time_s"], bool(signed))
-            notes += [note, *changes]
-            return
-    elif not signed:
-        _check_words(table, current, mapped, reading)
+    if _turned_by_words(table, data, mapped, reading, notes):
+        return
     if reading.state_words:
         notes.append(
             "Words of a state were declared, and the sign of the current comes from itself; name their column: --state."
         )
+    _turn_by_declaration(data, mapped, reading, notes)
+
+
+def _turned_by_words(
+    table: TableFile, data: Columns, mapped: Mapped, reading: Reading, notes: list[str]
+) -> bool:
+    """Has a column of words, such as `charge`, told which way the current flows? It does where it was asked for, or
+    where the current has no sign of its own."""
+    current = data["current_a"]
+    asked = "state" in reading.columns
+    signed = np.nanmin(current, initial=0.0) < -ZERO_SHARE * np.nanmax(np.abs(current), initial=0.0)
+    if "state" not in mapped.position:
+        if not signed:
+            _check_words(table, current, mapped, reading)
+        return False
+    if signed and not asked:
+        return False
+    (words,) = table.read_text((mapped.position["state"],))
+    way, note = signs(words, current, reading.state_words, table.path.name, mapped.header["state"])
+    if not asked and not np.any(way != 0):
+        return False
+    data["current_a"], changes = turned(current, way, data["time_s"], bool(signed))
+    notes += [note, *changes]
+    return True
+
+
+def _turn_by_declaration(data: Columns, mapped: Mapped, reading: Reading, notes: list[str]) -> None:
+    """By what the user declares of the current's sign, or else by what the format or its maker writes."""
     if mapped.bdf_current and reading.sign == "discharge-positive":
         notes.append("The current was declared positive on discharge, which BDF's is not; its sign was left.")
         return
@@ -110,7 +128,7 @@ def _orient(table: TableFile, data: Columns, mapped: Mapped, reading: Reading, n
         notes.append("The current was declared positive on charge; its sign was turned.")
     else:
         notes.append(f"{mapped.maker} writes the current positive on charge; its sign was turned.")
-    data["current_a"] = 0.0 - current  # no negative zeros
+    data["current_a"] = 0.0 - data["current_a"]  # no negative zeros
 
 
 def _check_words(table: TableFile, current: Array, mapped: Mapped, reading: Reading) -> None:

@@ -69,6 +69,11 @@ def decoded(head: bytes, name: str) -> tuple[str, str]:
 
 
 def layout_of(text: str, encoding: str, *, whole: bool, name: str, wanted: Collection[str]) -> Layout:
+    """How a text is laid out as a table, and sentences on what that took for granted.
+
+    text : the beginning of a file, or all of it (`whole`); else its last line may be cut off.  encoding : that it was
+    read in.  name : of the file.  wanted : names of columns that the user gave, which a header holds.
+    """
     lines = io.StringIO(text, newline=None).read().split("\n")
     if lines[-1] == "":
         del lines[-1]  # what follows the end of the last line is none

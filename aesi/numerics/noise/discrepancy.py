@@ -23,55 +23,62 @@ CORRELATION_LENGTHS_S = (2.0, 60.0, 1800.0)
 
 @kept_njit(nogil=True)
 def _filter(columns, time_s, opens, amplitude, white, tau_s):  # type: ignore[no-untyped-def]
+    """The Kalman filter of (1) row by row; opens : (n,) True where a block begins.  tau_s : (processes,).  Else and
+    what comes back as in `whiten`.
+
+    state : (processes, m) means of the x_j by the rows so far, of each column.  covariance : (processes, processes) of
+    the x_j about them.  kept : (processes,) what is kept of each x_j from a row to the next.
+    gain : (processes,) covariance of each x_j with the row's y.
+    """
     n, m = columns.shape
-    k = len(tau_s)
+    processes = len(tau_s)
     out = np.empty((n, m))
     log_det = np.empty(n)
-    state = np.zeros((k, m))
-    p = np.zeros((k, k))
-    phi = np.empty(k)
-    gain = np.empty(k)
-    share = 1.0 / k
-    last = -1.0
+    state = np.zeros((processes, m))
+    covariance = np.zeros((processes, processes))
+    kept = np.empty(processes)
+    gain = np.empty(processes)
+    share = 1.0 / processes
+    last_gap = -1.0
     for i in range(n):
         if opens[i]:
             state[:] = 0.0
-            p[:] = 0.0
-            for a in range(k):
-                p[a, a] = share
+            covariance[:] = 0.0
+            for a in range(processes):
+                covariance[a, a] = share
         else:
             gap = time_s[i] - time_s[i - 1]
-            if gap != last:
-                last = gap
-                for a in range(k):
-                    phi[a] = np.exp(-gap / tau_s[a])
-            for a in range(k):
-                for b in range(k):
-                    p[a, b] *= phi[a] * phi[b]
-                p[a, a] += share * (1.0 - phi[a] * phi[a])
+            if gap != last_gap:
+                last_gap = gap
+                for a in range(processes):
+                    kept[a] = np.exp(-gap / tau_s[a])
+            for a in range(processes):
+                for b in range(processes):
+                    covariance[a, b] *= kept[a] * kept[b]
+                covariance[a, a] += share * (1.0 - kept[a] * kept[a])
                 for j in range(m):
-                    state[a, j] *= phi[a]
+                    state[a, j] *= kept[a]
         scale = amplitude[i]
         variance = white[i] * white[i]
-        for a in range(k):
+        for a in range(processes):
             total = 0.0
-            for b in range(k):
-                total += p[a, b]
+            for b in range(processes):
+                total += covariance[a, b]
             gain[a] = total * scale
             variance += gain[a] * scale
         root = 1.0 / np.sqrt(variance)
         for j in range(m):
             predicted = 0.0
-            for a in range(k):
+            for a in range(processes):
                 predicted += state[a, j]
             innovation = columns[i, j] - scale * predicted
             out[i, j] = innovation * root
             step = innovation / variance
-            for a in range(k):
+            for a in range(processes):
                 state[a, j] += gain[a] * step
-        for a in range(k):
-            for b in range(k):
-                p[a, b] -= gain[a] * gain[b] / variance
+        for a in range(processes):
+            for b in range(processes):
+                covariance[a, b] -= gain[a] * gain[b] / variance
         log_det[i] = np.log(variance)
     return out, log_det
 

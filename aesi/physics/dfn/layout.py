@@ -95,10 +95,12 @@ class Electrodes(NamedTuple):
 class DfnState(NamedTuple):
     """What a step changes.
 
-    z : (units, modes).  mean : (units,).  y : (units,) A/m2.  trend : (units,) A/(m2 s), how y leaves its share of
-    the current.  theta : (units,) surfaces.  force : (units, modes + 1).  q, forcing : (salt modes,).  c : (nodes,)
-    mol/m3.  given : (places,) A/m2.  psi : (places,) V.  salt : (places,) over rest.  layer : (places,) A/m2 into
-    double layers.  plated : (places,) mol/m3.
+    z : (units, modes) stoichiometry.  mean, theta : (units,) the same, of the whole particle and of its surface.
+    y : (units,) A/m2, what the particles give.  trend : (units,) A/(m2 s), how y leaves its share of the current.
+    force : (units, modes + 1) stoichiometry, of the variable part of diffusion, see `solid_forcing`.
+    q, forcing : (salt modes,) mol/m3, of the salt, the latter as `force`.  c : (nodes,) mol/m3.
+    given : (places,) A/m2, of particles, double layers and plating.  psi : (places,) V, see `reaction_kernels`.
+    salt : (places,) over rest.  layer : (places,) A/m2 into double layers.  plated : (places,) mol/m3.
     """
 
     z: Array
@@ -118,14 +120,18 @@ class DfnState(NamedTuple):
 
 
 class DfnTrial(NamedTuple):
-    """Scratch of a step. `calm_...` is its end without what the reaction there does; `..._start` is its start.
+    """Scratch of a step. `calm_...` is its end without what the reaction there does; `..._start` and `..._back` are its
+    start. What `DfnState` names as well has the units that it has there.
 
-    reach, give : (units,) surface = reach - give y.  force (units, modes + 1), forcing (salt modes,) : at the end.
-    q, c, kappa : at the end.  salt_before : (places,) over rest, a step ago.  forcing_before : the same.
+    calm_z, calm_mean, calm_q, calm_salt, y_start, given_start, psi_start, force, forcing, q, c, salt : as there;
+    y_start with what double layers lag by.
+    reach, give : (units,) stoichiometry, and that per A/m2: surface = reach - give y.
+    force_end, z_end : (modes + 1,) and (modes,) of one unit, in a pass before and at the end.
+    nodes : (points of a particle,) stoichiometry.  kappa : (places,) S/m.  salt_before, forcing_before : a step ago.
     ohm : (places, points of an electrode) ohm m2.
     layer_c A/(V m2), layer_old A/m2, skew, lag A/m2 : (places,) double layers.
     metal_before mol/m3, metal_filled mol/m3 per A/m2 : (places,) plated lithium, see `interface_kernels.stripped`.
-    y_back, psi_start : (units,), (places,) as they were before the step.
+    y_back : (units,) A/m2, without what double layers lag by.
     total, before, change : (2,) A/m2, currents of both electrodes at the end of a step, at its start, and what is
     between.  faster : (3,) factors of diffusion, negative, positive, salt.
     no_spread : zeros, for an instant.  rates : (8,) Arrhenius factors, by `Electrodes.energies`.

@@ -48,6 +48,6 @@ EFFECT = Effect(
     __doc__,
     PARAMETERS,
     on_model=lose_material,
-    of_every_record=True,
+    of_age=True,
     experiment="a full C/20 discharge between the voltage limits and the coulombs that go back in, read as dV/dQ",
 )

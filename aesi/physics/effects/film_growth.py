@@ -53,6 +53,6 @@ EFFECT = Effect(
     __doc__,
     PARAMETERS,
     on_voltage=film_drop,
-    of_every_record=True,
+    of_age=True,
     experiment="the same pulse before and after some hundred hours or cycles",
 )

@@ -40,6 +40,6 @@ EFFECT = Effect(
     __doc__,
     PARAMETERS,
     on_model=lose_lithium,
-    of_every_record=True,
+    of_age=True,
     experiment="a full C/20 discharge between the voltage limits and the coulombs that go back in",
 )

@@ -77,27 +77,37 @@ def read_plan(source: Path, cell: Path | None = None, soh: Soh | None = None) ->
     if cell is not None and not cell.exists():
         raise InputError(f"There is no cell file {cell}, which is to be that of every job that names none.")
     jobs = _of_folder(source, cell) if source.is_dir() else _of_table(source, cell)
-    names = [job.name for job in jobs]
-    twice = next((name for name in names if names.count(name) > 1), None)
-    if twice is not None:
-        raise InputError(f"{source}: two rows are named {twice!r}; names tell the folders of results apart.")
-    visits = [(job.specimen, job.at) for job in jobs if job.specimen]
-    again = next((visit for visit in visits if visits.count(visit) > 1), None)
-    if again is not None:
-        raise InputError(
-            f"{source}: two check-ups of {again[0]!r} are at {again[1]:g}; several files of one are separated by ;"
-        )
+    _check_names(source, [job.name for job in jobs])
+    _check_one_visit(source, jobs)
     _check_one_cell(source, jobs)
-    outside = next((name for name in names if Path(name).name != name or name.startswith(".")), None)
-    if outside is not None:
-        raise InputError(
-            f"{source}: {outside!r} names a folder of results; give a name without slashes that starts with no dot."
-        )
     if not jobs:
         raise InputError(f"{source} holds no cell: one subfolder each with its records, or a table of them.")
     if all(job.unusable for job in jobs):
         raise InputError(f"none of the {len(jobs)} cells can be used; the first: {jobs[0].unusable}")
     return tuple(job if job.soh is not None else replace(job, soh=soh) for job in jobs)
+
+
+def _check_names(source: Path, names: list[str]) -> None:
+    """Raises InputError for a name that is there twice, and for one that is no name of a folder."""
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(
+                f"{source}: two rows are named {name!r}; names tell the folders of results apart."
+            )
+        if Path(name).name != name or name.startswith("."):
+            raise InputError(
+                f"{source}: {name!r} names a folder of results; give a name without slashes that starts with no dot."
+            )
+
+
+def _check_one_visit(source: Path, jobs: tuple[Job, ...]) -> None:
+    """Raises InputError for two check-ups of one specimen at one time."""
+    visits = [(job.specimen, job.at) for job in jobs if job.specimen]
+    for specimen, at in visits:
+        if visits.count((specimen, at)) > 1:
+            raise InputError(
+                f"{source}: two check-ups of {specimen!r} are at {at:g}; several files of one are separated by ;"
+            )
 
 
 def _check_one_cell(source: Path, jobs: tuple[Job, ...]) -> None:

@@ -52,14 +52,15 @@ class Windows:
         return cls(of_row, lasts_s)
 
     @cached_property
-    def of_window(self) -> Array:
-        """(n,) share of its window that each row stands for."""
+    def row_weight(self) -> Array:
+        """(n,) weight of each row in the mean of its window: the share of the window that it lasts."""
         return np.asarray(self.lasts_s / np.bincount(self.of_row, self.lasts_s)[self.of_row], dtype=float)
 
     @cached_property
-    def fast_share(self) -> Array:
-        """(n,) of each row, what is left of its freedom once the mean of its window is known: none of a lone row."""
-        return 1.0 - self.of_window
+    def fast_dof(self) -> Array:
+        """(n,) degrees of freedom of each row's deviation from the mean of its window: one less its weight, none of a
+        lone row."""
+        return 1.0 - self.row_weight
 
     @cached_property
     def _opens(self) -> IntArray:
@@ -68,7 +69,7 @@ class Windows:
 
     def means(self, columns: Array) -> Array:
         """Of each column (n, m) over the window of each row."""
-        weighted = columns * self.of_window[:, None]
+        weighted = columns * self.row_weight[:, None]
         return np.asarray(np.add.reduceat(weighted, self._opens, axis=0)[self.of_row])
 
 
@@ -104,7 +105,17 @@ class Blocks:
 
 
 def blocks_of(problem: InverseProblem) -> Blocks:
-    """Contiguous blocks by rows, shared among the records, and the folds: blocks, records, rates, charges."""
+    """Contiguous blocks by rows, shared among the records, and the folds of them, see `Blocks`."""
+    starts, record = _cut(problem)
+    windows = None
+    if problem.two_scales:
+        windows = Windows.within(starts, problem.time_s, problem.lasts_s, WINDOW_S)
+    return Blocks(starts, record, _folds(problem, _slices(starts), record), problem.compared, windows)
+
+
+def _cut(problem: InverseProblem) -> tuple[IntArray, IntArray]:
+    """`Blocks.starts` and `Blocks.record`: as many blocks of each record as its share of the rows, but no fewer than
+    `FEWEST`, and of a measured cell no more than it has independent samples."""
     total = len(problem.measured)
     starts: list[int] = []
     record: list[int] = []
@@ -113,28 +124,30 @@ def blocks_of(problem: InverseProblem) -> Blocks:
         pieces = max(FEWEST, round(BLOCKS * length / total))
         if problem.coarse:
             pieces = min(pieces, max(FEWEST_MEASURED, int(problem.independent[rows].sum())))
-        edges = np.linspace(rows.start, rows.stop, pieces + 1).astype(int)[:-1]
-        starts += edges.tolist()
+        starts += np.linspace(rows.start, rows.stop, pieces + 1).astype(int)[:-1].tolist()
         record += [i] * pieces
-    bounds = np.array([*starts, total])
-    rows_of = _slices(bounds)
+    return np.array([*starts, total]), np.array(record)
+
+
+def _folds(
+    problem: InverseProblem, rows_of: Sequence[slice], record: IntArray
+) -> dict[str, tuple[tuple[int, ...], ...]]:
+    """`Blocks.folds`.  rows_of : of each block.  record : (b,)."""
+    every = range(len(record))
     current = np.concatenate([m.current_a for m in problem.seen])
-    rate = np.array([rms(current[r]) for r in rows_of])
-    charge = np.array([np.mean(problem.declared_soc[r]) for r in rows_of])
-    folds: dict[str, tuple[tuple[int, ...], ...]] = {"block": tuple((b,) for b in range(len(record)))}
+    rate = np.array([rms(current[rows]) for rows in rows_of])
+    charge = np.array([np.mean(problem.declared_soc[rows]) for rows in rows_of])
+    folds: dict[str, tuple[tuple[int, ...], ...]] = {"block": tuple((b,) for b in every)}
     if len(problem.records) > 1:
         folds["record"] = tuple(
-            tuple(b for b, i in enumerate(record) if i == k) for k in range(len(problem.records))
+            tuple(b for b in every if record[b] == k) for k in range(len(problem.records))
         )
-    for name, of_block in (("rate", rate), ("charge", charge)):
-        ranges = _ranges(of_block)
-        if name == "charge" or _differ([rate[list(r)] for r in ranges]):
-            folds[name] = ranges
-    folds["end"] = (tuple(b for b in range(len(record)) if b >= round(SEEN_SHARE * len(record))),)
-    windows = None
-    if problem.two_scales:
-        windows = Windows.within(bounds, problem.time_s, problem.lasts_s, WINDOW_S)
-    return Blocks(bounds, np.array(record), folds, problem.compared, windows)
+    by_rate = _ranges(rate)
+    if _differ([rate[list(blocks)] for blocks in by_rate]):
+        folds["rate"] = by_rate
+    folds["charge"] = _ranges(charge)
+    folds["end"] = (tuple(b for b in every if b >= round(SEEN_SHARE * len(record))),)
+    return folds
 
 
 def _slices(bounds: IntArray) -> list[slice]:

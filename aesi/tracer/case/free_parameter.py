@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aesi.numerics.typing import Array
+from aesi.numerics.typing import Array, BoolArray
 from aesi.parameters import Parameter
 from aesi.physics.effect import Effect
 
@@ -98,8 +98,8 @@ class FreeParameter:
 
     def ends(self, x: float) -> tuple[bool, bool]:
         """Is x at its lower bound, and at its upper one?"""
-        low, high = self.bounds
-        return x - low < TINY, high - x < TINY
+        lowest, highest = at_ends(x, *self.bounds)
+        return bool(lowest), bool(highest)
 
     def told(self, value: float) -> float:
         """A value as it is written down: the bound itself where it counts as on it, without what round-off leaves."""
@@ -114,6 +114,11 @@ class FreeParameter:
         (low, high), (lowest, highest) = self.bounds, self.ends(x)
         below = lowest and abs(low) > TINY and not self.low_is_limit
         return below or (highest and abs(high) > TINY)
+
+
+def at_ends(x: Array | float, low: Array | float, high: Array | float) -> tuple[BoolArray, BoolArray]:
+    """Are coordinates at the lower ends of their ranges, and at the upper ones? Of the shape of x, as low and high."""
+    return np.asarray(x - low < TINY), np.asarray(high - x < TINY)
 
 
 def of_effect(effect: str, parameters: Mapping[str, Parameter], capacity_ah: float) -> list[FreeParameter]:

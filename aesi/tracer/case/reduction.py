@@ -56,7 +56,7 @@ class Reduction:
 
     @property
     def notable(self) -> bool:
-        """True where it is too much to be passed over."""
+        """True where it is too much to be passed over, or has no value (NaN)."""
         return not self.shift_v <= max(NOTABLE_SHARE * self.noise_v, LEAST_V)
 
     @property

@@ -2,11 +2,13 @@
 
 The model errs on all of them. The good records say how large its error is in this cell, and what of the instruments
 all of them share; effects act on the others alone. What is named is a difference between records, and what a right
-answer may leave is what the model leaves of the good ones. What the cell is made with, and its age, are alike in all.
+answer may leave is what the model leaves of the good ones. What the cell is made with is alike in all. Its age should
+be, and is asked about: a cell that has lost lithium since the good records reads like one whose current reads too low.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -20,10 +22,14 @@ from aesi.tracer.decide.evidence import MEASURED_EFFECTS, Answer, Evidence, with
 from aesi.tracer.decide.verdict import MOST_SDS, Thresholds, Verdict, best_gain, beyond, look_alikes
 from aesi.tracer.decide.written import limits_of
 from aesi.tracer.likelihood.fit import FittedHypothesis, held_out_residual
+from aesi.tracer.likelihood.growth import Explanation, Parent
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.search.archive import Archive
+from aesi.tracer.search.fitted import fitted_hypothesis
 from aesi.tracer.search.forward import searched
+from aesi.tracer.search.grown import grown_with
 from aesi.tracer.search.path import Path, Report
+from aesi.tracer.search.plausible import alike
 from aesi.tracer.search.wrong_parameters import NINETY
 
 
@@ -36,7 +42,8 @@ def gathered_beside(
     """
     beside = replace(problem, trust="beside")
     path = searched(beside, min(max_effects, MEASURED_EFFECTS), archive, report)
-    return Answer(path, judged_beside(path, thresholds), {"beside": path}, partial(_settled, path))
+    verdict = of_one_age(judged_beside(path, thresholds), path.chosen, _of_another_age(path, archive))
+    return Answer(path, verdict, {"beside": path}, partial(_settled, path))
 
 
 def _settled(path: Path, verdict: Verdict) -> Evidence:
@@ -48,6 +55,43 @@ def _settled(path: Path, verdict: Verdict) -> Evidence:
         return Evidence(path, {"beside": path}, recalibrated, ModelState(beside), verdict, fault)
     limits = limits_of(after) if verdict.effects else ()
     return Evidence(path, {"beside": path}, recalibrated, after, verdict, None, limits)
+
+
+def _of_another_age(path: Path, archive: Archive) -> list[FittedHypothesis]:
+    """What the records would be left with if instead of what is named the cell had aged beside the good ones."""
+    if not path.chosen.hypothesis:
+        return []
+    names = [name for name, effect in path.problem.effects.items() if effect.of_age]
+    grown = grown_with(Parent(path.problem, path.blocks, path.base), names, archive)
+    fits = (fitted_hypothesis(path.problem, path.blocks, one.hypothesis, one, archive) for one in grown)
+    return [fit for fit in fits if fit is not None]
+
+
+def of_one_age(verdict: Verdict, named: Explanation, aged: Sequence[Explanation]) -> Verdict:
+    """The verdict, with what an age of its own would say as well of the records among the look-alikes; no name where
+    it says more.
+
+    named : what the verdict names.  aged : what an age would say instead.
+    """
+    if not verdict.effects:
+        return verdict
+    better = [one for one in aged if not alike(one, named)]
+    if better:
+        most = max(better, key=lambda one: one.score.total)
+        reason = (
+            f"{most.hypothesis[0]} says {most.score.total - named.score.total:.1f} nats more of unseen data than "
+            f"{verdict.effects[0]} does, and records of one age do not differ by it: the good records seem to be of "
+            "another age; leave out --good to ask what the cell has lost since its file"
+        )
+        return replace(verdict, word="unknown", effects=(), confidence_sets=(), reason=reason, margin=0.0)
+    as_well = tuple(one.hypothesis[0] for one in aged if alike(named, one))
+    if not as_well:
+        return verdict
+    (known,) = verdict.confidence_sets or (verdict.effects,)
+    reason = (
+        f"{verdict.reason}; {' or '.join(as_well)} would say as much if the good records are of another age"
+    )
+    return replace(verdict, confidence_sets=((*known, *as_well),), reason=reason)
 
 
 def judged_beside(path: Path, thresholds: Thresholds) -> Verdict:

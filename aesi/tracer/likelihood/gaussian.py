@@ -25,7 +25,7 @@ from scipy.optimize import lsq_linear
 
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.tracer.case.blocks import Blocks
-from aesi.tracer.case.free_parameter import FURTHEST_SDS, TINY
+from aesi.tracer.case.free_parameter import FURTHEST_SDS, TINY, at_ends
 from aesi.tracer.likelihood.model_error import LOG_2PI, Size
 
 
@@ -238,7 +238,8 @@ def held_at_bounds(posterior: Posterior, bounds: Array) -> tuple[Array, BoolArra
         return np.zeros(len(best)), np.zeros(len(best), dtype=bool)
     ends = np.maximum(high, low + TINY)
     inside = lsq_linear(root.T, root.T @ best, (low, ends), method="bvls").x
-    held = (inside <= low + TINY) | (inside >= ends - TINY)
+    lowest, highest = at_ends(inside, low, ends)
+    held = lowest | highest
     return np.where(held, inside, 0.0), held
 
 

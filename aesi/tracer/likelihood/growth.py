@@ -19,7 +19,9 @@ from aesi.numerics.typing import Array, IntArray
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.free_parameter import (
     FURTHEST_SDS,
+    TINY,
     FreeParameter,
+    at_ends,
     by_owner,
     starts,
     values_of,
@@ -58,11 +60,10 @@ class Parent:
     def movable(self) -> IntArray:
         """Numbers of the parameters that may move to first order: all but those on a hard bound, such as nought of a
         resistance, beyond which the linear form would go. A bound at FURTHEST_SDS is none: the prior holds there."""
-        x = self.fit.point.x
-        bounds = np.array([f.bounds for f in self.fit.free])
-        near = np.abs(x[:, None] - bounds) < 1e-9
-        hard = np.abs(bounds) < FURTHEST_SDS - 1e-6
-        return np.flatnonzero(~(near & hard).any(axis=1))
+        bounds = np.array([f.bounds for f in self.fit.free]).reshape(-1, 2)
+        reached = np.column_stack(at_ends(self.fit.point.x, bounds[:, 0], bounds[:, 1]))
+        hard = np.abs(bounds) < FURTHEST_SDS - TINY
+        return np.flatnonzero(~(reached & hard).any(axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,7 +272,8 @@ def promise(parent: Parent, slopes_v: Array) -> float:
 
 def _scored(growth: EffectGrowth, u: Array, e: Array, jacobian: Array) -> Grown:
     parent, fit = growth.parent, growth.parent.fit
-    inside = (u > growth.low + 1e-9) & (u < growth.high - 1e-9)  # a linear form cannot see a bound
+    lowest, highest = at_ends(u, growth.low, growth.high)
+    inside = ~(lowest | highest)  # a linear form cannot see a bound
     x = np.concatenate([fit.point.x[growth.rest], u[inside]])
     prior, out = PRIORS[growth.problem.trust], []
     bounds = np.vstack(

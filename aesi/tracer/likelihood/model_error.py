@@ -150,19 +150,27 @@ class SplitTable:
         return slow, self.table - slow
 
     def whitened(self, size: Size) -> tuple[Array, Array]:
-        """The columns (n, m), whitened at a size, and log|C| by rows (n,)."""
-        problem, windows = self.problem, self.blocks.windows
+        """The columns (n, m), whitened at a size, and log|C| by rows (n,).
+
+        By the noise and an error that wanders, block by block; or, of a measured cell, with rows that count as many
+        samples as are independent, over the size of the error alone.
+        """
+        problem = self.problem
         amplitude = amplitude_v(problem.steepness, size.delta_v, problem.trust)
-        if not problem.coarse:
-            return whiten(self.table, problem.time_s, self.blocks.starts[:-1], amplitude, problem.white_v)
-        share = problem.independent
+        if problem.coarse:
+            return self._coarsened(amplitude, size.fast_v)
+        return whiten(self.table, problem.time_s, self.blocks.starts[:-1], amplitude, problem.white_v)
+
+    def _coarsened(self, amplitude: Array, fast_v: float) -> tuple[Array, Array]:
+        """amplitude : (n,) V of what lasts.  fast_v : V of what is gone within seconds, where it is told apart."""
+        share, windows = self.problem.independent, self.blocks.windows
         log_det = share * (2.0 * np.log(amplitude) + LOG_2PI) - LOG_2PI  # of so many samples, not of a row
         if windows is None:
             return self.table * (np.sqrt(share) / amplitude)[:, None], log_det
         slow, rest = self._parts
-        over = slow / amplitude[:, None] + rest / size.fast_v
-        gone = share * windows.fast_share * (2.0 * np.log(size.fast_v) + LOG_2PI)
-        return over * np.sqrt(share)[:, None], log_det + gone
+        over = slow / amplitude[:, None] + rest / fast_v
+        of_fast = share * windows.fast_dof * (2.0 * np.log(fast_v) + LOG_2PI)
+        return over * np.sqrt(share)[:, None], log_det + of_fast
 
 
 def whitened(problem: InverseProblem, blocks: Blocks, table: Array, size: Size) -> tuple[Array, Array]:

@@ -43,23 +43,33 @@ class ModelState:
 
         index : place among the fitted records, None for one that was not. That goes on from a fitted one where it
         continues it; else its cell has the file's capacity, and it begins at the state of charge that was given, of a
-        full charge where the fitted full charges begin, or where this model rests at its first voltage.
+        full charge where the fitted full charges begin, or where this model rests at its first voltage. Where it cannot
+        be at rest there, it begins as the declared cell does.
         """
         index = record.continues if index is None else index
         data, hold = (record.thin, record.thin_hold) if thin else (record.data, record.hold)
-        effects, run = self.effects(record.good), self.problem.run
-        if self.values is not None and index is not None:
-            share = share_of(self.values, index)
-            return run(data, self.values[STATE_OF_CHARGE][str(index)], effects, hold, share=share)
-        if self.values is not None and record.start.basis == "full charge":
-            return run(data, self._full(record.soc0), effects, hold)
-        rest_v = record.start.rest_voltage_v  # None where the state of charge was given
-        if self.values is None or rest_v is None:
-            return run(data, record.soc0, effects, hold)
+        effects = self.effects(record.good)
+        share = 1.0 if self.values is None or index is None else share_of(self.values, index)
+        soc0 = self._start(record, index)
+        if soc0 is not None:
+            return self.problem.run(data, soc0, effects, hold, share=share)
         try:
-            return run(data, None, effects, hold, rest_v)
+            return self.problem.run(data, None, effects, hold, record.start.rest_voltage_v)
         except AesiError:
-            return run(data, record.soc0, effects, hold)
+            return self.problem.run(data, record.soc0, effects, hold)
+
+    def _start(self, record: PreparedRecord, index: int | None) -> float | None:
+        """State of charge at a record's first row, None where it is that at which this model rests at its voltage.
+
+        index : of the fitted record that it is or continues, None where there is none.
+        """
+        if self.values is None:
+            return record.soc0
+        if index is not None:
+            return self.values[STATE_OF_CHARGE][str(index)]
+        if record.start.basis == "full charge":
+            return self._full(record.soc0)
+        return record.soc0 if record.start.rest_voltage_v is None else None  # it was given
 
     def start_slope_v(self, record: PreparedRecord) -> Array:
         """(n,) V of a whole record that was not fitted: what one standard deviation of its initial state of charge is

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from aesi.numerics.blocks import dealt_folds
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
 from aesi.records import Run
@@ -17,9 +18,9 @@ TURNS_S = (120.0, 900.0)
 REST_SHARE = 0.02
 """Of the current's RMS: less has no sign."""
 FOLDS = 5
-"""Every fifth block is left out in turn."""
-BLOCKS_PER_FOLD = 5
-"""Blocks are long against the correlation of neighbours."""
+"""Sets of blocks, each left out in turn."""
+BLOCKS = 25
+"""Contiguous ones, dealt out to the folds in turn; long against the correlation of neighbours."""
 RIDGES = (1e-4, 1e-2, 1.0, 1e2, 1e4)
 """The one that predicts left-out blocks best is taken."""
 SATURATION = 0.5
@@ -72,7 +73,7 @@ def explain(runs: Sequence[Run], residuals: Sequence[Array]) -> dict[str, float]
     """
     families = [features(r) for r in runs]
     target = np.concatenate(residuals)
-    folds = np.concatenate([_folds(len(e)) for e in residuals])
+    folds = np.concatenate([dealt_folds(len(e), BLOCKS, FOLDS) for e in residuals])
     variance = float(np.mean((target - target.mean()) ** 2)) + 1e-30
     tables = {name: _standard(np.concatenate([f[name] for f in families])) for name in families[0]}
     return {name: max(0.0, 1.0 - _unseen(table, target, folds) / variance) for name, table in tables.items()}
@@ -81,12 +82,6 @@ def explain(runs: Sequence[Run], residuals: Sequence[Array]) -> dict[str, float]
 def _standard(table: Array) -> Array:
     centred = table - table.mean(axis=0)
     return centred / (centred.std(axis=0) + 1e-12)
-
-
-def _folds(n: int) -> Array:
-    """Fold of each row: contiguous blocks dealt out in turn, so that each fold spans the record."""
-    blocks = np.minimum(np.arange(n) * FOLDS * BLOCKS_PER_FOLD // max(n, 1), FOLDS * BLOCKS_PER_FOLD - 1)
-    return blocks % FOLDS
 
 
 def _unseen(table: Array, target: Array, folds: Array) -> float:

@@ -34,42 +34,60 @@ def warnings(files: Sequence[FileOutcome], verdict: Verdict, rest_a: float = 0.0
 
     rest_a : A, below which the cell rests.
     """
-    out = []
+    said = (
+        _of_contradiction(files, verdict),
+        _of_worse_on_tests(_tests(files), bool(verdict.effects)),
+        _of_worse_on_fitted([f for f in files if f.part == "fit"]),
+        _of_rest(_tests(files), rest_a),
+    )
+    return tuple(sentence for sentence in said if sentence is not None)
+
+
+def _of_contradiction(files: Sequence[FileOutcome], verdict: Verdict) -> str | None:
     over_v = contradicted_by_v(files, verdict)
-    if over_v is not None:
-        said = "what was found" if verdict.effects else "that nothing is missing"
-        out.append(
-            f"the test part contradicts {said}: {MV_PER_V * over_v:.2f} mV beyond the noise are left there, and "
-            f"{MV_PER_V * verdict.tolerance_v:.2f} mV would be within what a right model leaves. {_advice(files)}"
-        )
-    tests = _tests(files)
+    if over_v is None:
+        return None
+    said = "what was found" if verdict.effects else "that nothing is missing"
+    return (
+        f"the test part contradicts {said}: {MV_PER_V * over_v:.2f} mV beyond the noise are left there, and "
+        f"{MV_PER_V * verdict.tolerance_v:.2f} mV would be within what a right model leaves. {_advice(files)}"
+    )
+
+
+def _of_worse_on_tests(tests: Sequence[FileOutcome], named: bool) -> str | None:
+    """named : whether the verdict names an effect, which the written model has where it is none of the others."""
     after_mv = _left_mv(tests, "after")
     less = _less_than(tests, after_mv)
-    if less:
-        same = next((state for state in OTHERS if _same(tests, state)), None)
-        model = "the model with what was found" if verdict.effects else NAMES["after"]
-        if same is not None:
-            model = f"{NAMES[same]}, which is what is written,"
-        others = " and ".join(f"{words} {left_mv:.2f} mV" for words, left_mv in less.items())
-        harms = same != "before" and after_mv > AS_GOOD * min(less.values())
-        advice = ": do not use it there." if harms else "."
-        out.append(f"on the test part {model} leaves {after_mv:.2f} mV, {others}{advice}")
-    fitted = [f for f in files if f.part == "fit"]
+    if not less:
+        return None
+    same = next((state for state in OTHERS if _same(tests, state)), None)
+    model = "the model with what was found" if named else NAMES["after"]
+    if same is not None:
+        model = f"{NAMES[same]}, which is what is written,"
+    others = " and ".join(f"{words} {left_mv:.2f} mV" for words, left_mv in less.items())
+    harms = same != "before" and after_mv > AS_GOOD * min(less.values())
+    advice = ": do not use it there." if harms else "."
+    return f"on the test part {model} leaves {after_mv:.2f} mV, {others}{advice}"
+
+
+def _of_worse_on_fitted(fitted: Sequence[FileOutcome]) -> str | None:
     after_mv = _left_mv(fitted, "after")
     less = _less_than(fitted, after_mv)
     if less.get(NAMES["recalibrated"], after_mv) * AS_GOOD >= after_mv:
         less.pop(NAMES["recalibrated"], None)
-    if less and not _same(fitted, "before"):
-        out.append(
-            f"on the part that was fitted {NAMES['after']} leaves {after_mv:.2f} mV of the rows as measured, "
-            f"{' and '.join(f'{words} {left_mv:.2f} mV' for words, left_mv in less.items())}."
-        )
-    if tests and max(float(np.max(np.abs(f.current_a))) for f in tests) < rest_a:
-        out.append(
-            "the cell rests throughout the test part, which says nothing of a load: keep back more (--holdout), or "
-            "give a test record (--test)."
-        )
-    return tuple(out)
+    if not less or _same(fitted, "before"):
+        return None
+    others = " and ".join(f"{words} {left_mv:.2f} mV" for words, left_mv in less.items())
+    return f"on the part that was fitted {NAMES['after']} leaves {after_mv:.2f} mV of the rows as measured, {others}."
+
+
+def _of_rest(tests: Sequence[FileOutcome], rest_a: float) -> str | None:
+    if not tests or max(float(np.max(np.abs(f.current_a))) for f in tests) >= rest_a:
+        return None
+    return (
+        "the cell rests throughout the test part, which says nothing of a load: keep back more (--holdout), or give a "
+        "test record (--test)."
+    )
 
 
 def _advice(files: Sequence[FileOutcome]) -> str:

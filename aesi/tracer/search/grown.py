@@ -34,26 +34,30 @@ def growths_on(
     if not slopes:
         return list(growths.values())
     pairs = [(parent, name) for parent in parents for name in addable(parent)]
-    keys = [_key(parent, name, "promised") for parent, name in pairs]
-    if any(archive.get(key, 1) is None for key in keys):
+    if any(archive.get(_promise_key(*pair), 1) is None for pair in pairs):
         if archive.other_model is None and not best.fit.as_declared:
             slopes = {**slopes, **_first_slopes(growths)}
-        for key, (parent, name) in zip(keys, pairs, strict=True):
-            gain = archive.near(key, 1)
-            if gain is None:
-                said = promise(parent, slopes[name]) if name in slopes else -np.inf
-                gain = np.array([said - parent.fit.score.total])
-            archive.put(key, gain)
-    gains = [archive.get(key, 1) for key in keys]
+        _put_promises(pairs, slopes, archive)
     promised = [
         (parent, name, parent.fit.score.total + float(gain[0]))
-        for (parent, name), gain in zip(pairs, gains, strict=True)
-        if gain is not None
+        for parent, name in pairs
+        if (gain := archive.get(_promise_key(parent, name), 1)) is not None
     ]
     return [
         growths[name] if parent is best else _growth(parent, name, archive)
         for parent, name in most_promising(promised)
     ]
+
+
+def _put_promises(pairs: Sequence[tuple[Parent, str]], slopes: Mapping[str, Array], archive: Archive) -> None:
+    """Put into the archive the nats that each effect promises to say more than its parent: as many as with the other
+    model of the cell, or else to first order by its slopes; -inf without these."""
+    for parent, name in pairs:
+        gain = archive.near(_promise_key(parent, name), 1)
+        if gain is None:
+            said = promise(parent, slopes[name]) if name in slopes else -np.inf
+            gain = np.array([said - parent.fit.score.total])
+        archive.put(_promise_key(parent, name), gain)
 
 
 def promising_first(
@@ -110,13 +114,19 @@ def addable(parent: Parent) -> list[str]:
     ]
 
 
+def grown_with(parent: Parent, names: Sequence[str], archive: Archive) -> list[Grown]:
+    """Where these effects end on a hypothesis, whether or not they compete in a search; without those that fail."""
+    growths = [_growth(parent, name, archive) for name in names]
+    return [one for one in ended(growths, archive) if one is not None]
+
+
 def _has_something_to_say(problem: InverseProblem, name: str) -> bool:
     """Not what infers a quantity that every record holds, nor what a file has right that was fitted to this very
     cell, nor, where good records stand beside the others, what all records of a cell share."""
     effect = problem.effects[name]
     if effect.infers is not None and all(r.data.temperature_degc is not None for r in problem.records):
         return False
-    if problem.has_good and effect.of_every_record:
+    if problem.has_good and (effect.of_every_record or effect.of_age):
         return False
     return not (problem.trust in MEASURED_CELL and effect.of_design)
 
@@ -138,6 +148,10 @@ def ended(growths: Sequence[EffectGrowth], archive: Archive) -> Iterable[Grown |
         return found
 
     return side_by_side(one, growths)
+
+
+def _promise_key(parent: Parent, name: str) -> str:
+    return _key(parent, name, "promised")
 
 
 def _key(parent: Parent, name: str, what: str = "grown") -> str:

@@ -59,7 +59,7 @@ def test_moments_of_one_day_were_taken_for_two_and_beside_dates_ended_in_an_erro
 
 def test_the_file_as_simulated_is_that_of_every_record():
     ageing = of(list(DAYS), DAYS)
-    assert shares(ageing, ageing.none) == pytest.approx(np.ones(3), abs=0.0)
+    assert shares(ageing, ageing.z_of_file_state) == pytest.approx(np.ones(3), abs=0.0)
 
 
 def test_the_file_is_in_the_state_of_the_last_day_with_a_load_or_of_a_given_one():

@@ -59,3 +59,16 @@ def test_residuals_on_both_sides_of_a_gap_were_taken_for_neighbours():
     record[::20] = np.nan
     with pytest.raises(FitError, match="19 calibration residuals in a row and needs 200"):
         RefittedForest().fit([record], window=100)
+
+
+def test_the_forest_of_a_record_with_gaps_was_grown_across_them(series):
+    past, future = series
+    torn = future[:1500].copy()
+    torn[:1000:20] = np.nan  # until row 1000 no window is whole, so that no forest is grown on these rows
+    louder = torn.copy()
+    louder[:1000] *= 100.0
+    calibrated = RefittedForest().fit([past], 0.1, WINDOW)
+    quiet, loud = calibrated.intervals(torn), calibrated.intervals(louder)
+    late = slice(1000 + WINDOW, 1500)
+    assert quiet.warm[late].all()
+    np.testing.assert_array_equal(quiet.lower_v[late], loud.lower_v[late])

@@ -61,6 +61,14 @@ def test_a_start_that_fails_is_returned_as_it_is():
     assert (found.rounds, found.converged) == (0, False)
 
 
+def test_a_start_where_the_model_gives_no_number_ended_in_an_error_of_linear_algebra():
+    model = Counted(lambda x: np.array([np.nan, x[0]]), lambda x: np.array([[1.0], [1.0]]))
+    found = descend(model, np.ones(1), np.zeros(1), 2.0 * np.ones(1), 5, 1e-9)
+    assert found.x == pytest.approx([1.0])
+    assert found.cost == np.inf
+    assert not found.converged
+
+
 def test_slopes_that_lead_nowhere_leave_the_start_as_it_is():
     model = Counted(lambda x: x - 3.0, lambda x: -np.eye(2))
     found = descend(model, np.zeros(2), np.full(2, -5.0), np.full(2, 5.0), 10, 1e-12)

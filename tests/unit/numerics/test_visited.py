@@ -31,3 +31,10 @@ def test_how_far_a_temperature_lies_above_or_below_the_visited_ones():
     known = seen.knows(np.array([18.0, 20.0, 22.0, 27.0, np.nan]))
     np.testing.assert_array_equal(known, [False, True, True, False, True])
     assert not Visited.of(np.array([0.5])).beyond_k(np.array([18.0])).any()
+
+
+def test_the_mean_of_one_temperature_was_taken_for_another_one_by_its_rounding():
+    seen = Visited.of(np.array([0.5]), np.array([25.1]))
+    means = np.array([np.full(rows, 25.1).sum() / rows for rows in range(1, 12)])
+    assert (means != 25.1).any()
+    assert seen.knows(means).all()

@@ -11,8 +11,8 @@ from aesi.physics.effects import CATALOGUE
 from aesi.tracer import discover
 from aesi.tracer.case.free_parameter import acting_on, of_all_records
 from aesi.tracer.case.problem import BESIDE_TIMES
-from aesi.tracer.decide.beside import judged_beside, left_v
-from aesi.tracer.decide.verdict import Thresholds
+from aesi.tracer.decide.beside import judged_beside, left_v, of_one_age
+from aesi.tracer.decide.verdict import Thresholds, Verdict
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.search.archive import context_of
 from aesi.tracer.search.grown import addable
@@ -26,8 +26,8 @@ def erring(cell, make):
     """A record of a cell in which its model errs: by up to 4 mV with the state of charge, alike in all records, and by
     1 mV over each 100 s for itself."""
 
-    def measurement(name, seed, offset_v=0.0):
-        data = make(seed=seed, n=7200)
+    def measurement(name, seed, offset_v=0.0, effects=(), n=7200):
+        data = make(effects, seed=seed, n=n)
         charge = 0.9 - np.cumsum(data.current_a) / (3600.0 * cell.capacity_ah)
         rng = np.random.default_rng(100 + seed)
         own = np.repeat(rng.normal(0.0, 2e-3, len(data) // 100 + 1), 100)[: len(data)]
@@ -186,3 +186,44 @@ def test_what_leaves_more_than_the_good_records_has_to_say_it_at_that_error(monk
     # Without a name the confidence of `unknown` is read off the logarithm of what is left over what may be, 8 over 4 mV
     # and what two records of a million rows each differ by.
     assert verdict.margin == (1.0 if named else pytest.approx(np.log(2.0), abs=2e-3))
+
+
+def said(name, total, scatter=1.0):
+    """A hypothesis that says so much of unseen data, in blocks that differ by `scatter`."""
+    blocks = total / 8.0 + scatter * np.tile([1.0, -1.0], 4)
+    return SimpleNamespace(
+        hypothesis=(name,), score=SimpleNamespace(total=total, log_density={"block": blocks})
+    )
+
+
+def test_what_an_age_says_as_well_is_a_look_alike_and_what_it_says_better_takes_the_name():
+    named = Verdict(
+        "found", ("current_sensor_gain",), (("current_sensor_gain", "clock_skew"),), 0.0, 0.0, 1.0, "so"
+    )
+    gain = said("current_sensor_gain", 40.0)
+    worse, same, better = (said("lithium_inventory_loss", total) for total in (10.0, 39.0, 70.0))
+    assert of_one_age(named, gain, [worse]) == named
+    alike = of_one_age(named, gain, [worse, same])
+    assert (alike.word, alike.effects) == ("found", named.effects)
+    assert alike.confidence_sets == (("current_sensor_gain", "clock_skew", "lithium_inventory_loss"),)
+    assert "of another age" in alike.reason
+    other = of_one_age(named, gain, [worse, better])
+    assert (other.word, other.effects, other.confidence_sets) == ("unknown", (), ())
+    assert "30.0 nats more" in other.reason
+    assert "leave out --good" in other.reason
+
+
+def test_an_aged_cell_was_a_current_that_reads_too_low(cell, erring):
+    aged = [CATALOGUE["active_material_loss_negative"].activate(loss=0.2)]
+    good, other = erring("good", 1, n=5400), erring("other", 2, effects=aged, n=5400)
+    gain = {"current_sensor_gain": CATALOGUE["current_sensor_gain"]}
+    before = discover(cell, [other], soc0=0.9, effects=gain, good=[good])
+    assert before.verdict.effects == ("current_sensor_gain",)
+    found = discover(
+        cell, [other], soc0=0.9, effects=gain | {e.effect.id: e.effect for e in aged}, good=[good]
+    )
+    assert found.verdict.effects == () or found.verdict.confidence_sets[0] == (
+        "current_sensor_gain",
+        "active_material_loss_negative",
+    )
+    assert "another age" in found.verdict.reason

@@ -31,7 +31,7 @@ def test_windows_end_with_their_block_and_a_lone_row_has_no_freedom_left():
     assert windows.of_row.tolist() == [0, 0, 1, 1, 1, 2, 3, 3]
     means = windows.means(np.arange(8.0)[:, None])[:, 0]
     assert means == pytest.approx([0.5, 0.5, 3.0, 3.0, 3.0, 5.0, 6.5, 6.5])
-    assert windows.fast_share == pytest.approx([0.5, 0.5, *[2 / 3] * 3, 0.0, 0.5, 0.5])
+    assert windows.fast_dof == pytest.approx([0.5, 0.5, *[2 / 3] * 3, 0.0, 0.5, 0.5])
 
 
 def test_what_lasts_counts_as_before_and_what_is_gone_by_its_own_size(problem):

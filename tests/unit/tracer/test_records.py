@@ -193,7 +193,7 @@ def test_a_full_charge_left_out_begins_where_the_fitted_full_charges_do():
         SimpleNamespace(start=SimpleNamespace(basis=b)) for b in ("full charge", "rest", "full charge")
     ]
     problem = SimpleNamespace(
-        records=records, active=lambda values, good: (), run=lambda data, soc0, *_: soc0
+        records=records, active=lambda values, good: (), run=lambda data, soc0, *_, share: soc0
     )
     left_out = SimpleNamespace(
         continues=None, data=None, hold="linear", good=False, soc0=1.0, start=records[0].start

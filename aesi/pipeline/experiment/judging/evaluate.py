@@ -102,54 +102,89 @@ def _judge(one: Fitted, series: ErrorSeries, role: Role) -> _Judged:
 
 
 def _row(one: Fitted, judged: Mapping[Role, Sequence[_Judged]], seconds: float) -> dict[str, Any]:
-    row: dict[str, Any] = {"name": one.model.name, "terms": one.terms, "seconds": round(seconds, 3)}
-    free: dict[str, Any] = {}
-    step: dict[str, Any] = {}
-    for role, records in judged.items():
-        if not records:
-            continue
-        error = _joined(r.series.error_v for r in records)
-        left = error - _joined(r.free.error_v for r in records)
-        for key, against in AGAINST.items():
-            physics = _joined(r.series.left_by(against) for r in records)
-            free[f"{role}_{key}"] = 100.0 * (1.0 - float(np.mean(left**2) / np.mean(physics**2)))
-        free[f"{role}_rmse_mv"] = MV_PER_V * rmse(error, _joined(r.free.error_v for r in records))
-        runs = _joined(r.series.runs for r in records)
-        if runs.any() and not runs.all():
-            free[f"{role}_until_ran_out_rmse_mv"] = MV_PER_V * rms(left[runs])
-        after = _joined(r.series.error_v[1:] for r in records)
-        step[f"{role}_rmse_mv"] = MV_PER_V * rmse(after, _joined(r.one_step[1:] for r in records))
+    """A model's row in summary.json: each regime on every part, and all else on the test part alone."""
     test = judged["test"]
-    free["diverged"] = sum(r.free.diverged_at is not None for r in test)
-    free["outside_pct"] = 100.0 * float(np.mean(_joined(r.free.outside for r in test)))
-    step["persistence_rmse_mv"] = _persistence_mv(test, 1)
     ahead = _ahead(one, test)
-    row |= {"free_run": free, "one_step": step, "k_step": _k_step(ahead, test)}
-    row["test_records"] = {r.series.name: _record_figures(one, r) for r in test}
-    row["k_step_persistence"] = {
-        _seconds(h): _persistence_mv(test, test[0].series.steps(h)) for h in HORIZONS_S
+    return {
+        "name": one.model.name,
+        "terms": one.terms,
+        "seconds": round(seconds, 3),
+        "free_run": _free_run(judged),
+        "one_step": _one_step(judged),
+        "k_step": _k_step(ahead, test),
+        "test_records": {r.series.name: _record_figures(one, r) for r in test},
+        "k_step_persistence": {
+            _seconds(h): _persistence_mv(test, test[0].series.steps(h)) for h in HORIZONS_S
+        },
+        **_one_step_intervals(one, test),
+        **_free_run_intervals(one, test, ahead),
     }
-    if one.intervals is not None:
-        residuals = [_without_first(r.series.error_v - r.one_step) for r in test]
-        row["intervals"] = _interval_figures(
-            test, [r.intervals for r in test], residuals, one.intervals.alpha
-        )
-        row["intervals_by_method"] = {
+
+
+def _free_run(judged: Mapping[Role, Sequence[_Judged]]) -> dict[str, float]:
+    """By part, per cent of the squared error of each physics that is taken off, and what is left, of the rows before a
+    simulation ran out by itself; how the test went."""
+    figures: dict[str, float] = {}
+    for role, records in judged.items():
+        if records:
+            error = _joined(r.series.error_v for r in records)
+            predicted = _joined(r.free.error_v for r in records)
+            for key, against in AGAINST.items():
+                physics = _joined(r.series.left_by(against) for r in records)
+                left_share = np.mean((error - predicted) ** 2) / np.mean(physics**2)
+                figures[f"{role}_{key}"] = 100.0 * (1.0 - float(left_share))
+            figures[f"{role}_rmse_mv"] = MV_PER_V * rmse(error, predicted)
+            runs = _joined(r.series.runs for r in records)
+            if runs.any() and not runs.all():
+                figures[f"{role}_until_ran_out_rmse_mv"] = MV_PER_V * rms((error - predicted)[runs])
+    test = judged["test"]
+    figures["diverged"] = sum(r.free.diverged_at is not None for r in test)
+    figures["outside_pct"] = 100.0 * float(np.mean(_joined(r.free.outside for r in test)))
+    return figures
+
+
+def _one_step(judged: Mapping[Role, Sequence[_Judged]]) -> dict[str, float]:
+    """By part, what is left one step ahead; and what holding the last error leaves of the test part."""
+    figures = {}
+    for role, records in judged.items():
+        if records:
+            error = _joined(r.series.error_v[1:] for r in records)
+            figures[f"{role}_rmse_mv"] = MV_PER_V * rmse(error, _joined(r.one_step[1:] for r in records))
+    figures["persistence_rmse_mv"] = _persistence_mv(judged["test"], 1)
+    return figures
+
+
+def _one_step_intervals(one: Fitted, test: Sequence[_Judged]) -> dict[str, Any]:
+    """Scores of the model's intervals one step ahead and of the methods beside them; nothing where it has none."""
+    if one.intervals is None:
+        return {}
+    residuals = [_without_first(r.series.error_v - r.one_step) for r in test]
+    return {
+        "intervals": _interval_figures(test, [r.intervals for r in test], residuals, one.intervals.alpha),
+        "intervals_by_method": {
             name: _interval_figures(test, [r.compared[name] for r in test], residuals, each.alpha)
             for name, each in one.compared.items()
-        }
-    if one.bands is not None:
-        residuals = [r.series.error_v - r.free.error_v for r in test]
-        whole = _interval_figures(test, [r.bands for r in test], residuals, one.bands.alpha)
-        row["free_run_intervals"] = (
-            whole | _inside([r.bands for r in test], residuals) | _left_out(one.bands.horizons[-1])
-        )
-        row["bands_by_horizon"] = {
+        },
+    }
+
+
+def _free_run_intervals(
+    one: Fitted, test: Sequence[_Judged], ahead: Mapping[float, Sequence[Array]]
+) -> dict[str, Any]:
+    """Scores of the model's bands, over a whole drive and by horizon; nothing where it has none.  ahead : `_ahead`."""
+    if one.bands is None:
+        return {}
+    residuals = [r.series.error_v - r.free.error_v for r in test]
+    bands = [r.bands for r in test]
+    whole = _interval_figures(test, bands, residuals, one.bands.alpha)
+    return {
+        "free_run_intervals": whole | _inside_coverage(bands, residuals) | _left_out(one.bands.horizons[-1]),
+        "bands_by_horizon": {
             _seconds(band.horizon_s): _horizon_figures(one, one.bands, band, test, ahead[band.horizon_s])
             for band in one.bands.horizons
             if band.horizon_s in ahead
-        }
-    return row
+        },
+    }
 
 
 def _record_figures(one: Fitted, record: _Judged) -> dict[str, float | None]:
@@ -193,10 +228,10 @@ def _horizon_figures(
         for r in test
     ]
     figures = _interval_figures(test, intervals, left, bands.alpha)
-    return figures | _inside(intervals, left) | _left_out(band)
+    return figures | _inside_coverage(intervals, left) | _left_out(band)
 
 
-def _inside(intervals: Sequence[Intervals | None], residuals: Sequence[Array]) -> dict[str, float]:
+def _inside_coverage(intervals: Sequence[Intervals | None], residuals: Sequence[Array]) -> dict[str, float]:
     """Coverage of the rows inside the trained range, where alone the band is calibrated; NaN without such rows."""
     covered = [
         each.covers(residual)[each.warm & np.isfinite(residual)]
