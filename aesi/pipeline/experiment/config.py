@@ -47,7 +47,24 @@ def model_names() -> tuple[str, ...]:
 
 
 class ExperimentConfig(Section):
-    """One experiment. `base` is the folder its relative paths start from; it is not part of its identity."""
+    """One experiment.
+
+    name : letters, digits, `_` and `-`; becomes a folder below `runs/`.
+    note : a line on why it is there, for its report and the tracking store.
+    seed : of all that is random in it.
+    data : the records and their roles.
+    cell : the declared cell.
+    fallback : what to run instead where the measured data cannot be had; of `data.kind: catalogue` alone.
+    library : the candidate terms of the correction.
+    search : the evolutionary search among them.
+    conformal : prediction intervals.
+    models : the models that the tables compare; all of them without it.
+    tracking : where the run is tracked.
+    runner : who evaluates candidates.
+    discover : what `aesi discover` needs beside cell and data.
+
+    `base` is the folder its relative paths start from; it is not part of its identity.
+    """
 
     name: str
     note: str = ""
