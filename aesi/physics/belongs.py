@@ -82,6 +82,12 @@ TOO_SMALL = 1.25
 times the capacity of their own cell's file, the drive of an LG M50T 1.31 times that of a Panasonic NCR18650PF."""
 ABOVE_FULL_V = 0.1
 """A voltage at rest further above that of a full cell belongs to another chemistry."""
+MOST_C_RATE = 100.0
+"""Of a current without a voltage: the pulses that cells are sold for are of 50C at most, a drive in mA is of 1000C and
+more."""
+MOST_CAPACITIES = 10.0
+"""Of a cell, that may flow one way: a schedule asks for several where a start or a capacity is wrong, one in ms for a
+thousand times what it is."""
 SMALL_C_RATE = 0.1
 """Below it a cell all but rests."""
 CONVERTED, DECLARED = " was converted from ", " as declared"
@@ -130,12 +136,37 @@ def check_measured(cell: Cell, records: Sequence[Measurement]) -> None:
 
 def check_belongs(cell: Cell, records: Iterable[Measurement]) -> None:
     """Raises DataError, one sentence, for the first record that cannot be of this cell: of its voltages, before what
-    these and its charge say of the capacity, which means nothing where they are another cell's."""
+    these and its charge say of the capacity, which means nothing where they are another cell's; of a current alone,
+    one that is of no cell of this capacity."""
     for record in records:
+        if not np.any(np.isfinite(record.voltage_v)):
+            _check_current(cell, record)
         if not np.all(np.isfinite(record.voltage_v)):
             continue
         _check_window(cell, record)
         _check_capacity(cell, record)
+
+
+def _check_current(cell: Cell, record: Measurement) -> None:
+    """Of a current without a voltage: one that no cell of this capacity carries, or that moves many times what it
+    holds, is in another unit."""
+    declared = max(cell.nominal_capacity_ah, cell.capacity_ah)
+    row = int(np.argmax(np.abs(record.current_a)))
+    rate = float(np.abs(record.current_a[row])) / declared
+    head = f"{record.name}, {stamp(record.time_s[row])} s: {record.current_a[row]:.4g} A are {rate:.3g}C of"
+    whose = f"{cell.name}, which has {declared:.3g} Ah"
+    if rate > MOST_C_RATE:
+        raise DataError(
+            f"{head} {whose}: the current is in mA, or the cell file is another's; give A, or declare it: --unit "
+            "current_a=mA."
+        )
+    moved = float(np.ptp(record.discharged_ah("linear")))
+    if moved > MOST_CAPACITIES * declared:
+        raise DataError(
+            f"{record.name}: {moved:.4g} Ah would flow one way within {record.time_s[-1] - record.time_s[0]:.6g} s, "
+            f"{moved / declared:.3g} times what {whose}, holds: the time is in ms, or the current in mA; give s and A, "
+            "or declare it: --unit time_s=ms, or --unit current_a=mA."
+        )
 
 
 def capacity_bounds(cell: Cell, record: Measurement) -> CapacityBounds:

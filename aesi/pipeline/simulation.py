@@ -230,10 +230,20 @@ def reached(cell: Cell, record: Measurement, voltage_v: Array, soc: Array) -> li
             f"{np.mean(error):+.2f} mV in the mean (measured minus model), at most {np.max(np.abs(error)):.1f} mV."
         )
     beyond = (soc < -GIVEN_SD) | (soc > 1.0 + GIVEN_SD)  # as closely as any is known
-    window = (voltage_v < cell.lower_voltage_v) | (voltage_v > cell.upper_voltage_v)
+    low, high = voltage_v < cell.lower_voltage_v, voltage_v > cell.upper_voltage_v
+    limits = f"the cell's {cell.lower_voltage_v:g} to {cell.upper_voltage_v:g} V"
+    left = [
+        f"{side} {limit:g} V first at {stamp(record.time_s[int(np.argmax(rows))])} s, {furthest} {voltage_v[at]:.3f} "
+        f"V at {stamp(record.time_s[at])} s"
+        for side, limit, rows, furthest, at in (
+            ("below", cell.lower_voltage_v, low, "down to", int(np.argmin(voltage_v))),
+            ("above", cell.upper_voltage_v, high, "up to", int(np.argmax(voltage_v))),
+        )
+        if np.any(rows)
+    ]
     for rows, words in (
         (beyond, f"a state of charge outside 0 to 1{_too_much(soc)}"),
-        (window, f"a voltage outside the cell's {cell.lower_voltage_v:g} to {cell.upper_voltage_v:g} V"),
+        (low | high, f"a voltage outside {limits}: {'; '.join(left)}"),
     ):
         if np.any(rows):
             said.append(f"{record.name}: {_percent(rows)} of the simulated rows have {words}.")

@@ -476,6 +476,20 @@ def test_round_off_at_a_full_charge_was_told_as_rows_beyond_it(model, data):
         assert any("a state of charge outside 0 to 1" in note for note in told) == said
 
 
+def test_a_voltage_of_no_cell_was_told_without_when_it_left_the_limits(model, data):
+    voltage, low_v = np.full(len(data), 3.9), model.cell.lower_voltage_v
+    voltage[10], voltage[12] = low_v - 0.1, -1.49
+    *_, last = reached(model.cell, data, voltage, np.linspace(0.9, 0.5, len(data)))
+    assert (
+        f"below {low_v:g} V first at {data.time_s[10]:g} s, down to -1.490 V at {data.time_s[12]:g} s."
+        in last
+    )
+    assert "above" not in last
+    voltage[20] = 5.0
+    *_, last = reached(model.cell, data, voltage, np.linspace(0.9, 0.5, len(data)))
+    assert last.endswith(f"V first at {data.time_s[20]:g} s, up to 5.000 V at {data.time_s[20]:g} s.")
+
+
 def test_by_how_much_a_record_emptied_or_overfilled_a_cell_was_not_told(model, data):
     voltage = np.full(len(data), 3.9)
     for soc, words in (
