@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -15,7 +16,7 @@ from aesi.data.convert import write_csv
 from aesi.data.current import CurrentProfile, read_current
 from aesi.data.reading import Reading, record_name
 from aesi.data.resample import DENSE
-from aesi.errors import DataError, InputError
+from aesi.errors import DataError, InputError, SimulationError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, BoolArray
 from aesi.over_time import stamp
@@ -100,17 +101,18 @@ def simulate_file(
     )
     placed = _placed(used, profile, current, asked, say, saved=saved)
     used = placed.model
-    run = simulate(
-        used.cell,
-        profile.time_s,
-        profile.current_a,
-        placed.start.soc,
-        used.effects,
-        profile.temperature_degc,
-        used.hold,
-        on_depletion="clip" if asked.run_on else "raise",
-        model=used.model,
-    )
+    with _doubting(placed.start, say):
+        run = simulate(
+            used.cell,
+            profile.time_s,
+            profile.current_a,
+            placed.start.soc,
+            used.effects,
+            profile.temperature_degc,
+            used.hold,
+            on_depletion="clip" if asked.run_on else "raise",
+            model=used.model,
+        )
     _write_run(out, run, profile.temperature_degc, declared.cell)
     say(reached(used.cell, placed.record, run.voltage_v, run.series["soc"]))
     if asked.run_on and np.any(run.series["depleted"]):
@@ -156,7 +158,8 @@ def predict_file(
     placed = _placed(used, profile, current, asked, say, saved=True)
     hybrid, record = placed.model, placed.record
     start = placed.start
-    prediction = hybrid.predict_record(record, start.soc, one_step=measured, soc0_sd=start.read_sd)
+    with _doubting(start, say):
+        prediction = hybrid.predict_record(record, start.soc, one_step=measured, soc0_sd=start.read_sd)
     frame = prediction.to_frame()
     frame.insert(1, "current_a", profile.current_a)
     _write(out, frame)
@@ -366,6 +369,23 @@ def _start(model: HybridModel, record: Measurement, soc0: float | None) -> Initi
         return start(soc0)
     words = f"{record.name} starts at the saved model's state of charge of {model.soc0:.4g}; --soc0 takes another."
     return replace(start(model.soc0), sentence=words)
+
+
+@contextmanager
+def _doubting(start: InitialState, say: SayNotes) -> Iterator[None]:
+    """Where a simulation fails that began at a state of charge read from a voltage, say that this is the first to
+    check."""
+    try:
+        yield
+    except SimulationError:
+        if start.read_sd > 0.0:
+            say(
+                [
+                    f"where this record starts was read from its voltage, {start.soc:.3f} +/- {start.read_sd:.3f} of "
+                    "its charge: check that first; --soc0 gives it."
+                ]
+            )
+        raise
 
 
 def _silent(notes: Iterable[str]) -> None:

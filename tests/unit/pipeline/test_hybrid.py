@@ -10,7 +10,7 @@ import pytest
 from small_experiment import SOC0, experiment, fitted, write_record
 
 import aesi
-from aesi.errors import DataError, InputError
+from aesi.errors import DataError, InputError, SimulationError
 from aesi.physics.effects import CATALOGUE, activated
 from aesi.physics.folded import folded
 from aesi.pipeline.discovery.cases import case_of_files
@@ -314,6 +314,24 @@ def test_a_saved_model_was_simulated_with_another_hold_than_it_was_predicted_wit
         np.testing.assert_allclose(simulated, predicted, atol=1e-8)
         words = "as declared" if name == "asked" else "since the row before, as the saved model was made"
         assert all(any(words in note for note in notes) for notes in said.values())
+
+
+@pytest.mark.parametrize("soc0", [None, 0.2])
+def test_a_start_that_was_read_is_the_first_to_check_where_a_record_runs_empty(model, tmp_path, soc0):
+    folder = replace(model, correction=None, intervals=None, bands=None).save(tmp_path / "model")
+    time = np.arange(0.0, 1400.0, 10.0)
+    current = np.where(time < 300.0, 0.0, model.cell.nominal_capacity_ah)
+    rest_v = float(model.cell.rest_voltage_v(0.2)[0])
+    frame = pd.DataFrame(
+        {"time_s": time, "current_a": current, "voltage_v": np.where(time < 300.0, rest_v, 3.3)}
+    )
+    frame.to_csv(tmp_path / "record.csv", index=False)
+    for todo in (simulate_file, predict_file):
+        said: list[str] = []
+        with pytest.raises(SimulationError, match="asks for more charge|solid diffusion"):
+            asked = ProfileRequest(soc0)
+            todo(folder, tmp_path / "record.csv", tmp_path / "out.csv", asked, say_notes=said.extend)
+        assert any("was read from its voltage, 0.2" in note for note in said) == (soc0 is None)
 
 
 @pytest.mark.parametrize("damage", ["missing", "schema", "list", "no parts", "arrays", "part"])
