@@ -90,6 +90,8 @@ MOST_CAPACITIES = 10.0
 thousand times what it is."""
 SMALL_C_RATE = 0.1
 """Below it a cell all but rests."""
+CONVERTED, DECLARED = " was converted from ", " as declared"
+"""In a reader's note on a unit that the user gave, which is the first suspect where a charge is that of no cell."""
 SOC_GRID = 1201
 """States of charge at which a voltage is looked up."""
 BEYOND_SOC = 0.1
@@ -227,6 +229,9 @@ def _check_capacity(cell: Cell, record: Measurement) -> None:
             f". Or it was far colder than the {_declared_degc(cell):.4g} degC that the cell's file declares: give its "
             "temperature in a column temperature_degc, or declare another in that file (Initial temperature [K])"
         )
+    declared = [note.rstrip(".") for note in record.notes if CONVERTED in note and DECLARED in note]
+    if declared:
+        fault += f". First look at what was declared: {'; '.join(declared)}"
     raise DataError(f"{fault}.")
 
 
@@ -267,8 +272,8 @@ def _cause(ratio: float, record: Measurement) -> str:
         )
     if ratio < 1.0 / 1000.0:
         return (
-            "the time is in hours or the current in kA; give s and A, or declare it: --unit time_s=h, or --unit "
-            "current_a=kA"
+            "the time is in hours or days or the current in kA (give s and A, or declare it: --unit time_s=h or d, or "
+            "--unit current_a=kA), or the sensor of the current failed"
         )
     if ratio < 1.0 / 15.0:
         return (

@@ -68,7 +68,7 @@ class Case:
 
     def __post_init__(self) -> None:
         """Raises DataError for a record that is given twice."""
-        check_distinct((*self.measurements, *self.good), self.tests)
+        check_distinct((*self.measurements, *self.good), self.tests, led=True)
 
     @property
     def records(self) -> tuple[Measurement, ...]:
