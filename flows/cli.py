@@ -5,19 +5,24 @@ Commands live in `flows.commands`; each imports what it needs when it runs, so t
 
 from __future__ import annotations
 
-import errno
-import os
 import sys
-from typing import NoReturn
 
-import typer
+try:
+    import errno
+    import os
+    from typing import NoReturn
 
-from aesi.errors import AesiError, OwnEffectError
-from aesi.numerics.files.first_use import tell_compiling
-from flows.base import environment
-from flows.base.interrupt import INTERRUPTED, ending_soon_on_interrupt, tell_interrupted
-from flows.commands import batch, bench, cell, data, effects, experiment
-from flows.commands.command import App
+    import typer
+
+    from aesi.errors import AesiError, OwnEffectError
+    from aesi.numerics.files.first_use import tell_compiling
+    from flows.base import environment
+    from flows.base.interrupt import INTERRUPTED, ending_soon_on_interrupt, tell_interrupted
+    from flows.commands import batch, bench, cell, data, effects, experiment
+    from flows.commands.command import App
+except KeyboardInterrupt:  # before anything hears Ctrl-C; none of it is worth a traceback
+    print("Interrupted.", file=sys.stderr)
+    sys.exit(130)
 
 app = App(
     name="aesi",
@@ -57,10 +62,10 @@ def _version(version: bool = typer.Option(False, "--version", help="Print the ve
 
 def main() -> NoReturn:
     """Entry point of the `aesi` script."""
-    environment.prepare_process()
-    tell_compiling(_say_compiling)
     try:
         with ending_soon_on_interrupt():
+            environment.prepare_process()
+            tell_compiling(_say_compiling)
             app(args=repeated(sys.argv[1:]))
     except (AesiError, OwnEffectError) as error:
         if isinstance(error, OwnEffectError) and os.environ.get("AESI_DEBUG"):

@@ -22,6 +22,7 @@ from aesi.calibration.records.conditions import Conditions
 from aesi.calibration.records.named import named_apart
 from aesi.calibration.records.prepared import Prepared, check_charge, hold_told, prepared, with_temperatures
 from aesi.calibration.records.spectra import degc_of, fitted_ones
+from aesi.calibration.records.temperature import against_temperature
 from aesi.calibration.records.zero import Zero, zero_of
 from aesi.calibration.result import (
     Calibration,
@@ -102,6 +103,7 @@ def calibrate(
         model=model,
         x=x,
         covariance=covariance,
+        against_temperature=against_temperature(cell, model.records, model.model_name),
     )
 
 

@@ -81,6 +81,7 @@ class Calibration:
     at_bounds : parameters that ended on a bound.  errors : of each record.  capacities : share of the cell's capacity
     that each record's has.  size_assumed : that no record told the size of the cell, as a sentence, or ''.
     x, covariance : working vector and its covariance, for the posterior.
+    against_temperature : a sentence on each record whose voltage contradicts the temperature that it was fitted at.
     """
 
     cell: Cell
@@ -96,14 +97,16 @@ class Calibration:
     model: Model
     x: Array
     covariance: Array
+    against_temperature: tuple[str, ...] = ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Why the cell may be bent to what is not its own, a sentence each: a state of charge that was given against
-        the voltage, records on which the fit errs by more than the start file, which one cell's seldom do, or the file
-        that is written, and parameters that stand in for what the model lacks."""
+        """Why the cell may be bent to what is not its own, a sentence each: a temperature, or a state of charge that
+        was given, against the voltage, records on which the fit errs by more than the start file, which one cell's
+        seldom do, or the file that is written, and parameters that stand in for what the model lacks."""
         against = (r.start for r in self.model.records if r.start.against_voltage)
         return (
+            *self.against_temperature,
             *(
                 f"{start.sentence[:-1]}: the fit bends the cell's parameters to make up for the difference; leave out "
                 "--soc0, or correct it, unless the charge was counted and the start file is another cell's."

@@ -7,13 +7,16 @@ from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
+import numpy as np
+
 from aesi.data.channels.checks import Columns, Context, check_alive, check_finite, check_ranges, check_time
 from aesi.data.channels.columns import QUANTITIES, REQUIRED, Mapped
 from aesi.data.channels.gaps import without_gaps
+from aesi.data.channels.glitches import glitch_doubts, glitches
 from aesi.data.channels.implausible import check_scale, check_sign, check_signed
-from aesi.data.channels.load_columns import load_columns
+from aesi.data.channels.load_columns import keep_rows, load_columns
 from aesi.data.channels.stamps import time_doubts
-from aesi.data.channels.stuck import check_stuck
+from aesi.data.channels.stuck import check_dead, check_stuck
 from aesi.data.channels.temperature import temperature_doubts
 from aesi.data.readers import open_table
 from aesi.data.readers.formats.format import Sign
@@ -140,11 +143,22 @@ def _examine(
     check_alive(data, context)
     notes.extend(time_doubts(data))
     notes.extend(temperature_doubts(data, context))
+    found = glitches(data)
+    notes.extend(glitch_doubts(found, data, context))
+    course = data, context
+    if found.leaps.size:
+        course = keep_rows(data, context, np.delete(np.arange(len(data["time_s"])), found.leaps))
+    _examine_course(*course, header, sign_advice)
+    return data
+
+
+def _examine_course(data: Columns, context: Context, header: Sequence[str], sign_advice: str) -> None:
+    """What current, voltage and time tell together, of the rows that are the cell's."""
+    check_dead(data, context)
     check_scale(data, context)
     check_signed(data, context, header)
     check_sign(data, context, sign_advice)
     check_stuck(data, context)
-    return data
 
 
 def _sign_advice(mapped: Mapped, reading: Reading) -> str:

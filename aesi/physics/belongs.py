@@ -82,8 +82,16 @@ TOO_SMALL = 1.25
 times the capacity of their own cell's file, the drive of an LG M50T 1.31 times that of a Panasonic NCR18650PF."""
 ABOVE_FULL_V = 0.1
 """A voltage at rest further above that of a full cell belongs to another chemistry."""
+MOST_C_RATE = 100.0
+"""Of a current without a voltage: the pulses that cells are sold for are of 50C at most, a drive in mA is of 1000C and
+more."""
+MOST_CAPACITIES = 10.0
+"""Of a cell, that may flow one way: a schedule asks for several where a start or a capacity is wrong, one in ms for a
+thousand times what it is."""
 SMALL_C_RATE = 0.1
 """Below it a cell all but rests."""
+CONVERTED, DECLARED = " was converted from ", " as declared"
+"""In a reader's note on a unit that the user gave, which is the first suspect where a charge is that of no cell."""
 SOC_GRID = 1201
 """States of charge at which a voltage is looked up."""
 BEYOND_SOC = 0.1
@@ -128,12 +136,37 @@ def check_measured(cell: Cell, records: Sequence[Measurement]) -> None:
 
 def check_belongs(cell: Cell, records: Iterable[Measurement]) -> None:
     """Raises DataError, one sentence, for the first record that cannot be of this cell: of its voltages, before what
-    these and its charge say of the capacity, which means nothing where they are another cell's."""
+    these and its charge say of the capacity, which means nothing where they are another cell's; of a current alone,
+    one that is of no cell of this capacity."""
     for record in records:
+        if not np.any(np.isfinite(record.voltage_v)):
+            _check_current(cell, record)
         if not np.all(np.isfinite(record.voltage_v)):
             continue
         _check_window(cell, record)
         _check_capacity(cell, record)
+
+
+def _check_current(cell: Cell, record: Measurement) -> None:
+    """Of a current without a voltage: one that no cell of this capacity carries, or that moves many times what it
+    holds, is in another unit."""
+    declared = max(cell.nominal_capacity_ah, cell.capacity_ah)
+    row = int(np.argmax(np.abs(record.current_a)))
+    rate = float(np.abs(record.current_a[row])) / declared
+    head = f"{record.name}, {stamp(record.time_s[row])} s: {record.current_a[row]:.4g} A are {rate:.3g}C of"
+    whose = f"{cell.name}, which has {declared:.3g} Ah"
+    if rate > MOST_C_RATE:
+        raise DataError(
+            f"{head} {whose}: the current is in mA, or the cell file is another's; give A, or declare it: --unit "
+            "current_a=mA."
+        )
+    moved = float(np.ptp(record.discharged_ah("linear")))
+    if moved > MOST_CAPACITIES * declared:
+        raise DataError(
+            f"{record.name}: {moved:.4g} Ah would flow one way within {record.time_s[-1] - record.time_s[0]:.6g} s, "
+            f"{moved / declared:.3g} times what {whose}, holds: the time is in ms, or the current in mA; give s and A, "
+            "or declare it: --unit time_s=ms, or --unit current_a=mA."
+        )
 
 
 def capacity_bounds(cell: Cell, record: Measurement) -> CapacityBounds:
@@ -196,6 +229,9 @@ def _check_capacity(cell: Cell, record: Measurement) -> None:
             f". Or it was far colder than the {_declared_degc(cell):.4g} degC that the cell's file declares: give its "
             "temperature in a column temperature_degc, or declare another in that file (Initial temperature [K])"
         )
+    declared = [note.rstrip(".") for note in record.notes if CONVERTED in note and DECLARED in note]
+    if declared:
+        fault += f". First look at what was declared: {'; '.join(declared)}"
     raise DataError(f"{fault}.")
 
 
@@ -236,8 +272,8 @@ def _cause(ratio: float, record: Measurement) -> str:
         )
     if ratio < 1.0 / 1000.0:
         return (
-            "the time is in hours or the current in kA; give s and A, or declare it: --unit time_s=h, or --unit "
-            "current_a=kA"
+            "the time is in hours or days or the current in kA (give s and A, or declare it: --unit time_s=h or d, or "
+            "--unit current_a=kA), or the sensor of the current failed"
         )
     if ratio < 1.0 / 15.0:
         return (

@@ -13,8 +13,10 @@ import numpy as np
 
 from aesi.calibration import Calibration, Conditions
 from aesi.calibration import calibrate as fit_cell
+from aesi.calibration.records.spectra import check_spectra
 from aesi.data.read import Reading, examined, read
 from aesi.data.reading import record_names
+from aesi.data.spectra import read_spectra
 from aesi.errors import DataError, InputError
 from aesi.over_time import stamp
 from aesi.physics import ModelName
@@ -25,14 +27,18 @@ from aesi.pipeline.discovery.budget import within_budget
 from aesi.pipeline.discovery.cold import with_cold_admitted
 from aesi.pipeline.discovery.discover import Case, run_case
 from aesi.pipeline.discovery.finding import Finding
+from aesi.pipeline.distinct import check_distinct_spectra
 from aesi.pipeline.product.declared import Declared, declared_model
-from aesi.records import Hold, Measurement
+from aesi.records import Hold, Measurement, Spectrum
 from aesi.records.checked import row_words
 from aesi.tracer.discovery import Progress
 
 FileOrRecord = str | PathLike[str] | Measurement
 Data = FileOrRecord | Sequence[FileOrRecord]
 """Files, or what `aesi.read_measurement` gave; one, or several."""
+FileOrSpectrum = str | PathLike[str] | Spectrum
+Spectra = FileOrSpectrum | Sequence[FileOrSpectrum]
+"""Files of impedance spectra, or these; one, or several."""
 MOST_HOLDOUT, MOST_EFFECTS = 0.9, 10
 """As `--holdout` and `--max-effects` have them."""
 
@@ -111,6 +117,7 @@ def calibrate(
     dates: Mapping[str, date] | None = None,
     as_of: date | None = None,
     priors: Mapping[str, tuple[float, float]] | None = None,
+    spectra: Spectra = (),
     hold: Hold | None = None,
     model: ModelName | None = None,
 ) -> Calibration:
@@ -122,6 +129,8 @@ def calibrate(
     priors : (value, standard deviation) of parameters that are known from elsewhere, by their names in the report and
     in its units (of a factor, times the start file's); the deviation is that of the natural logarithm for factors,
     double layers and the thermal conductivity.
+    spectra : impedance of this very cell, fitted beside the records as `--fit-impedance` does: files of spectra, or
+    `aesi.records.Spectrum`s, one or several.
     model : that is fitted, "espm" or "dfn"; None takes that of a saved model, or that the file was fitted with, else
     "espm".
     Raises AesiError, one sentence, for what cannot be used.
@@ -135,17 +144,38 @@ def calibrate(
     declared = given.cell
     measurements = _read_all(_listed(data), hold)
     check_records(measurements, temperatures_degc)
-    scaled_to(declared, measurements, temperatures_degc)  # refused before anything is fitted
+    scaled = scaled_to(declared, measurements, temperatures_degc)  # refused before anything is fitted
     conditions = Conditions(
         soc0,
         temperatures_degc or {},
         dates or {},
         as_of,
         model or given.model,
+        spectra=_read_spectra(spectra),
         priors=priors or {},
     )
+    check_distinct_spectra(conditions.spectra, ())
+    check_spectra(scaled, conditions.spectra)
     found = fit_cell(declared, measurements, conditions)
     return replace(found, notes=(*effects_left(given), *found.notes))
+
+
+def _read_spectra(given: Spectra) -> tuple[Spectrum, ...]:
+    """The spectra of files, and those that were read before.  Raises InputError for what is neither."""
+    several = isinstance(given, Sequence) and not isinstance(given, str)
+    found: list[Spectrum] = []
+    listed = list(given) if several else [given]  # type: ignore[arg-type]
+    for one in listed:
+        if isinstance(one, Spectrum):
+            found.append(one)
+        elif isinstance(one, str | PathLike):
+            found += read_spectra(Path(one))
+        else:
+            raise InputError(
+                f"spectra: an object of type {type(one).__name__} is no spectrum; give a file of spectra, or "
+                "aesi.records.Spectrum."
+            )
+    return tuple(found)
 
 
 def _names(ids: str | Sequence[str]) -> tuple[str, ...]:

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 from aesi.errors import DataError
+from aesi.over_time import stamp
 from aesi.records import Measurement, Spectrum
+from aesi.records.overlap import Overlap, Rows, overlap
+from aesi.tracer.case.records import led_by
 
 _Listed = Sequence[Measurement] | Sequence[Spectrum]
 
@@ -42,12 +46,36 @@ def check_distinct_spectra(fitted: Sequence[Spectrum], witnesses: Sequence[Spect
     _check_once(fitted, witnesses, SPECTRA)
 
 
-def check_distinct(fitted: Sequence[Measurement], tests: Sequence[Measurement] = ()) -> None:
-    """Raises DataError, one sentence, for two records that hold the same rows.
+def check_distinct(
+    fitted: Sequence[Measurement], tests: Sequence[Measurement] = (), *, led: bool = False
+) -> None:
+    """Raises DataError, one sentence, for two records that hold the same rows, in whole or in part, as they are or
+    shifted in time, rounded or thinned.
 
     fitted : what may be looked at.  tests : what chooses nothing.
+    led : a test that begins with a fitted record is judged where that ends.
     """
     _check_once(fitted, tests, RECORDS)
+    rows = {id(record): Rows(record) for record in (*fitted, *tests)}
+    pairs = [
+        *((*pair, RECORDS.fitted) for pair in combinations(fitted, 2)),
+        *(
+            (one, test, RECORDS.between)
+            for one in fitted
+            for test in tests
+            if not (led and _begins(test, one))
+        ),
+        *((*pair, RECORDS.judging) for pair in combinations(tests, 2)),
+    ]
+    for one, other, where in pairs:
+        found = overlap(rows[id(one)], rows[id(other)])
+        if found is not None:
+            raise _of_one_test(one.name, other.name, found, where)
+
+
+def _begins(test: Measurement, known: Measurement) -> bool:
+    found = led_by(test, [known])
+    return found is not None and found[1] is test
 
 
 def _check_once(fitted: _Listed, judging: _Listed, words: _Words) -> None:
@@ -69,3 +97,13 @@ def _twice(one: str, other: str, where: str) -> DataError:
     """One sentence about two of the same content."""
     both = f"{one} is there twice" if one == other else f"{one} and {other} hold the same rows and are both"
     return DataError(f"{both} {where}.")
+
+
+def _of_one_test(one: str, other: str, found: Overlap, where: str) -> DataError:
+    """One sentence about two records that share rows."""
+    way = "later" if found.ahead_s > 0 else "earlier"
+    clock = f", {stamp(abs(found.ahead_s))} s {way} than in {one}" if found.ahead_s else ""
+    return DataError(
+        f"{one} and {other} hold the same rows of one test ({found.rows:,} rows, in {other} from "
+        f"{stamp(found.from_s)} to {stamp(found.to_s)} s{clock}), and are both {where}."
+    )

@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from aesi.calibration.records.spectra import BAND_HZ, degc_of, in_band, state_of, usable
+from aesi.data.channels.spectrum_columns import find_frequency
 from aesi.data.readers import open_table
+from aesi.data.readers.table import names_listed
 from aesi.errors import DataError, InputError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, ComplexArray
@@ -51,7 +53,7 @@ def impedance_file(
     """Write frequency_hz, z_real_ohm, z_imag_ohm to `out`, and return the impedance (n,) ohm.
 
     cell : a BPX file, or a folder of a saved model, whose effects are taken.  effects : added to those.
-    frequencies : LOW:HIGH:N in Hz, log-spaced, or a CSV with a column frequency_hz.
+    frequencies : LOW:HIGH:N in Hz, log-spaced, or a CSV with a column frequency_hz, or an instrument's (freq/Hz).
     model : "espm" or "dfn"; None takes that of a saved model, or that the cell's file was fitted with, else "espm".
     soh : share of the file's capacity that the cell had then, or the day of the test; None takes all of it.
     say_notes : is given a sentence where the model has no double layer, and frequencies at which that shows, and on
@@ -132,9 +134,14 @@ def read_frequencies(text: str) -> Array:
             )
         return np.geomspace(low, high, n)
     table = open_table(text)
-    if "frequency_hz" not in table.header:
-        raise DataError(f"{table.path.name} has no column frequency_hz; it has {', '.join(table.header)}.")
-    hz = table.read((list(table.header).index("frequency_hz"),))[0]
+    found = find_frequency(table)
+    if found is None:
+        raise DataError(
+            f"{table.path.name} has no column frequency_hz, and none as instruments name it with its unit (freq/Hz); "
+            f"it has {names_listed(table.header)}."
+        )
+    place, factor = found
+    hz = factor * table.read((place,))[0]
     bad = np.flatnonzero(~(np.isfinite(hz) & (hz > 0.0)))
     if bad.size or not hz.size:
         what = f"row {bad[0] + 1}: frequency_hz is {hz[bad[0]]:g}" if bad.size else "no row below its header"

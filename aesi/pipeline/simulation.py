@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -15,7 +16,7 @@ from aesi.data.convert import write_csv
 from aesi.data.current import CurrentProfile, read_current
 from aesi.data.reading import Reading, record_name
 from aesi.data.resample import DENSE
-from aesi.errors import DataError, InputError
+from aesi.errors import DataError, InputError, SimulationError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, BoolArray
 from aesi.over_time import stamp
@@ -100,17 +101,18 @@ def simulate_file(
     )
     placed = _placed(used, profile, current, asked, say, saved=saved)
     used = placed.model
-    run = simulate(
-        used.cell,
-        profile.time_s,
-        profile.current_a,
-        placed.start.soc,
-        used.effects,
-        profile.temperature_degc,
-        used.hold,
-        on_depletion="clip" if asked.run_on else "raise",
-        model=used.model,
-    )
+    with _doubting(placed.start, say):
+        run = simulate(
+            used.cell,
+            profile.time_s,
+            profile.current_a,
+            placed.start.soc,
+            used.effects,
+            profile.temperature_degc,
+            used.hold,
+            on_depletion="clip" if asked.run_on else "raise",
+            model=used.model,
+        )
     _write_run(out, run, profile.temperature_degc, declared.cell)
     say(reached(used.cell, placed.record, run.voltage_v, run.series["soc"]))
     if asked.run_on and np.any(run.series["depleted"]):
@@ -156,7 +158,8 @@ def predict_file(
     placed = _placed(used, profile, current, asked, say, saved=True)
     hybrid, record = placed.model, placed.record
     start = placed.start
-    prediction = hybrid.predict_record(record, start.soc, one_step=measured, soc0_sd=start.read_sd)
+    with _doubting(start, say):
+        prediction = hybrid.predict_record(record, start.soc, one_step=measured, soc0_sd=start.read_sd)
     frame = prediction.to_frame()
     frame.insert(1, "current_a", profile.current_a)
     _write(out, frame)
@@ -230,10 +233,20 @@ def reached(cell: Cell, record: Measurement, voltage_v: Array, soc: Array) -> li
             f"{np.mean(error):+.2f} mV in the mean (measured minus model), at most {np.max(np.abs(error)):.1f} mV."
         )
     beyond = (soc < -GIVEN_SD) | (soc > 1.0 + GIVEN_SD)  # as closely as any is known
-    window = (voltage_v < cell.lower_voltage_v) | (voltage_v > cell.upper_voltage_v)
+    low, high = voltage_v < cell.lower_voltage_v, voltage_v > cell.upper_voltage_v
+    limits = f"the cell's {cell.lower_voltage_v:g} to {cell.upper_voltage_v:g} V"
+    left = [
+        f"{side} {limit:g} V first at {stamp(record.time_s[int(np.argmax(rows))])} s, {furthest} {voltage_v[at]:.3f} "
+        f"V at {stamp(record.time_s[at])} s"
+        for side, limit, rows, furthest, at in (
+            ("below", cell.lower_voltage_v, low, "down to", int(np.argmin(voltage_v))),
+            ("above", cell.upper_voltage_v, high, "up to", int(np.argmax(voltage_v))),
+        )
+        if np.any(rows)
+    ]
     for rows, words in (
         (beyond, f"a state of charge outside 0 to 1{_too_much(soc)}"),
-        (window, f"a voltage outside the cell's {cell.lower_voltage_v:g} to {cell.upper_voltage_v:g} V"),
+        (low | high, f"a voltage outside {limits}: {'; '.join(left)}"),
     ):
         if np.any(rows):
             said.append(f"{record.name}: {_percent(rows)} of the simulated rows have {words}.")
@@ -356,6 +369,23 @@ def _start(model: HybridModel, record: Measurement, soc0: float | None) -> Initi
         return start(soc0)
     words = f"{record.name} starts at the saved model's state of charge of {model.soc0:.4g}; --soc0 takes another."
     return replace(start(model.soc0), sentence=words)
+
+
+@contextmanager
+def _doubting(start: InitialState, say: SayNotes) -> Iterator[None]:
+    """Where a simulation fails that began at a state of charge read from a voltage, say that this is the first to
+    check."""
+    try:
+        yield
+    except SimulationError:
+        if start.read_sd > 0.0:
+            say(
+                [
+                    f"where this record starts was read from its voltage, {start.soc:.3f} +/- {start.read_sd:.3f} of "
+                    "its charge: check that first; --soc0 gives it."
+                ]
+            )
+        raise
 
 
 def _silent(notes: Iterable[str]) -> None:

@@ -29,6 +29,8 @@ class ErrorSeries:
     was read from a voltage; None elsewhere.
     missed_v : V, the error of the physics model that a recalibration allowed for, where one was made; it tells how much
     rows leave open of the parameters, of the declared cell's too.
+    ran_out_s : s, from when on the physics model, or another one of `physics`, is held where it ran empty or full; an
+    error says no more than that from there on. None where none of them ran out, or that is not known.
     The sparse model maps (error_v[k], inputs[k]) to error_v[k + 1]; records are never joined across a gap.
     """
 
@@ -44,6 +46,7 @@ class ErrorSeries:
     temperature_degc: Array | None = None
     slopes_v: Array | None = None
     missed_v: float | None = None
+    ran_out_s: float | None = None
     start_v: Array | None = None
 
     def __len__(self) -> int:
@@ -70,6 +73,11 @@ class ErrorSeries:
     def digest(self) -> str:
         """Content hash of error and inputs."""
         return digest(self.error_v, self.inputs)
+
+    @property
+    def runs(self) -> BoolArray:
+        """(n,) True for the rows before a physics model ran out."""
+        return self.time_s < (np.inf if self.ran_out_s is None else self.ran_out_s)
 
     def take(self, rows: slice, name: str | None = None) -> ErrorSeries:
         """A contiguous piece of the record."""

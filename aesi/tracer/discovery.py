@@ -26,6 +26,7 @@ from aesi.tracer.case.records import PreparedRecord, prepare_all, prepare_test
 from aesi.tracer.decide.beside import gathered_beside
 from aesi.tracer.decide.evidence import Answer, Evidence, gathered
 from aesi.tracer.decide.model_choice import ModelChoice, with_model
+from aesi.tracer.decide.temperatures import fitted_at_fault, other_temperatures
 from aesi.tracer.decide.verdict import Thresholds, Verdict
 from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_state import ModelState
@@ -94,11 +95,12 @@ class Discovery:
     declared and after show.
     effects : by id, all that may be tried or moved.  tried : ids of those that competed, none where none may be added.
     experiments : (group of look-alikes, what would tell them apart).  choice : of the model of the cell.
-    not_adopted : why the written model has not what the verdict names, or is the declared one where a refit errs less.
+    not_adopted : why the written model has not what the verdict names, or is not the refit that errs less.
     notes : what was assumed, and what a reader should know of the records and the search.
     contradicted : whether what explains the data leaves more of the test part than a right explanation may.
-    warnings : that, where the written model does worse on the test part than another one, or on what was fitted than
-    the declared one, and where the test part has no load.
+    warnings : that, records that contradict their own temperature, where the written model does worse than another one
+    on the test part or on what was fitted, and where the test part has no load.
+    other_temperature : names of the records that contradict their own.
     seconds : spent.  simulations : of the hypotheses that were tried, without what judges them.
     """
 
@@ -119,6 +121,7 @@ class Discovery:
     notes: tuple[str, ...] = ()
     contradicted: bool = False
     warnings: tuple[str, ...] = ()
+    other_temperature: tuple[str, ...] = ()
     held: tuple[ActiveEffect, ...] = ()
     written: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     own: Mapping[State, tuple[OwnParameter, ...]] = field(default_factory=dict)
@@ -249,7 +252,10 @@ def _told(
     seconds: float,
 ) -> Discovery:
     problem, verdict = evidence.path.problem, evidence.verdict
-    records = problem.records
+    records, others = problem.records, other_temperatures(problem)
+    at_fault = fitted_at_fault(evidence.after, others)
+    if at_fault is not None:
+        evidence = replace(evidence, after=ModelState(problem), fault=at_fault, limits=())
     declared = ModelState(problem)
     states: States = {"before": declared, "recalibrated": evidence.recalibrated, "after": evidence.after}
     files = outcomes(records, states, tested, rng)
@@ -280,7 +286,11 @@ def _told(
         not_adopted=evidence.fault,
         notes=(choice.sentence, *_notes(evidence, tested, left), *emptied(files)),
         contradicted=contradicted_by_v(files, verdict) is not None,
-        warnings=warnings(files, verdict, REST_C_RATE * problem.cell.capacity_ah),
+        warnings=(
+            *(other.sentence(records[k].name) for k, other in others.items()),
+            *warnings(files, verdict, REST_C_RATE * problem.cell.capacity_ah),
+        ),
+        other_temperature=tuple(records[k].name for k in others),
         written={name: (evidence.after.values or {})[name] for name in evidence.after.hypothesis},
         own={state: own_parameters(states[state]) for state in ("recalibrated", "after")},
         tried=problem.competing(),

@@ -1,4 +1,4 @@
-"""Pages made at build time: catalogue of effects, benchmarks, command line, and files of the repository."""
+"""Pages made at build time: effects, benchmarks, commands, keys of experiments, and files of the repository."""
 
 from __future__ import annotations
 
@@ -90,18 +90,10 @@ def over_time() -> str:
 
 
 def speed() -> str:
-    """How fast both models are beside PyBaMM's, and how close to a fine mesh, from the newest recorded lines."""
+    """How fast it is beside its peers, and how close to a fine mesh, from the newest recorded lines."""
     from flows.benchmarks.history import latest
 
-    lines = [line for _, line in latest(_history()).values()]
-    parts = []
-    for bench, words in (("espm", "The single particle"), ("dfn", "the porous electrode")):
-        line = next((line for line in lines if line["bench"] == bench and line.get("ratio")), None)
-        if line is not None:
-            parts.append(
-                f"{words} {line['ratio']:.0f} times as fast as PyBaMM's, {line['rmse_mv']:.2g} mV RMSE off a fine mesh"
-            )
-    return "; ".join(parts) or "No run has been recorded"
+    return str(_hook("speed")["speed"]([line for _, line in latest(_history()).values()]))
 
 
 def dfn_curve() -> str:
@@ -112,9 +104,23 @@ def dfn_curve() -> str:
     return str(_hook("curve")["curve"](lines))
 
 
+def bands() -> str:
+    """The free-run bands of virtual cells in short, from the newest recorded lines."""
+    return str(_hook("recorded")["bands"](_history()))
+
+
+def experiment() -> str:
+    """Every key of an experiment file, a table a section."""
+    from aesi.conformal import COMPARED, METHODS
+    from aesi.pipeline.experiment.config import ExperimentConfig, model_names
+
+    choices = {"models": model_names(), "conformal.method": METHODS, "conformal.compare": COMPARED}
+    return str(_hook("experiment")["tables"](ExperimentConfig, choices))
+
+
 def _hook(name: str) -> dict[str, Any]:
-    """What another file of this folder defines: mkdocs imports a hook by its path, without a package."""
-    return run_path(str(Path(__file__).with_name(f"{name}.py")))
+    """What a file of `parts/` defines: mkdocs imports a hook by its path, without a package."""
+    return run_path(str(Path(__file__).with_name("parts") / f"{name}.py"))
 
 
 def _history() -> list[Any]:
@@ -167,6 +173,8 @@ GENERATORS: dict[str, Callable[[], str]] = {
     "over time": over_time,
     "speed": speed,
     "dfn curve": dfn_curve,
+    "bands in short": bands,
+    "experiment": experiment,
     "command line": command_line,
     "contributing": contributing,
     "changelog": changelog,

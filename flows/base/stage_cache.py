@@ -41,7 +41,10 @@ class Cache:
         try:
             write_whole(path, codec.dumps(result))
         except codec.Uncodable:  # a fitted object of another library would be unsafe to unpickle
-            self._say(f"{stage}: not kept for a resumed run, which makes it again")
+            self._say(
+                f"{stage}: done, but no result that can be stored: where this run is stopped and resumed, it is "
+                "computed again"
+            )
         except OSError as error:
             self._say(f"cache: the result of {stage!r} could not be stored ({error.strerror or error}).")
         return result

@@ -226,11 +226,10 @@ def _track_result(tracker: Tracker | None, found: Discovery, content: dict[str, 
 
 def _say(console: Console, content: dict[str, Any], notes: Sequence[str], out: Path, started: float) -> None:
     from aesi.pipeline.notes import together
-    from aesi.pipeline.report.words.discoveries import name_confidence, reason_finding, unchanged_finding
+    from aesi.pipeline.report.words.discoveries import reason_finding, short_finding, unchanged_finding
     from aesi.pipeline.report.words.moved import moved_findings
-    from aesi.pipeline.report.words.sizes import finding_line
 
-    console.say(finding_line(content) + name_confidence(content))
+    console.say(short_finding(content, sure=True))
     for warning in content["warnings"]:
         console.say(f"  WARNING: {warning}")
     console.say(f"  {reason_finding(content)}")

@@ -8,8 +8,10 @@ import sys
 import tomllib
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from typing import get_args
 
 import pytest
+from pydantic import BaseModel
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -48,6 +50,86 @@ def test_every_command_is_on_the_command_line_page():
         assert f"## aesi {command}\n" in page
 
 
+def sections_of_an_experiment(section, name=""):
+    """Each section with its dotted name, by the annotations alone."""
+    yield name, section
+    for key, field in section.model_fields.items():
+        for each in (field.annotation, *get_args(field.annotation)):
+            if isinstance(each, type) and issubclass(each, BaseModel) and name != "fallback":
+                yield from sections_of_an_experiment(each, f"{name}.{key}".lstrip("."))
+
+
+def test_every_key_of_an_experiment_is_in_its_table_with_unit_default_and_meaning():
+    from aesi.pipeline.experiment.config import ExperimentConfig
+
+    page = hook("generate").experiment()
+    tables = dict(re.findall(r"^### (.*)\n\n.*\n\n((?:\|.*\n)+)", page, re.MULTILINE))
+    sections = dict(sections_of_an_experiment(ExperimentConfig))
+    assert set(tables) == {f"`{name}`" if name else "The file itself" for name in sections}
+    for name, section in sections.items():
+        lines = tables[f"`{name}`" if name else "The file itself"].splitlines()[2:]
+        rows = {line.split("`")[1]: [cell.strip() for cell in line[1:-1].split(" | ")] for line in lines}
+        assert set(rows) == set(section.model_fields) - {"base"}
+        for key, (_, kind, unit, default, meaning) in rows.items():
+            field = section.model_fields[key]
+            assert kind
+            assert len(meaning) > 8, f"{name}.{key}: {meaning}"
+            ending = key.rpartition("_")[2]
+            assert unit == {"s": "s", "mb": "MB"}.get(ending, unit), f"{name}.{key} in {unit}"
+            assert (default == "required") == field.is_required()
+            if default.startswith("`"):
+                plain = list(field.default) if isinstance(field.default, tuple) else field.default
+                assert json.loads(default.strip("`")) == plain
+
+
+def test_a_key_that_nobody_described_builds_no_table():
+    class Section(BaseModel):
+        """A section.
+
+        told : s, what it is.
+        """
+
+        told: float = 1.0
+        untold: int = 2
+
+    experiment = hook("parts/experiment")
+    assert experiment.unit_of(experiment.told(Section)["told"]) == ("s", "what it is")
+    with pytest.raises(KeyError, match="untold"):
+        experiment.tables(Section, {})
+
+
+def test_the_bands_of_virtual_cells_are_of_the_newest_run(tmp_path, monkeypatch):
+    generate = hook("generate")
+    (tmp_path / "docs").mkdir()
+    monkeypatch.setattr(generate, "ROOT", tmp_path)
+    assert "No run has been recorded" in generate.bands()
+    entry = {"machine": "a machine", "commit": "0123456789", "load": None}
+    figures = ("coverage_pct", "coverage_se_pct", "coverage_sd_pct", "worst_bin_coverage_pct", "width_mv")
+    line = dict(zip(figures, (90.04, 0.71, 3.5, 88.0, 10.0), strict=True))
+    line |= {
+        "bench": "bands",
+        "method": "scaled",
+        "cells": 24,
+        "interval_score_mv": 12.0,
+        "score_ratio": 1.234,
+    }
+    older = [{**line, "layout": "all", "horizon_s": None, "coverage_pct": 80.0}]
+    newer = [
+        {**line, "layout": "repeats", "horizon_s": 1.0},
+        {**line, "layout": "repeats", "horizon_s": 1.0, "method": "one width"},
+        {**line, "layout": "all", "horizon_s": None},
+    ]
+    entries = [
+        {**entry, "date": "2026-01-01", "lines": older},
+        {**entry, "date": "2026-02-01", "lines": newer},
+    ]
+    (tmp_path / "docs" / "benchmarks.json").write_text(json.dumps({"entries": entries}))
+    assert [row for row in generate.bands().splitlines() if row.startswith("| ")][1:] == [
+        "| all | scaled | whole drive | 90.0 ± 0.7 | 3.5 | 88.0 | 10.0 | 12.0 | 1.23 |",
+        "| repeats | scaled | 1 s | 90.0 ± 0.7 | 3.5 | 88.0 | 10.0 | 12.0 | 1.23 |",
+    ]
+
+
 def test_benchmarks_come_from_the_recorded_lines_alone(tmp_path, monkeypatch):
     generate = hook("generate")
     (tmp_path / "docs").mkdir()
@@ -75,6 +157,26 @@ def test_benchmarks_come_from_the_recorded_lines_alone(tmp_path, monkeypatch):
     assert "| peer_s | – |" in page
     moved = "| scale | dask, 9, 3, 2 | ratio_by_processor | 1.9 (2026-01-01) → 1.8 (2026-02-01) |"
     assert moved in generate.over_time()
+
+
+def test_the_answer_on_speed_names_every_peer_that_was_timed():
+    speed = hook("parts/speed").speed
+    assert speed([]) == "No run has been recorded"
+    lines = [
+        {"bench": "espm", "ratio": 250.4, "rmse_mv": 0.0424},
+        {"bench": "dfn", "ratio": None, "rmse_mv": 0.2},
+        {"bench": "spci", "method": "enbpi", "peer": "MAPIE EnbPI", "ratio": 24.1, "score_ratio": 2.3},
+        {"bench": "spci", "method": "split", "peer": "MAPIE ACI", "ratio": 9e4, "score_ratio": 2.9},
+        {"bench": "spci", "method": "spci_boosted", "peer": "SPCI", "ratio": 561_070.0, "score_ratio": 1.032},
+        {"bench": "ensemble", "peer": "PySINDy STLSQ", "ratio": 210.7},
+        {"bench": "ensemble", "peer": "PySINDy STLSQ", "ratio": 969.4},
+    ]
+    assert speed(lines) == (
+        "The single particle 250 times as fast as PyBaMM's, 0.042 mV RMSE off a fine mesh; intervals one step ahead by "
+        "`enbpi` 24 times as fast as MAPIE EnbPI, the default `spci_boosted` some 560,000 times as fast as SPCI, "
+        "which is refitted at every step, with an interval score 1.03 times the best possible; a search's ensembles "
+        "211 to 969 times as fast as PySINDy STLSQ on the same resamples"
+    )
 
 
 def test_lines_of_two_kinds_stand_in_two_tables_and_many_are_folded_away(tmp_path, monkeypatch):
@@ -208,6 +310,35 @@ def test_what_the_page_of_the_cells_says_in_short_is_what_its_table_says():
         in short
     )
     assert f"| {said(told(both, 'aged', '25degC'))} | {but_one(told(both, 'aged', *cold))} |" in short
+
+
+def test_the_medians_that_the_page_of_the_cells_begins_with_are_those_of_its_archives():
+    page = (ROOT / "docs" / "cells.md").read_text(encoding="utf-8")
+    short, rest = page.split("## Every record")
+    table = rest.split("<!-- table of aesi bench cells, archive -->")[1].split("\n\n")[0]
+    rows = [[cell.strip() for cell in line[1:-1].split("|")] for line in table.strip().splitlines()]
+    column = rows[0].index("with temperature")
+    medians = {(row[0], row[1]): round(float(row[column].split()[0])) for row in rows[2:]}
+    said = re.findall(r"^\| (-?\d+) °C \| (\d+) \| (\d+)", short, re.MULTILINE)
+    assert [chamber for chamber, *_ in said] == ["25", "10", "0", "-10", "-20"]
+    for chamber, panasonic, hg2 in said:
+        assert medians["panasonic_ncr18650pf", f"{chamber} degC"] == int(panasonic)
+        folder = "40" if chamber == "25" else chamber
+        assert medians["lg_18650hg2", f"{folder} degC"] == int(hg2)
+
+
+@pytest.mark.parametrize(("name", "least"), [("limits.md", 25), ("index.md", 4)])
+def test_figures_in_short_stand_on_the_pages_that_they_link_to(name, least):
+    page = ROOT / "docs" / name
+    rows = [line[1:-1].split(" | ") for line in page.read_text(encoding="utf-8").splitlines() if "](" in line]
+    rows = [row for row in rows if len(row) == 3]
+    assert len(rows) >= least
+    for where, told, links in rows:
+        pages = {page.parent / target for target in re.findall(r"\]\(([^)#]+)", links)}
+        text = " ".join(each.read_text(encoding="utf-8") for each in pages)
+        for figure in re.findall(r"(?<![\w.])\d+(?:\.\d+)?", f"{where} {told}"):
+            found = re.search(rf"(?<![\d.]){re.escape(figure)}(?!\d|\.\d)", text)
+            assert found, f"{figure} of: {where} | {told}"
 
 
 def test_every_formula_of_the_documentation_is_understood():

@@ -1,6 +1,6 @@
 """`import aesi` at a prompt: what it offers, what it shows, and what it says of what cannot be meant."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import date
 from functools import partial
 from pathlib import Path
@@ -13,8 +13,10 @@ import pytest
 import aesi
 from aesi.calibration import calibrate as fit_cell
 from aesi.data.read import examined
+from aesi.data.spectra import read_spectra
 from aesi.errors import DataError, InputError
 from aesi.physics.effects import CATALOGUE
+from aesi.pipeline import api
 from aesi.records import Spectrum
 
 CELL = Path(__file__).resolve().parents[2] / "experiments" / "cells" / "nmc_30ah.bpx.json"
@@ -365,6 +367,40 @@ def test_what_is_said_of_records_in_a_form_that_nothing_reads_was_an_error_of_py
 ):
     with pytest.raises(InputError, match=sentence):
         aesi.calibrate(cell, record, **said)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Of a fit that was not made."""
+
+    notes: tuple[str, ...] = ()
+
+
+def test_spectra_were_fitted_by_the_command_line_alone(cell, record, tmp_path, monkeypatch):
+    frequency = np.array([0.1, 1.0, 10.0, 1000.0])
+    z_ohm = aesi.impedance(cell, frequency, soc=0.6)
+    rows = {"frequency_hz": frequency, "z_real_ohm": z_ohm.real, "z_imag_ohm": z_ohm.imag, "soc": 0.6}
+    pd.DataFrame(rows).to_csv(tmp_path / "eis.csv", index=False)
+    (read,) = read_spectra(tmp_path / "eis.csv")
+    asked = []
+
+    def fitted(cell, records, conditions):
+        asked.append(conditions)
+        return Answer()
+
+    monkeypatch.setattr(api, "fit_cell", fitted)
+    for given in (tmp_path / "eis.csv", str(tmp_path / "eis.csv"), read, [read]):
+        aesi.calibrate(cell, record, spectra=given)
+    assert [[one.digest for one in each.spectra] for each in asked] == 4 * [[read.digest]]
+    with pytest.raises(
+        InputError, match="spectra: an object of type int is no spectrum; give a file of spectra"
+    ):
+        aesi.calibrate(cell, record, spectra=3)
+    with pytest.raises(DataError, match="is there twice"):
+        aesi.calibrate(cell, record, spectra=[read, read])
+    milliohm = replace(read, z_ohm=1e3 * read.z_ohm)
+    with pytest.raises(DataError, match="as of no cell"):
+        aesi.calibrate(cell, record, spectra=milliohm)
 
 
 def test_arrays_in_another_unit_were_told_options_of_the_command_line_alone(cell, record):

@@ -17,12 +17,17 @@ from aesi.numerics.typing import Array, BoolArray
 
 HIGHEST_VOLTAGE_V = 6.0
 """No lithium cell reaches it, and two in series exceed it."""
+LOWEST_TYPICAL_V = 0.5
+"""In the median, of one cell: those of lithium titanate rest at 2 V, and below 1 V nothing is sold."""
 HIGHEST_PLAIN_VOLT = 1000.0
 """A typical voltage above it is one in millivolts."""
 HIGHEST_CURRENT_A = 20_000.0
 """Above what any single cell takes; a smaller current in mA is told by `check_scale`."""
 ENOUGH_ROWS = 10
 """From which a voltage that never changes is one that does not answer."""
+ROUNDED_SHARE = 0.2
+"""Of the rows: more that share a stamp with the one before, and differ from it, are a time that was rounded. Cyclers
+write the end of a step and the start of the next with one stamp: 0.4 % of the rows at most in 212 of their files."""
 CLOCK_JUMPS_S = (SECONDS_PER_HOUR, 24 * SECONDS_PER_HOUR)
 """By which a time of day runs back: the end of daylight saving, and midnight."""
 MOST_RELAXED_V = 0.5
@@ -82,6 +87,25 @@ def check_time(time_s: Array, context: Context) -> None:
     )
 
 
+def check_resolution(columns: Columns, context: Context) -> None:
+    """Refuse stamps that stand for several rows each all along: the time was rounded, and one row of each is a part of
+    what was measured."""
+    time_s = columns["time_s"]
+    same = np.diff(time_s) == 0
+    others = [np.diff(column) != 0 for name, column in columns.items() if name in ("current_a", "voltage_v")]
+    several = same & np.any(others, axis=0)
+    if int(np.sum(several)) <= ROUNDED_SHARE * len(time_s):
+        return
+    row, apart = int(np.argmax(several)) + 1, np.diff(np.unique(time_s))
+    every = f" {np.median(apart):.4g} s apart" if apart.size else ""
+    raise DataError(
+        f"{context.at('time_s', row)}: {np.mean(several):.0%} of the rows have the stamp of the row before and another "
+        f"current or voltage: the time was written too coarsely for the rate of the rows, with stamps{every}; export "
+        "it with its decimals, or the whole date and time. (--duplicates first would keep one row of each and drop "
+        "the rest.)"
+    )
+
+
 def _disorder(time_s: Array, step: Array) -> str:
     """What kind of times run back, and what to do about it, from '; ' on.
 
@@ -98,7 +122,11 @@ def _disorder(time_s: Array, step: Array) -> str:
             "test, or split the file there."
         )
     if len(first) == 1:
-        return "; one file should hold one continuous test: split it there."
+        again = ", and starts again there, as that of a second test does"
+        return (
+            f"{again if anew <= np.median(np.abs(step)) else ''}; one file should hold one continuous test: split it "
+            "there."
+        )
     if np.all(first <= np.min(time_s) + np.median(np.abs(step))):
         return (
             f", and begins anew {len(first)} times, as the time of a step does: name the column of the whole test's "
@@ -124,6 +152,13 @@ def check_ranges(columns: Columns, context: Context) -> None:
             f"{context.at('voltage_v', row)}: {voltage[row]:.6g} V is not the voltage of one cell (above 0 "
             f"and at most {HIGHEST_VOLTAGE_V:g} V; rows like it: {int(np.sum(bad))}): check the column and its unit"
             f"{_without_an_end(columns['time_s'], bad)}."
+        )
+    if typical < LOWEST_TYPICAL_V:
+        taken = context.unit.get("voltage_v", "V")
+        told = "" if taken == "V" else f", taken in {taken} as declared or as its header says"
+        raise DataError(
+            f"{context.at('voltage_v', 0)}: the voltage is {typical:.4g} V in the median{told}, which is that of no "
+            "cell: check its unit, and whether a sign between thousands was read as a decimal one."
         )
     large = np.abs(current) > HIGHEST_CURRENT_A
     if np.any(large):

@@ -178,10 +178,21 @@ class _Finder:
         for quantity in sorted(leave.keys() - self.position.keys() - self.given.keys()):
             name = headers.nearest(quantity, self._table.header, doubtful=quantity not in REQUIRED)
             if name is not None:
+                others = self._other_temperatures(name) if quantity == "temperature_degc" else ""
+                also = f"; there is also {others}" if others else ""
                 self.notes.append(
                     f"Column {name!r} looks like a {quantity.partition('_')[0]} and is not used; "
-                    f"{headers.of_column(quantity, name)} takes it{leave[quantity]}."
+                    f"{headers.of_column(quantity, name)} takes it{leave[quantity]}{also}."
                 )
+        if "temperature_degc" in self.position:
+            taken = self._table.header[self.position["temperature_degc"]]
+            if others := self._other_temperatures(taken):
+                self.notes.append(f"The temperature was taken from column {taken!r}, and not from {others}.")
+
+    def _other_temperatures(self, name: str) -> str:
+        """The columns that look like a temperature beside this one, and are not the same in another unit, in words."""
+        every = headers.temperatures(self._table.header)
+        return names_listed(other for other in every if headers.stem(other) != headers.stem(name))
 
     def mapped(self) -> Mapped:
         """What was found."""
@@ -275,6 +286,8 @@ class _Finder:
             )
         elif units.spelt(quantity, below):
             unit = units.spelt(quantity, below) or ""
+            if unit != units.SI[quantity] and self._table.format is None:
+                self.notes.append(f"{quantity} was converted from {unit}, as the line of units says.")
         elif known:
             unit = known
         else:

@@ -12,18 +12,21 @@ LIKELY = {
     "time_s": r"time|zeit|elapsed|\bt\b|^t$|duration",
     "current_a": r"current|strom|\bamps?\b|\bi\b|^<?i>?\b|ampere",
     "voltage_v": r"volt|spannung|ecell|ewe|potential|\b[uv]\b",
-    "temperature_degc": r"temp|°c|degc|celsius|thermo|\bt[ck]?\d\b|\bt[ _]?(cell|can|case|surf|skin|batt|core)",
+    "temperature_degc": r"temp|°[cf]|deg[cf]|celsius|thermo|\bt[ck]?\d\b|"
+    r"\bt[ _]?(cell|can|case|surf|skin|batt|core|amb|chamber|env|room)",
     "state": r"^(state|status|step type|mode|md|command|zustand|direction)\b",
 }
 UNLIKELY = {
     "time_s": r"step|rest\b|date|stamp|real|absolute|cycle|dpt|dt\b|/dt",
     "current_a": r"density|range|limit|capacity|control|set\b|rate|time|temp|dq|power|shunt|offset",
     "voltage_v": r"limit|control|set\b|max|min|dv|range|aux|offset|power|upper|lower",
-    "temperature_degc": r"time|/dt|set\b|limit|circuit|ambient|chamber|env",
+    "temperature_degc": r"time|/dt|set\b|limit|circuit|\bamb|chamber|env|room|umgebung|kammer",
     "state": r"time|of charge|soc",
 }
 WHOLE_TIME = r"total|test|cumul|elapsed"
 """Of the names of a time: beside one of these a bare 'Time' begins anew with each step."""
+NO_TEMPERATURE = r"time|/dt|set\b|limit|circuit"
+"""Of the names of what only looks like a temperature."""
 UNIT = re.compile(
     r"[\[(<]\s*([^\])>]+?)\s*[\])>]\s*$|[/#]\s*([^/#\[\](){}]+?)\s*$|[_ ]\s*([^/_ \[\](){}]+)\s*$"
 )
@@ -37,6 +40,22 @@ def nearest(quantity: str, header: Sequence[str], doubtful: bool = False) -> str
     likely = [name for name in header if quantity in LIKELY and re.search(LIKELY[quantity], plain(name))]
     best = min(likely, key=lambda name: _doubt(quantity, name), default=None)
     return best if best is None or doubtful or not _doubt(quantity, best)[0] else None
+
+
+def temperatures(header: Sequence[str]) -> list[str]:
+    """The columns that look like temperatures, of the cell or of what is around it, the likeliest of the cell's
+    first."""
+    like = [name for name in header if re.search(LIKELY["temperature_degc"], plain(name))]
+    return sorted(
+        (name for name in like if not re.search(NO_TEMPERATURE, plain(name))),
+        key=lambda name: _doubt("temperature_degc", name),
+    )
+
+
+def stem(name: str) -> str:
+    """A column's name without its unit."""
+    found = UNIT.search(name)
+    return plain(name[: found.start()] if found else name)
 
 
 def unit_in(name: str) -> str:

@@ -14,9 +14,11 @@ from itertools import pairwise
 import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
+from aesi.data import units
 from aesi.data.channels.checks import Columns, Context
 from aesi.data.channels.gaps import find_gaps
 from aesi.data.channels.headers import nearest
+from aesi.data.channels.stamps import longer_unit
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 
@@ -77,25 +79,24 @@ def check_scale(columns: Columns, context: Context) -> None:
     row = int(np.argmax(np.abs(current)))
     if resistance is not None and resistance < LOWEST_RESISTANCE_OHM:
         raise DataError(
-            f"{context.at('current_a', row)}: {current[row]:.6g} A is plainly in mA (its steps would show "
-            f"{resistance * 1e6:.3g} microohm); give it in A, or declare it: --unit current_a=mA."
+            f"{context.at('current_a', row)}: {current[row]:.6g} A would show {resistance * 1e6:.3g} microohm at its "
+            f"steps: {in_another_unit(context, 'it is plainly in mA', current_a='mA')}."
         )
     if moved > HIGHEST_CHARGE_AH:
         if resistance is not None and moved * resistance > HIGHEST_CHARGE_RESISTANCE_OHM_AH:
             raise DataError(
                 f"{context.at('time_s', len(time) - 1)}: {moved:.4g} Ah would have moved, which "
                 f"a cell that shows {resistance * 1e3:.3g} mohm at the steps of its current does not hold: "
-                "the time is in ms; give it in s, or declare it: --unit time_s=ms."
+                f"{in_another_unit(context, 'the time is in ms', time_s='ms')}."
             )
         if resistance is not None:
             raise DataError(
-                f"{context.at('current_a', row)}: {current[row]:.6g} A is plainly in mA ({moved:.4g} Ah would have "
-                "moved); give it in A, or declare it: --unit current_a=mA."
+                f"{context.at('current_a', row)}: at {current[row]:.6g} A {moved:.4g} Ah would have moved: "
+                f"{in_another_unit(context, 'it is plainly in mA', current_a='mA')}."
             )
         raise DataError(
-            f"{context.at('current_a', row)}: {current[row]:.6g} A is plainly in mA, or the time in ms "
-            f"({moved:.4g} Ah would have moved); give A and s, or declare it: "
-            "--unit current_a=mA, or --unit time_s=ms."
+            f"{context.at('current_a', row)}: at {current[row]:.6g} A {moved:.4g} Ah would have moved: "
+            f"{in_another_unit(context, 'it is plainly in mA, or the time in ms', current_a='mA', time_s='ms')}."
         )
     if resistance is not None:
         _check_slide(columns, context, moved, resistance)
@@ -112,15 +113,35 @@ def _check_slide(columns: Columns, context: Context, moved_ah: float, resistance
         raise DataError(
             f"{context.at('time_s', last)}: the voltage slides by {slide:.2f} V while {1e3 * moved_ah:.3g} mAh move in "
             f"{columns['time_s'][last] - columns['time_s'][0]:.3g} s, of a cell that shows {resistance_ohm * 1e3:.3g} "
-            "mohm at the steps of its current; the time is in another unit, give it in s, or declare it: "
-            "--unit time_s=h, or min."
+            f"mohm at the steps of its current: {_longer_unit(columns, context)}."
         )
     if moved_ah * resistance_ohm > MOST_CHARGE_RESISTANCE_AH_A * max(slide, FLAT_V):
         raise DataError(
             f"{context.at('time_s', last)}: {moved_ah:.4g} Ah would have moved while the voltage slides by {slide:.2f} "
-            f"V, of a cell that shows {resistance_ohm * 1e3:.3g} mohm at the steps of its current; the time is in ms, "
-            "give it in s, or declare it: --unit time_s=ms."
+            f"V, of a cell that shows {resistance_ohm * 1e3:.3g} mohm at the steps of its current: "
+            f"{in_another_unit(context, 'the time is in ms', time_s='ms')}."
         )
+
+
+def in_another_unit(context: Context, claim: str, **units_of: str) -> str:
+    """What is wrong with numbers that are no cell's: `claim`, and how to say so; of columns that were not taken in SI,
+    that they were not.
+
+    units_of : quantity -> the unit that its numbers rather are in.
+    """
+    taken = {quantity: context.unit.get(quantity, units.SI[quantity]) for quantity in units_of}
+    other = [
+        f"{quantity} was taken in {unit}" for quantity, unit in taken.items() if unit != units.SI[quantity]
+    ]
+    if other:
+        return f"{' and '.join(other)}, as declared or as its header says; check that first"
+    wanted = " and ".join(units.SI[quantity] for quantity in units_of)
+    options = ", or ".join(f"--unit {quantity}={unit}" for quantity, unit in units_of.items())
+    return f"{claim}; give {wanted}, or declare it: {options}"
+
+
+def _longer_unit(columns: Columns, context: Context) -> str:
+    return in_another_unit(context, "the time is in another unit", time_s=longer_unit(columns["time_s"]))
 
 
 def step_resistance_ohm(columns: Columns) -> float | None:
@@ -177,8 +198,7 @@ def _check_pace(columns: Columns, context: Context) -> None:
         if slide > SLIDE_V and seconds < FASTEST_SLIDE_S:
             raise DataError(
                 f"{context.at('time_s', rows.start)}: the voltage moves by {slide:.2f} V in {seconds:.3g} s of one "
-                "held current, faster than any cell's; the time is in another unit, give it in s, or declare it: "
-                "--unit time_s=h, or min."
+                f"held current, faster than any cell's: {_longer_unit(columns, context)}."
             )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.data import units
 from aesi.data.channels import headers
-from aesi.data.channels.checks import Columns, Context
+from aesi.data.channels.checks import Columns, Context, check_resolution
 from aesi.data.channels.columns import QUANTITIES, Mapped, map_columns
 from aesi.data.readers.table import TableFile
 from aesi.data.reading import Duplicates, Reading, bounds
@@ -41,6 +41,8 @@ def load_columns(
     data = {quantity: column for quantity, column in data.items() if quantity in QUANTITIES}
     data, context = _window(data, context, reading, notes)
     duplicates: Duplicates = reading.duplicates or ("first" if mapped.maker else "refuse")
+    if reading.duplicates is None:
+        check_resolution(data, context)
     data, context = _without_duplicates(data, context, duplicates, notes)
     return data, context, mapped, notes
 

@@ -31,7 +31,16 @@ def find_impedance(table: TableFile) -> dict[str, tuple[int, float]]:
 
     Raises DataError for one that is there twice, and for one under another name that says no unit.
     """
-    found = {quantity: _found(table, quantity) for quantity in NEEDED}
+    return _with_factors(table, NEEDED)
+
+
+def find_frequency(table: TableFile) -> tuple[int, float] | None:
+    """Position and factor to Hz of the frequency alone; raises as `find_impedance`."""
+    return _with_factors(table, NEEDED[:1]).get("frequency_hz")
+
+
+def _with_factors(table: TableFile, quantities: Sequence[str]) -> dict[str, tuple[int, float]]:
+    found = {quantity: _found(table, quantity) for quantity in quantities}
     without = [table.header[at[0]] for at in found.values() if at and at[1] is None]
     if without:
         say = "says" if len(without) == 1 else "say"

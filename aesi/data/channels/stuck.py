@@ -1,4 +1,5 @@
-"""A voltage that stands still while the current moves: a sensor that failed, or what a cycler holds."""
+"""A voltage that stands still while the current moves, or a current while the voltage does: a sensor that failed, or
+what a cycler holds."""
 
 from __future__ import annotations
 
@@ -21,6 +22,69 @@ that end so do at most 1.5 mV below."""
 HOLD_SHARE = 0.1
 """By which share of its largest the current may come back while the voltage is held: by 0.034 in a chamber that sways
 by 3.5 K at -20 degC, and by 0.19 and more in long stretches of braking whose voltage stays within 10 mV."""
+TURN_V = 0.05
+"""By which a voltage rises and falls for a turn to count. Under one current it goes one way: in 137 records no stretch
+of one value of the current has a single turn by 0.01 V. A drive whose current was set to 0 for 1000 s turns 37 times by
+this."""
+OF_MEDIAN = 1.4826
+"""Deviations in the median size of what is normally distributed."""
+FAR_ROWS = 3.0
+"""Times the median interval: what the cell did between rows further apart, as those of the rests of a test alone, is
+not known."""
+NOISES = 10.0
+"""Times the noise of the voltage, which a turn is beyond."""
+
+
+def check_dead(columns: Columns, context: Context) -> None:
+    """Refuse a current of one value throughout a stretch of rows in which the voltage goes up and down: after a load it
+    relaxes, and under a held current slides, one way."""
+    current, voltage, time = columns["current_a"], columns["voltage_v"], columns["time_s"]
+    if len(voltage) < ENOUGH_STEPS:
+        return
+    least = max(TURN_V, NOISES * _noise_v(voltage), CLEAR_RESOLUTIONS * _resolution_v(voltage))
+    step = np.diff(time)
+    goes_on = (np.diff(current) == 0) & (step <= FAR_ROWS * np.median(step))
+    ends = np.concatenate([[-1], np.flatnonzero(~goes_on), [len(current) - 1]])
+    for k in np.flatnonzero(np.diff(ends) > 2 * ENOUGH_STEPS):
+        begin, end = int(ends[k]) + 1, int(ends[k + 1])
+        turns = _turns(voltage[begin : end + 1], least)
+        if turns >= 2 * ENOUGH_STEPS:
+            rows = end - begin + 1
+            sides = [f"--to-s {time[begin]:.10g}"] * (begin > 0)
+            sides += [f"--from-s {time[end]:.10g}"] * (end < len(current) - 1)
+            where = f"{rows:,} rows, up to {time[end]:.10g} s," if sides else f"all {rows:,} rows"
+            aside = f", or read one side of it: {' or '.join(sides)}" if sides else ""
+            raise DataError(
+                f"{context.at('current_a', begin)}: the current is {current[begin]:.6g} A in {where} while the voltage "
+                f"turns {turns} times, rising and falling by more than {least:.2g} V, which only a current makes it "
+                f"do; check the sensor or the column{aside}."
+            )
+
+
+def _turns(voltage: Array, least_v: float) -> int:
+    """How often a voltage (n,) that has risen by so much falls by so much again, or the other way round."""
+    if np.ptp(voltage) < least_v:
+        return 0
+    turns, way, low, high = 0, 0, float(voltage[0]), float(voltage[0])
+    for here in voltage.tolist():
+        low, high = min(low, here), max(high, here)
+        if way >= 0 and high - here >= least_v:
+            turns, way, low, high = turns + (way != 0), -1, here, here
+        elif way <= 0 and here - low >= least_v:
+            turns, way, low, high = turns + (way != 0), 1, here, here
+    return turns
+
+
+def _noise_v(voltage: Array) -> float:
+    """V, one deviation of what single rows scatter by: of a smooth voltage, second differences are noise alone, and of
+    one that moves they are more."""
+    second = np.abs(np.diff(voltage, 2))
+    return float(np.median(second)) * OF_MEDIAN / np.sqrt(6.0)
+
+
+def _resolution_v(voltage: Array) -> float:
+    moves = np.abs(np.diff(voltage))
+    return _smallest(moves) if moves.any() else 0.0
 
 
 def check_stuck(columns: Columns, context: Context) -> None:

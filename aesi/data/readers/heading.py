@@ -17,7 +17,7 @@ KNOWN = ("time_s", "current_a", "voltage_v", "test time / s", "current / a", "vo
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?inf(inity)?", re.ASCII | re.IGNORECASE)
 WITH_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?", re.ASCII)
 UNIT_CELL = re.compile(
-    r"[\[(<]?\s*(s|sec|ms|min|h|hr|d|hh:mm:ss(\.\w+)?|h:m(in)?:s|[mkµu]?a|[mkµu]?v|°?c|degc|k|%|[mk]?ah|[mk]?wh|"
+    r"[\[(<]?\s*(s|sec|ms|min|h|hr|d|hh:mm:ss(\.\w+)?|h:m(in)?:s|[mkµu]?a|[mkµu]?v|°?[cf]|deg[cf]|k|%|[mk]?ah|[mk]?wh|"
     r"[mk]?w|[mµu]?ohm|[mµu]?ω|[mk]?hz|cnt|#|-|1)?\s*[\])>]?|\[[^\[\]]*\]",
     re.IGNORECASE,
 )

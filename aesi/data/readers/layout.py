@@ -22,6 +22,7 @@ from aesi.data.readers.heading import (
 from aesi.errors import DataError
 
 COMMENT = "#"
+THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
 BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
     (codecs.BOM_UTF32_LE, "utf-32"),
@@ -168,10 +169,14 @@ def _as_wide_as_the_rows(header: tuple[str, ...], below: Sequence[str], separato
 
 
 def _decimal(lines: list[str], separator: str) -> str:
-    """A comma, where cells are separated otherwise and more of the first ones have a comma than a point."""
-    if separator == ",":
-        return "."
-    cells = [cell.strip() for line in lines for cell in line.split(separator)]
-    commas = sum(bool(WITH_COMMA.fullmatch(cell)) for cell in cells)
+    """A comma, where more of the first cells have a comma than a point.
+
+    Between commas such cells are quoted, and a comma may be one between thousands, which has three digits behind it
+    and none but 1 to 9 in front: where all are so, it is left to be refused.
+    """
+    cells = [cell.strip() for line in lines for cell in split(line, separator)]
+    with_comma = [cell for cell in cells if WITH_COMMA.fullmatch(cell)]
     points = sum("." in cell and bool(NUMBER.fullmatch(cell)) for cell in cells)
-    return "," if commas > points else "."
+    if separator == "," and all(THOUSANDS.fullmatch(cell) for cell in with_comma):
+        return "."
+    return "," if len(with_comma) > points else "."

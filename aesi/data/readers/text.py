@@ -31,6 +31,7 @@ HEAD_BYTES = 1 << 18
 BLOCK_BYTES = 1 << 22
 """Of a file that is converted at a time; it bounds the memory beyond the numbers."""
 MISSING = ("", "nan", "NaN", "NAN", "NA", "N/A", "n/a", "#N/A", "null", "NULL", "None", "-nan", "-NaN")
+MINUS = "\N{MINUS SIGN}"
 DAMAGED = (EOFError, zlib.error, gzip.BadGzipFile)
 
 
@@ -196,7 +197,7 @@ class TextTable:
             if cell not in MISSING and not _is_number(cell, self._layout.decimal):
                 raise DataError(
                     f"{place}: column {self.header[position]!r} holds {cell[:40]!r}, which is not a "
-                    f"number{_advice(cell, self._layout)}."
+                    f"number{_advice(cell, self.header[position], self._layout)}."
                 )
 
     def _damaged(self, error: Exception) -> DataError:
@@ -221,7 +222,12 @@ def _is_number(cell: str, decimal: str) -> bool:
     return bool(NUMBER.fullmatch(cell.replace(decimal, "."))) and (decimal == "." or "." not in cell)
 
 
-def _advice(cell: str, layout: Layout) -> str:
+def _advice(cell: str, name: str, layout: Layout) -> str:
+    """What to do about a cell that is no number, in the column of that name; from ': ' or ', ' on."""
+    if cell == name:
+        return ": a second table begins there, below the names of its columns; split the file there"
+    if _is_number(cell.replace(MINUS, "-"), layout.decimal):
+        return f": its minus is the sign of a typesetter (U+{ord(MINUS):04X}); write a hyphen in all rows"
     if re.match(r"\d{1,4}[-/.:]\d{1,2}[-/.:]\d", cell):
         return (
             ": declare what it is: --unit time_s=h:m:s, --unit time_s=date (2024-05-31 12:00:00), or a pattern such as "

@@ -12,7 +12,7 @@ from typing import Any
 from aesi.errors import CellError
 from aesi.physics.cell.bpx_schema import load_bpx
 from aesi.physics.cell.bpx_transport import check_kinetics, check_transport
-from aesi.physics.cell.bpx_unread import replaced_relations, unread
+from aesi.physics.cell.bpx_unread import other_capacity, replaced_relations, unread
 from aesi.physics.cell.bpx_values import check_energies, check_values
 from aesi.physics.cell.parts import (
     CAPACITY_SHARES,
@@ -54,7 +54,7 @@ def read_bpx(source: str | PathLike[str] | Mapping[str, Any], fitted: bool = Fal
         check_kinetics(cell, where)
         if not cell.fitted_with:
             check_energies(cell, where)
-    return replace(cell, unread=(*cell.unread, *replaced_relations(cell)))
+    return replace(cell, unread=(*cell.unread, *replaced_relations(cell), *other_capacity(cell)))
 
 
 def _cell(v1: dict[str, Any], where: str) -> CellParameters:

@@ -38,6 +38,9 @@ OWN_FIELDS = {
 """Of the section `User-defined` that are read."""
 POINTS = 401
 """At which relations are looked at."""
+OTHER_CAPACITY = 1.5
+"""Times, either way, that the declared capacity may be of what an electrode holds between its limits: 0.94 to 1.01 in
+the files of ten cells."""
 BRANCHES = ("OCP (lithiation) [V]", "OCP (delithiation) [V]")
 
 
@@ -65,6 +68,20 @@ def unread(v1: Mapping[str, Any]) -> tuple[str, ...]:
     if own:
         said.append(f"fields of the cell's file that are not read (User-defined): {', '.join(own)}.")
     return tuple(said)
+
+
+def other_capacity(cell: CellParameters) -> tuple[str, ...]:
+    """A sentence where the nominal capacity is far from what an electrode holds between its stoichiometry limits."""
+    for side, electrode in (("negative", cell.negative), ("positive", cell.positive)):
+        held = (electrode.theta_max - electrode.theta_min) * cell.electrode_capacity_ah(electrode)
+        ratio = cell.nominal_capacity_ah / held
+        if not 1.0 / OTHER_CAPACITY <= ratio <= OTHER_CAPACITY:
+            return (
+                f"the cell's file declares {cell.nominal_capacity_ah:.4g} Ah, and its {side} electrode holds "
+                f"{held:.4g} Ah between its stoichiometry limits, which is what is simulated: correct 'Nominal cell "
+                "capacity [A.h]', or the area, the thickness, the number of electrode pairs or the limits.",
+            )
+    return ()
 
 
 def replaced_relations(cell: CellParameters) -> tuple[str, ...]:

@@ -16,6 +16,8 @@ class InitialState:
     state of charge is far from that of the voltage.  rest_voltage_v : at which the cell rests there, as read.
     doubt : how far the reading of the voltage is from what was given.  ends : states of charge that the voltage would
     say two of its deviations lower and higher; on a flat potential far beyond soc -+ 2 sd.
+    doubted : True where a given one is further from that of the voltage than this is uncertain by, and not so far that
+    it is contradicted.
     by_voltage : of a full charge alone, what the open-circuit potentials say of its rest voltage instead of 1.
     """
 
@@ -28,6 +30,7 @@ class InitialState:
     doubt: float = 0.0
     ends: tuple[float, float] | None = None
     by_voltage: float | None = None
+    doubted: bool = False
 
     @property
     def read_sd(self) -> float:

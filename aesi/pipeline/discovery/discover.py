@@ -68,7 +68,7 @@ class Case:
 
     def __post_init__(self) -> None:
         """Raises DataError for a record that is given twice."""
-        check_distinct((*self.measurements, *self.good), self.tests)
+        check_distinct((*self.measurements, *self.good), self.tests, led=True)
 
     @property
     def records(self) -> tuple[Measurement, ...]:
@@ -236,6 +236,7 @@ def discovery_content(found: Discovery, asked: Sequence[str] = ()) -> dict[str, 
         "not_adopted": found.not_adopted,
         "notes": list(together((*asked, *found.notes))),
         "contradicted": found.contradicted,
+        "other_temperature": list(found.other_temperature),
         "warnings": list(found.warnings),
         "seconds": round(found.seconds, 2),
         "simulations": found.simulations,

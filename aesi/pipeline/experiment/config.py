@@ -47,7 +47,24 @@ def model_names() -> tuple[str, ...]:
 
 
 class ExperimentConfig(Section):
-    """One experiment. `base` is the folder its relative paths start from; it is not part of its identity."""
+    """One experiment.
+
+    name : letters, digits, `_` and `-`; becomes a folder below `runs/`.
+    note : a line on why it is there, for its report and the tracking store.
+    seed : of all that is random in it.
+    data : the records and their roles.
+    cell : the declared cell.
+    fallback : what to run instead where the measured data cannot be had; of `data.kind: catalogue` alone.
+    library : the candidate terms of the correction.
+    search : the evolutionary search among them.
+    conformal : prediction intervals.
+    models : the models that the tables compare; all of them without it.
+    tracking : where the run is tracked.
+    runner : who evaluates candidates.
+    discover : what `aesi discover` needs beside cell and data.
+
+    `base` is the folder its relative paths start from; it is not part of its identity.
+    """
 
     name: str
     note: str = ""
@@ -142,7 +159,12 @@ def read_experiment(path: str | Path, overrides: Sequence[str] = ()) -> Experime
         raise ConfigError(f"{path}: {error}") from None
     if not isinstance(content, dict):
         raise ConfigError(f"{path}: holds no keys; an experiment starts with `name:`, `data:`, `cell:`.")
+    seen: set[str] = set()
     for override in overrides:
+        key = override.partition("=")[0].strip()
+        if key in seen:  # the last would count, and nobody be told
+            raise ConfigError(f"{path}: {key!r} is overridden twice; give it once.")
+        seen.add(key)
         _override(content, override)
     return parse_experiment(content, base=path.resolve().parent, where=str(path))
 

@@ -186,7 +186,10 @@ def _on_grid(
     records: dict[str, FitRecord] = {}
     notes: list[str] = []
     for name, (measurement, known_soc0) in sources.records.items():
-        check_measured(cell, [measurement])
+        try:
+            check_measured(cell, [measurement])
+        except DataError as error:
+            raise DataError(with_keys(str(error))) from None
         declared = known_soc0 if config.cell.soc0 is None else config.cell.soc0
         start = initial_state(
             cell, measurement, declared, data.hold, given.effects, shared=shared, model=given.model
@@ -197,7 +200,7 @@ def _on_grid(
             with_keys(start.sentence),
             held,
             temperature_sentence(cell, measurement, given.effects),
-            *even.notes,
+            *map(with_keys, even.notes),
         ]
         records[name] = no_rows(even, start.soc, start.read_sd)
     notes += on_temperatures(cell, (m.temperature_degc for m, _ in sources.records.values()), given.effects)

@@ -65,8 +65,15 @@ class PhysicsModels:
         run = runs[self.start]
         series = error_series(record, run, dt_s)
         others = {name: each.voltage_v for name, each in runs.items()}
-        missed_v = self.by_name[RECALIBRATED].missed_v
-        return replace(series, physics=others, missed_v=missed_v), bool(run.series["depleted"].any())
+        out = [each.series["depleted"] > 0.0 for each in runs.values()]
+        first = min((int(np.argmax(rows)) for rows in out if rows.any()), default=None)
+        series = replace(
+            series,
+            physics=others,
+            missed_v=self.by_name[RECALIBRATED].missed_v,
+            ran_out_s=None if first is None else float(run.time_s[first]),
+        )
+        return series, bool(run.series["depleted"].any())
 
     def with_slopes(self, series: ErrorSeries, record: FitRecord, hold: Hold) -> ErrorSeries:
         """The series of the record with what each parameter of the chosen physics, and its start, is worth along it."""

@@ -1,4 +1,8 @@
-"""The sections of an experiment file: what each may say, and what of it cannot be."""
+"""The sections of an experiment file: what each may say, and what of it cannot be.
+
+The docstring of a section describes each of its keys, `key : unit, meaning`; the table of keys in the documentation is
+made of these and of the fields.
+"""
 
 from __future__ import annotations
 
@@ -26,8 +30,11 @@ class Section(BaseModel):
 class RepeatsConfig(Section):
     """One record that repeats a schedule, cut into its repeats (numbered from 1).
 
-    The last `valid_share` of every training repeat validates, so that validation spans the state of charge. With 0
-    the search validates on contiguous pieces of the training repeats in turn, each by models that have not seen it.
+    period_s : s, length of a repeat.
+    train : repeats that are trained on.  test : repeats that the finished models meet.
+    valid_share : the last share of every training repeat, which validates, so that validation spans the state of
+    charge; with 0 the search validates on contiguous pieces of the training repeats in turn, each by models that have
+    not seen it.
     """
 
     period_s: Positive
@@ -50,12 +57,15 @@ class RepeatsConfig(Section):
 
 
 class VirtualConfig(Section):
-    """How a virtual measurement is made (kind: virtual): the paper's profiles on a cell that has more than the ESPM.
+    """How a virtual measurement is made, of kind `virtual`: the paper's profiles on a cell that has more than the ESPM.
 
+    model : what PyBaMM simulates, the porous electrode or one particle an electrode.
     effects : what the cell has beyond its declared parameters; None for the laboratory's default mix.
-    magnitude : 1 is typical.  values : of an effect, by its id and their names, in place of the typical ones.
-    pulse_c : C-rate of the charge pulse after each training schedule.
+    magnitude : size of these effects; 1 is typical.
+    values : parameters of an effect, by its id and their names, in place of the typical ones.
+    pulse_c : C, rate of the charge pulse after each training schedule.
     other_load : times the vehicle's current in the validation and test schedules; 2 takes them to 3.1C.
+    seed : of the sensor's noise.
     """
 
     model: Literal["DFN", "SPMe"] = "DFN"
@@ -74,11 +84,24 @@ READING_KEYS = ("columns", "units", "sign", "state_words", "duplicates")
 class DataConfig(Section):
     """Records by role, or one record cut by repeats.
 
-    files: paths of measurement files; catalogue: names of records of the data set `set`; virtual: the paper's
-    profiles, which have their roles already. `repeats` cuts the one file or record `record`.
-    hold : how the current runs between the rows of a run; a discovery has its own, see `DiscoverConfig`.
-    columns, units, sign, state_words, duplicates : what files do not say themselves, see `aesi.data.reading.Reading`;
-    `columns: {state: NAME}` is the column that gives a current its sign.
+    kind : where records are from: `files`, paths of measurement files; `catalogue`, names of records of a data set;
+    `virtual`, the paper's profiles on a simulated cell, which have their roles already.
+    set : the data set, of kind `catalogue` (`aesi data list`).
+    record : the one file or record that `repeats` cuts, in place of `train`, `valid` and `test`.
+    repeats : how `record` is cut into what trains and what tests.
+    train : files or records that are trained on.
+    valid : those on which the search validates its candidates; without any it takes parts of the training records.
+    test : those that the finished models meet once.
+    dt_s : s, step to which the records are brought, which is that of the correction and of its bands.
+    hold : how the current runs between the rows of a run; a discovery has its own (`discover.hold`).
+    columns : quantity, or `state`, `cycle`, `step`, and the file's name for it; `state` is the column that gives a
+    current its sign, and None leaves out the temperature.
+    units : quantity and unit of the file's column (`mA`, `mV`, `h`, `K`, `h:m:s`, `date` or a pattern).
+    sign : which direction of the file's current is positive; None takes that of a known export, else discharge.
+    state_words : words of the state column that are not known, and what each means.
+    duplicates : which of several rows with one stamp is kept; None takes the first in a known export and refuses
+    others.
+    virtual : the virtual cell, of kind `virtual`.
     """
 
     kind: Literal["files", "catalogue", "virtual"]
@@ -138,18 +161,19 @@ class DataConfig(Section):
 
 
 class CellConfig(Section):
-    """The cell: a BPX file, a folder of a saved model (its cell and effects), or `catalogue` for the one that
-    belongs to the data set.
+    """The cell: what it is declared to be, and the physics that a correction starts from.
 
+    bpx : a BPX file, the folder of a saved model (its cell and effects), or `catalogue` for the cell that belongs to
+    the data set; `cell: PATH` alone is short for it.
     soc0 : state of charge at the first row, of several records that of all whose voltage does not contradict it; None
     finds it from the voltage.
     soh : share of the file's capacity that the cell had when it was measured, or that day; None takes all of it.
-    model : espm, one particle an electrode, or dfn, the porous electrode; None takes that of a saved model, or
-    that the file was fitted with, else espm.
-    effects : id -> parameters, effects added to the declared cell.  effect_files : Python files that hold effects of
-    the user's own; they are run, so name only files that you trust.
+    model : `espm`, one particle an electrode, or `dfn`, the porous electrode; None takes that of a saved model, or
+    that the file was fitted with, else `espm`.
+    effects : effects added to the declared cell, by id, each with its parameters.
+    effect_files : Python files that hold effects of the user's own; they are run, so name only files that you trust.
     start : the physics that the correction is learned on: the cell as declared, or recalibrated on the training
-    records (`aesi.pipeline.experiment.recalibrate`). The tables show both.
+    records. The tables show both.
     """
 
     bpx: str = "catalogue"
@@ -168,13 +192,16 @@ class CellConfig(Section):
 
 
 class LibraryConfig(Section):
-    """The candidate terms the search may choose from (`aesi.sparse.Library.build`).
+    """The candidate terms that the search may choose from.
 
-    p_c, d : range of the highest polynomial order and of the total degree; their upper ends make the library.
-    factors : most variables in a product.  special : with trigonometric and hyperbolic functions.
-    mixed : and their products with first-order terms.
-    inputs : None takes the paper's; `aesi.sparse.terms.inputs` names those that can be derived, such as I_next, the
-    current that flows while the predicted error arises.
+    p_c : range of the highest order of a polynomial of one variable; its upper end makes the library.
+    d : range of the total degree of a product; its upper end makes the library.
+    factors : most variables in a product.
+    special : whether there are trigonometric and hyperbolic functions.
+    mixed : whether there are their products with first-order terms.
+    inputs : variables of the terms, `I` among them; None takes the paper's (`I`, `c_sp`, `c_sn`, `c_e0`,
+    `c_eL`). Beside these there are `soc`, `I_next`, the current that flows while the predicted error arises, and such
+    as `I_60s`, the current through a low-pass of so many seconds.
     feedback : whether terms may hold the error itself, which then feeds back in free run.
     fade : whether a correction without such terms gives way to the physics where left-out drives do not bear it out.
 
@@ -209,17 +236,28 @@ class LibraryConfig(Section):
 class SearchConfig(Section):
     """The evolutionary search, in the paper's symbols.
 
-    block : rows of a bootstrap block.  horizon : rows of a free run inside the losses, None for a block.
-    fold : rows of the pieces that validate in turn where no records are set aside for it; None for whole training
+    candidates : how many are evaluated.
+    population : candidates in a generation.
+    resamples : bootstrap resamples, which every candidate is fitted to.
+    block : rows, of a bootstrap block; None takes 500, or a tenth of the training rows where these are few.
+    horizon : rows, of a free run inside the losses; None takes a block.
+    fold : rows, of the pieces that validate in turn where no records are set aside for it; None takes whole training
     records, halves of training repeats, or an eighth of a single record.
-    regime : what the losses measure.  weights : gamma of the losses (out-of-bag, validation, sparsity) in the
-    scalar fitness (`aesi.sparse.search.evaluate.FitnessWeights`).  pearson_train, pearson_valid : epsilon of the two
-    constraints, which the paper sets (-1: none; a correction that left-out drives do not bear out fades by itself).
-    warm_start : begin with a few plain candidates (strong ridge on the whole library).
-    top_share : of the resamples, the best of which make an ensemble, and of the candidates, the fittest of which are
-    averaged where corrections are not shrunk (`library.fade`).
-    timeout_s, memory_mb : what one candidate may take before it counts as failed; memory on Linux, and under Dask for
-    each thread of a worker, whose threads share what they may take together.
+    regime : what the losses measure, errors in free run or one step ahead.
+    top_share : share of the resamples, the best of which make an ensemble, and of the candidates, the fittest of which
+    are averaged where corrections are not shrunk (`library.fade`).
+    lambda1 : range of the ridge.
+    lambda2 : range of the threshold below which a coefficient is dropped, in scaled units.
+    tau : range of the share of an ensemble that has to keep a term (AESI II).
+    pearson_train : least correlation of a candidate with the error on training rows, epsilon of the paper; -1 asks for
+    none (a correction that left-out drives do not bear out fades by itself).
+    pearson_valid : the same on the validation records.
+    weights : gamma of the losses (out-of-bag, validation, sparsity) in the scalar fitness.
+    warm_start : whether it begins with a few plain candidates (strong ridge on the whole library).
+    timeout_s : s, what one candidate may take before it counts as failed.
+    memory_mb : MB, what one candidate may take before it counts as failed; on Linux, and under Dask for each thread
+    of a worker, whose threads share what they may take together.
+    workers : processes that evaluate candidates.
     """
 
     candidates: Count = 40
@@ -257,8 +295,12 @@ class SearchConfig(Section):
 
 
 class ConformalConfig(Section):
-    """Prediction intervals: `method` is a name in `aesi.conformal.METHODS`; horizons for free-run bands.
+    """Prediction intervals one step ahead, and bands of the free run.
 
+    method : how intervals one step ahead are made.
+    alpha : share of misses that is aimed at; 0.1 for intervals of 90 %.
+    window : rows, the residuals that an interval looks back at.
+    horizons_s : s, times since the last measured voltage for which bands are calibrated, beside the whole record.
     compare : methods that the tables show beside it, calibrated on the same residuals; `spci_refitted`, the paper's
     forest refitted as it goes, can stand here alone.
     """
@@ -298,9 +340,12 @@ class ConformalConfig(Section):
 
 
 class TrackingConfig(Section):
-    """Where runs are tracked: an MLflow URI, or None for the SQLite store of the workspace.
+    """Where runs are tracked.
 
-    log_model : log the chosen model so that MLflow can serve it; register_model : under the experiment's name.
+    uri : of an MLflow store; None takes the SQLite store of the workspace.
+    log_model : whether the chosen model is logged so that MLflow can serve it.
+    register_model : whether it is registered under the experiment's name.
+    system_metrics : whether the load of processor and memory is logged while a run goes on.
     """
 
     uri: str | None = None
@@ -310,10 +355,13 @@ class TrackingConfig(Section):
 
 
 class RunnerConfig(Section):
-    """Who evaluates candidates: worker processes here, or Dask workers (`address` of a scheduler, or local).
+    """Who evaluates candidates.
 
+    kind : worker processes on this machine, or workers of Dask.
+    address : of Dask's scheduler; None starts a cluster on this machine.
     storage : a database URL where several `aesi worker` processes share the candidates of one study.
-    stage_timeout_s : wall time after which a stage of the run (the search, the report) has failed; None for no limit.
+    stage_timeout_s : s, wall time after which a stage of the run (the search, the report) has failed; None for no
+    limit.
     """
 
     kind: Literal["local", "dask"] = "local"
@@ -331,12 +379,15 @@ class RunnerConfig(Section):
 class DiscoverConfig(Section):
     """What `aesi discover` needs beyond cell and data.
 
-    fit, test : names of records; a record in both goes on where the fit ends. kind: virtual has them by role.
-    fit_until_s : record -> time up to which fits see it.  until_s : what comes later is left out of every test record.
+    fit : records in which it is sought what the cell lacks; kind `virtual` has them by role.
+    test : records that choose nothing; one in both goes on where the fit ends.
     good : records of the cell that are known to be good; what is sought is what those in `fit` have beside them.
+    fit_until_s : s, by record the time up to which fits see it.
+    until_s : s, what comes later is left out of every test record.
     holdout : the last share of each record, kept back where there are no test records; None takes 0.3.
     hold : how the current runs between rows (of `data.kind: virtual` it is known); None takes it of each record as its
     rows show, like `aesi discover` of a file.
+    max_effects : most effects that are named.
     """
 
     fit: tuple[str, ...] = ()
@@ -364,7 +415,11 @@ class DiscoverConfig(Section):
 
 
 class FallbackConfig(Section):
-    """What to run instead where the measured data cannot be had."""
+    """What to run instead where the measured data cannot be had.
+
+    data : records in their place, as in the section `data`.
+    cell : their cell, as in the section `cell`.
+    """
 
     data: DataConfig
     cell: CellConfig

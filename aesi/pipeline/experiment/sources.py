@@ -30,6 +30,8 @@ KEYS = {
     "--soc0": "cell.soc0",
     "--step": "a file of its own, by `aesi data convert --step`",
     "--to-s": "a file of its own, by `aesi data convert --to-s`",
+    "--from-s": "a file of its own, by `aesi data convert --from-s`",
+    "--soh": "cell.soh",
 }
 """Option of a command that reads files -> what says the same in an experiment file."""
 

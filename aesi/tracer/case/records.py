@@ -156,7 +156,8 @@ def _prepared(
     n_fit = int(np.searchsorted(thin.time_s, until))
     noise_full = noise_floor_v(data.voltage_v, data.current_a)
     white = _white_v(record, thin.take(slice(0, n_fit)), noise_full)
-    said = () if start.basis == "given" and not start.contradicted else (start.sentence,)
+    as_given = start.basis == "given" and not (start.contradicted or start.doubted)
+    said = () if as_given else (start.sentence,)
     return PreparedRecord(
         data=data,
         thin=thin,

@@ -23,7 +23,7 @@ from aesi.tracer.decide.verdict import (
     tolerance_v,
     unexplained_v,
 )
-from aesi.tracer.decide.written import Option, carries_best, limits_of, refused, stand_ins, written
+from aesi.tracer.decide.written import Option, carries_best, limits_of, of_refit, stand_ins, written
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import base_of
@@ -46,7 +46,7 @@ MOST_EFFECTS: dict[Trust, int] = {"measured": MEASURED_EFFECTS, "loose": STAND_I
 class Evidence:
     """path : the search that the verdict is about.  paths : all of them, by trust.  recalibrated : the declared model
     with all of its own parameters open.  after : the model that is written.  fault : why the chosen hypothesis was not
-    adopted, or the recalibrated model where the declared one is written.  limits : where the written model stops short
+    adopted, or the recalibrated model where another one is written.  limits : where the written model stops short
     of the declared one."""
 
     path: Path
@@ -169,8 +169,8 @@ def _unexplained(problem: InverseProblem, path: Path, verdict: Verdict, searches
         named = named_options(lasting, tight, blocks, archive)
     declared = Option.of(problem, blocks, None)
     after, why = written(declared, options, named)
-    if after is declared.state and recalibrations:
-        why = "; ".join(filter(None, (refused(carries_best(recalibrations), declared), why))) or None
+    if after.values is None or not after.hypothesis:
+        why = "; ".join(filter(None, (of_refit(declared, recalibrations, options, after), why))) or None
     limits = (*stand_ins(after, verdict.effects), *limits_of(after)) if after.hypothesis else ()
     recalibrated = _recalibrated(problem, recalibrations)
     return Evidence(path, searches.paths, recalibrated, after, with_confidence(verdict), why, limits)

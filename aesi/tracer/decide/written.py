@@ -111,10 +111,26 @@ def written(
     return best.state, why if best is declared else f"{why}; {_instead(best, declared)}"
 
 
-def refused(recalibrated: Option, declared: Option) -> str | None:
-    """Why a recalibrated model may not be written, None where nothing speaks against it."""
-    fault = _fault(recalibrated, declared, (*ORDINARY_C, *FAST_C))
-    return None if fault is None else f"the recalibrated model: {fault}"
+def of_refit(
+    declared: Option, recalibrations: Sequence[Option], options: Sequence[Option], taken: ModelState
+) -> str | None:
+    """Why the recalibration that carries best is not what is written, and what is in its place where that is neither
+    the declared model; None where it is written, or where nothing speaks against it."""
+    if not recalibrations:
+        return None
+    best = carries_best(recalibrations)
+    fault = None if best.state is taken else _fault(best, declared, (*ORDINARY_C, *FAST_C))
+    if fault is None:
+        return None
+    why = f"the recalibrated model: {fault}"
+    other = next((one for one in options if one.state is taken), None)
+    if other is None:
+        return why
+    left_mv, before_mv = 1e3 * other.left_out.pooled_v, 1e3 * declared.left_out.pooled_v
+    return (
+        f"{why}; written is one whose parameters moved less, which leaves {left_mv:.1f} mV of data left out, the "
+        f"declared one {before_mv:.1f}"
+    )
 
 
 def stand_ins(state: ModelState, named: Sequence[str]) -> tuple[str, ...]:

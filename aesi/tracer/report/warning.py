@@ -29,8 +29,8 @@ def contradicted_by_v(files: Sequence[FileOutcome], verdict: Verdict) -> float |
 
 
 def warnings(files: Sequence[FileOutcome], verdict: Verdict, rest_a: float = 0.0) -> tuple[str, ...]:
-    """Where the test part contradicts a verdict that explains the data, where the written model does worse there than
-    another one, or on what was fitted than the declared one, and where the test part has no load.
+    """Where the test part contradicts a verdict that explains the data, where the written model does worse there, or on
+    what was fitted, than another one, and where the test part has no load.
 
     rest_a : A, below which the cell rests.
     """
@@ -57,7 +57,7 @@ def _of_contradiction(files: Sequence[FileOutcome], verdict: Verdict) -> str | N
 def _of_worse_on_tests(tests: Sequence[FileOutcome], named: bool) -> str | None:
     """named : whether the verdict names an effect, which the written model has where it is none of the others."""
     after_mv = _left_mv(tests, "after")
-    less = {NAMES[state]: left_mv for state in OTHERS if (left_mv := _left_mv(tests, state)) < after_mv}
+    less = _less_than(tests, after_mv)
     if not less:
         return None
     same = next((state for state in OTHERS if _same(tests, state)), None)
@@ -71,13 +71,14 @@ def _of_worse_on_tests(tests: Sequence[FileOutcome], named: bool) -> str | None:
 
 
 def _of_worse_on_fitted(fitted: Sequence[FileOutcome]) -> str | None:
-    before_mv, after_mv = (_left_mv(fitted, state) for state in ("before", "after"))
-    if not after_mv > before_mv:
+    after_mv = _left_mv(fitted, "after")
+    less = _less_than(fitted, after_mv)
+    if less.get(NAMES["recalibrated"], after_mv) * AS_GOOD >= after_mv:
+        less.pop(NAMES["recalibrated"], None)
+    if not less or _same(fitted, "before"):
         return None
-    return (
-        f"on the part that was fitted {NAMES['after']} leaves {after_mv:.2f} mV of the rows as measured, "
-        f"{NAMES['before']} {before_mv:.2f} mV."
-    )
+    others = " and ".join(f"{words} {left_mv:.2f} mV" for words, left_mv in less.items())
+    return f"on the part that was fitted {NAMES['after']} leaves {after_mv:.2f} mV of the rows as measured, {others}."
 
 
 def _of_rest(tests: Sequence[FileOutcome], rest_a: float) -> str | None:
@@ -105,6 +106,11 @@ def _tests(files: Sequence[FileOutcome]) -> list[FileOutcome]:
 def _same(tests: Sequence[FileOutcome], state: State) -> bool:
     """Whether the written model is no other than that of `state`."""
     return all(np.array_equal(f.voltages["after"], f.voltages[state]) for f in tests)
+
+
+def _less_than(files: Sequence[FileOutcome], after_mv: float) -> dict[str, float]:
+    """The other models that leave less than the written one, in words, with what they leave, mV."""
+    return {NAMES[state]: left_mv for state in OTHERS if (left_mv := _left_mv(files, state)) < after_mv}
 
 
 def _left_mv(files: Sequence[FileOutcome], state: State) -> float:

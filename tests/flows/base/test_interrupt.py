@@ -117,3 +117,18 @@ def test_a_worker_that_was_still_importing_showed_its_traceback(tmp_path):
     assert busy.returncode == 130
     assert err == "Interrupted.\n"
     assert not [one for one in workers if one.is_running() and one.status() != psutil.STATUS_ZOMBIE]
+
+
+def test_an_interrupt_before_anything_hears_it_left_a_traceback():
+    """Within the first fifth of a second, while the command is still being imported."""
+    code = """
+import sys
+class Interrupting:
+    def find_spec(self, name, path=None, target=None):
+        if name == "typer":
+            raise KeyboardInterrupt
+sys.meta_path.insert(0, Interrupting())
+import flows.cli
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "Interrupted.\n")

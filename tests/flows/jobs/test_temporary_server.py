@@ -116,3 +116,9 @@ def test_time_is_limited_within_the_block_alone():
         time.sleep(10)
     with time_limit(None):
         time.sleep(0.01)
+
+
+def test_where_no_signal_tells_the_time_a_limit_is_none(monkeypatch):
+    monkeypatch.delattr("signal.SIGALRM")  # as on Windows
+    with time_limit(0.01):
+        time.sleep(0.05)

@@ -177,3 +177,15 @@ def test_a_row_that_is_no_measurement_was_fitted_by_a_run_and_converted(m50, rec
         DataError, match=r"^drive: 0.500 V at 1400 s \(row 701, counted from 1; rows like it: 2\) is outside"
     ):
         check_measured(m50, [record, spiked])
+
+
+def test_a_current_alone_in_milliampere_or_over_milliseconds_was_simulated_as_it_is(m50, record):
+    lone = replace(record, voltage_v=np.full_like(record.voltage_v, np.nan))
+    check_belongs(m50, [lone])
+    with pytest.raises(DataError, match=r"drive, .* A are .*C of .*: the current is in mA"):
+        check_belongs(m50, [replace(lone, current_a=1e3 * lone.current_a)])
+    with pytest.raises(DataError, match=r"would flow one way .* the time is in ms"):
+        check_belongs(m50, [replace(lone, time_s=1e3 * lone.time_s)])
+    check_belongs(
+        m50, [replace(lone, current_a=10.0 * lone.current_a)]
+    )  # more than it holds, in no other unit

@@ -227,6 +227,18 @@ def test_a_relation_that_does_not_hold_where_surfaces_and_salt_come_was_replaced
     assert "conductivity of the electrolyte is no positive number at 1668 to 2000 mol/m3" in salt
 
 
+@pytest.mark.parametrize("times", [3.0, 1.0 / 3.0])
+def test_a_nominal_capacity_that_the_electrodes_do_not_hold_was_passed_over_in_silence(content, times):
+    cell = content["Parameterisation"]["Cell"]
+    held = Cell.from_bpx(content).capacity_ah
+    cell["Nominal cell capacity [A.h]"] *= times
+    (said,) = Cell.from_bpx(content).unread
+    assert (
+        f"declares {cell['Nominal cell capacity [A.h]']:.4g} Ah, and its negative electrode holds {held:.4g}"
+        in said
+    )
+
+
 def test_a_placeholder_for_an_open_circuit_potential_is_refused(content):
     content["Parameterisation"]["Negative electrode"]["OCP [V]"] = 0
     with pytest.raises(CellError, match="OCP \\[V\\] is 0 at all stoichiometries"):

@@ -166,6 +166,24 @@ def test_a_given_state_of_charge_is_believed_for_one_record_and_checked_for_seve
     assert initial_state(LG_M50, data, 0.41, shared=True).basis == "given"
 
 
+def test_a_given_state_that_the_first_seconds_under_load_speak_against_was_taken_without_a_word():
+    data, _ = cut_from_a_drive(1000)
+    read = initial_state(LG_M50, data)
+    assert read.basis == "load"
+    given_soc = read.soc - 4.2 * read.sd
+    assert 0.05 < read.soc - given_soc < 0.15
+    far = initial_state(LG_M50, data, given_soc)
+    assert (far.soc, far.basis, far.contradicted, far.doubted) == (given_soc, "given", False, True)
+    assert (
+        f"as given; its first voltage ({data.voltage_v[0]:.3f} V) rather says {read.soc:.3f} +/- "
+        in far.sentence
+    )
+    near = initial_state(LG_M50, data, read.soc - 3.8 * read.sd)
+    assert (near.contradicted, near.doubted) == (False, False)
+    assert "rather says" not in near.sentence
+    assert initial_state(LG_M50, data, given_soc, shared=True).basis == "given"
+
+
 def test_a_given_state_on_a_flat_potential_is_not_contradicted_by_what_two_deviations_of_the_voltage_span():
     lfp = Cell.from_bpx(CELLS / "lfp_prada2013.bpx.json")
     data = resting(float(lfp.rest_voltage_v(0.9)[0]) + 2.0 * READING_V)  # where it is steep

@@ -148,6 +148,13 @@ def test_overrides_reach_into_sections(tmp_path):
     assert config.tracking.uri == "http://a"
 
 
+def test_of_two_overrides_of_one_key_the_last_counted_and_nobody_was_told(tmp_path):
+    path = tmp_path / "x.yaml"
+    path.write_text("name: x\ndata: {kind: files, train: [a.csv], test: [b.csv]}\n")
+    with pytest.raises(ConfigError, match=r"x.yaml: 'seed' is overridden twice; give it once\."):
+        read_experiment(path, ["seed=1", "seed =2"])
+
+
 @pytest.mark.parametrize(
     "override", ["seed", "=3", "seed.x=1", "search..x=1", "search.candidates=[", "seed=one"]
 )

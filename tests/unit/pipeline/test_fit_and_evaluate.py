@@ -1,5 +1,7 @@
 """Load, fit, conformalise, judge: on a record whose answer is known (1.5 mohm too little declared)."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from small_experiment import NOISE_V, experiment, fitted, write_record
@@ -46,6 +48,26 @@ def test_each_test_record_has_the_figures_that_were_pooled(evaluation):
     table = record_table(evaluation.rows)
     assert [cells[0] for cells in table.rows][2:4] == ["AESI I, repeat 2", "AESI I, repeat 4"]
     assert not record_table([figures | {"test_records": {"alone": next(iter(each))}}]).rows
+
+
+def test_the_error_of_a_record_on_which_the_model_ran_empty_was_told_without_a_time(record):
+    loaded, _, models = fitted(record)
+    first, second = loaded.split.test
+    at_s = float(first.time_s[400])
+    tests = (replace(first, ran_out_s=at_s), second)
+    (figures,) = evaluate_models(models[:1], replace(loaded.split, test=tests)).rows
+    of_first, of_second = figures["test_records"].values()
+    before_v = first.error_v[:400]
+    assert of_first["ran_out_s"] == at_s
+    assert of_first["until_ran_out_mv"] == pytest.approx(1e3 * np.sqrt(np.mean(before_v**2)))
+    assert "ran_out_s" not in of_second
+    pooled_v = np.concatenate([before_v, second.error_v])
+    left_mv = figures["free_run"]["test_until_ran_out_rmse_mv"]
+    assert left_mv == pytest.approx(1e3 * np.sqrt(np.mean(pooled_v**2)))
+    emptied = replace(first, ran_out_s=float(first.time_s[0]))  # no row before
+    (none,) = evaluate_models(models[:1], replace(loaded.split, test=(emptied,))).rows
+    assert "test_until_ran_out_rmse_mv" not in none["free_run"]
+    assert none["test_records"][first.name]["ran_out_s"] == 0.0 + first.time_s[0]
 
 
 def test_a_record_that_is_trained_on_may_not_judge(record, tmp_path):

@@ -10,7 +10,7 @@ import pytest
 from small_experiment import SOC0, experiment, fitted, write_record
 
 import aesi
-from aesi.errors import DataError, InputError
+from aesi.errors import DataError, InputError, SimulationError
 from aesi.physics.effects import CATALOGUE, activated
 from aesi.physics.folded import folded
 from aesi.pipeline.discovery.cases import case_of_files
@@ -316,6 +316,24 @@ def test_a_saved_model_was_simulated_with_another_hold_than_it_was_predicted_wit
         assert all(any(words in note for note in notes) for notes in said.values())
 
 
+@pytest.mark.parametrize("soc0", [None, 0.2])
+def test_a_start_that_was_read_is_the_first_to_check_where_a_record_runs_empty(model, tmp_path, soc0):
+    folder = replace(model, correction=None, intervals=None, bands=None).save(tmp_path / "model")
+    time = np.arange(0.0, 1400.0, 10.0)
+    current = np.where(time < 300.0, 0.0, model.cell.nominal_capacity_ah)
+    rest_v = float(model.cell.rest_voltage_v(0.2)[0])
+    frame = pd.DataFrame(
+        {"time_s": time, "current_a": current, "voltage_v": np.where(time < 300.0, rest_v, 3.3)}
+    )
+    frame.to_csv(tmp_path / "record.csv", index=False)
+    for todo in (simulate_file, predict_file):
+        said: list[str] = []
+        with pytest.raises(SimulationError, match="asks for more charge|solid diffusion"):
+            asked = ProfileRequest(soc0)
+            todo(folder, tmp_path / "record.csv", tmp_path / "out.csv", asked, say_notes=said.extend)
+        assert any("was read from its voltage, 0.2" in note for note in said) == (soc0 is None)
+
+
 @pytest.mark.parametrize("damage", ["missing", "schema", "list", "no parts", "arrays", "part"])
 def test_a_damaged_folder_is_named(model, tmp_path, damage):
     folder = model.save(tmp_path / "model")
@@ -474,6 +492,20 @@ def test_round_off_at_a_full_charge_was_told_as_rows_beyond_it(model, data):
     for above, said in ((1e-12, False), (0.01, True)):
         told = reached(model.cell, data, voltage, np.linspace(1.0 + above, 0.9, len(data)))
         assert any("a state of charge outside 0 to 1" in note for note in told) == said
+
+
+def test_a_voltage_of_no_cell_was_told_without_when_it_left_the_limits(model, data):
+    voltage, low_v = np.full(len(data), 3.9), model.cell.lower_voltage_v
+    voltage[10], voltage[12] = low_v - 0.1, -1.49
+    *_, last = reached(model.cell, data, voltage, np.linspace(0.9, 0.5, len(data)))
+    assert (
+        f"below {low_v:g} V first at {data.time_s[10]:g} s, down to -1.490 V at {data.time_s[12]:g} s."
+        in last
+    )
+    assert "above" not in last
+    voltage[20] = 5.0
+    *_, last = reached(model.cell, data, voltage, np.linspace(0.9, 0.5, len(data)))
+    assert last.endswith(f"V first at {data.time_s[20]:g} s, up to 5.000 V at {data.time_s[20]:g} s.")
 
 
 def test_by_how_much_a_record_emptied_or_overfilled_a_cell_was_not_told(model, data):

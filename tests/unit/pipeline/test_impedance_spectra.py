@@ -183,3 +183,15 @@ def test_a_file_of_spectra_was_fitted_and_was_its_own_witness(cell):
         DataError, match="s is there twice among the spectra to hold the result against; give it"
     ):
         check_distinct_spectra([], [one, one])
+
+
+@pytest.mark.parametrize(
+    ("name", "factor"), [("freq/Hz", 1.0), ("Frequency (kHz)", 1e3), ("frequency_hz", 1.0)]
+)
+def test_an_instruments_frequencies_were_refused(tmp_path, name, factor):
+    path = tmp_path / "f.csv"
+    path.write_text(f"{name},Re(Z)/Ohm\n0.1,0.02\n10,0.01\n")
+    assert read_frequencies(str(path)) == pytest.approx(factor * np.array([0.1, 10.0]))
+    path.write_text("Hertz,Re(Z)/Ohm\n0.1,0.02\n")
+    with pytest.raises(DataError, match="as instruments name it with its unit"):
+        read_frequencies(str(path))

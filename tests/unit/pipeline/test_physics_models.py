@@ -10,8 +10,10 @@ from aesi.pipeline.experiment.fit import Fitted, build_problem
 from aesi.pipeline.experiment.judging.evaluate import evaluate_models
 from aesi.pipeline.experiment.judging.validation import validation_mser
 from aesi.pipeline.experiment.load import load
-from aesi.pipeline.experiment.physics_models import DECLARED, PHYSICS_NAMES, RECALIBRATED
+from aesi.pipeline.experiment.physics_models import DECLARED, PHYSICS_NAMES, RECALIBRATED, PhysicsModels
+from aesi.pipeline.product.deviations import PhysicsStart
 from aesi.pipeline.product.hybrid import HybridModel
+from aesi.records import Measurement
 from aesi.sparse import Candidate, Genome, evaluate
 from aesi.sparse.yardsticks import Bare
 
@@ -41,6 +43,24 @@ def test_one_fitted_resistor_is_all_that_this_cell_lacks(loaded):
         assert rms(series.left_by("ESPM, one resistor")) < 2.0 * NOISE_V
         assert rms(series.left_by(RECALIBRATED)) < 2.0 * NOISE_V
         np.testing.assert_array_equal(series.left_by(RECALIBRATED), series.error_v)
+
+
+def test_a_series_knows_from_when_on_a_physics_model_ran_out():
+    cell = Cell.from_bpx(BPX)
+    whole = PhysicsStart(cell, cell, ())
+    models = PhysicsModels(dict.fromkeys((DECLARED, RECALIBRATED), whole), DECLARED)
+    time_s = np.arange(1800.0)
+    record = Measurement(time_s, np.full(1800, 30.0), np.full(1800, 3.5))
+    series, empty = models.series(record, 0.3, 1.0, "linear")
+    assert empty
+    run = whole.simulate(record, 0.3, "linear")
+    first = int(np.argmax(run.series["depleted"] > 0.0))
+    assert series.ran_out_s == time_s[first] > 900.0
+    np.testing.assert_array_equal(series.runs, time_s < first)
+    assert series.take(slice(0, first)).runs.all()
+    assert not series.take(slice(first, None)).runs.any()
+    full, empty = models.series(record, 0.9, 1.0, "linear")
+    assert (empty, full.ran_out_s) == (False, None)
 
 
 def test_the_saved_cell_is_the_one_that_is_corrected(loaded):

@@ -25,6 +25,24 @@ def test_a_harmful_correction_is_called_harmful(views):
     assert "13.2 mV to 15.7 mV" in text
 
 
+def test_an_error_of_661_mv_did_not_say_that_the_model_ran_empty(views):
+    view = views.run_view(200)
+    physics, chosen, other = view.models
+    physics, chosen = (
+        row | {"free_run": row["free_run"] | {"test_until_ran_out_rmse_mv": left}}
+        for row, left in ((physics, 240.14), (chosen, 234.84))
+    )
+    chosen |= {"test_records": {"a": {"ran_out_s": 7976.0}, "b": {}}}
+    emptied = replace(view, models=(physics, chosen, other))
+    assert runs.run_finding(emptied) == runs.run_finding(view).removesuffix(".") + (
+        "; a simulation runs empty or full on a at 7976 s, from where on an error says that it ran out, not by how "
+        f"much the model is off: before that it is 240.1 mV by ESPM and 234.8 mV by {view.chosen}."
+    )
+    assert runs.run_finding(
+        replace(emptied, models=(view.models[0], chosen | {"free_run": view.models[1]["free_run"]}))
+    ).endswith("not by how much the model is off.")
+
+
 def test_a_correction_that_does_not_beat_the_physics_it_was_learned_on_is_told_so(views):
     view = views.run_view(200)
     row = {"name": "ESPM recalibrated", "free_run": {"test_rmse_mv": 3.9}}
@@ -42,6 +60,12 @@ def test_a_correction_that_does_not_beat_the_physics_it_was_learned_on_is_told_s
     figures = view.models[1]["free_run"] | {"test_rmse_mv": 4.0, "test_mser_recalibrated_pct": -300.0}
     refit_does = replace(view, models=(view.models[0], {**view.models[1], "free_run": figures}))
     assert "errs by 2.0 mV there: recalibrate it first" in runs.corrected_finding(refit_does)
+    first = "and nothing learnt, the ESPM errs less there: 2.0 mV."
+    assert runs.run_finding(refit_does).endswith(first)
+    none = replace(refit_does, chosen="ESPM", models=({**view.models[0], "free_run": figures},))
+    assert runs.run_finding(none).startswith("No correction of the voltage error was chosen")
+    assert runs.run_finding(none).endswith(first)
+    assert "errs less there" not in runs.run_finding(view)
 
 
 def test_training_records_of_another_cell_than_the_validation_ones_are_told_of(views):
@@ -202,7 +226,24 @@ def test_a_written_model_that_does_worse_on_the_test_part_is_told_in_the_first_s
     assert "worse" not in discoveries.discovery_finding(same)
 
 
-def test_an_unknown_that_is_worse_on_the_test_part_is_told_so_once(views, tmp_path):
+def test_a_written_model_that_leaves_more_of_what_it_was_fitted_to_than_a_refit_was_told_without_a_word(
+    views,
+):
+    view = views.discovery_view(200, verdict="unknown")
+    states = {name: {"fit": {"rmse_mv": left}} for name, left in (("recalibrated", 5.05), ("after", 28.46))}
+    text = discoveries.short_finding(view.discovery | states)
+    assert text.endswith("of what was fitted the written model leaves 28.46 mV, recalibrated 5.05")
+    as_good = states | {"after": {"fit": {"rmse_mv": 5.2}}}
+    assert "of what was fitted" not in discoveries.short_finding(view.discovery | as_good)
+
+
+def test_a_contradicted_temperature_is_told_in_the_first_sentence(views):
+    view = views.discovery_view(200, verdict="unknown")
+    doubted = replace(view, discovery=view.discovery | {"other_temperature": ["a", "b"]})
+    assert "; the voltage of a and b contradicts its temperature" in discoveries.discovery_finding(doubted)
+
+
+def test_an_unknown_that_is_worse_on_the_test_part_is_told_so_at_once(views, tmp_path):
     view = views.discovery_view(200, verdict="unknown")
     warning = "on the test part the written model leaves 9.30 mV, the recalibrated model 6.20 mV: do not use it there."
     left = {"after": {"fit": {"rmse_mv": 9.0}, "test": {"rmse_mv": 9.3}}, "warnings": [warning]}
@@ -210,7 +251,11 @@ def test_an_unknown_that_is_worse_on_the_test_part_is_told_so_once(views, tmp_pa
         tmp_path / "r.html", replace(view, discovery=view.discovery | left)
     ).read_text()
     header = text[text.index("<h1>") : text.index("</header>")]
-    assert header.count("on the test part") == 1
+    assert header.count("on the test part the written model leaves") == 1
+    first = header[: header.index("</h1>")]
+    assert "on the test part the written model does worse, 9.30" in " ".join(
+        first.replace("\xa0", " ").split()
+    )
     assert "data that chose nothing" not in header
 
 

@@ -40,7 +40,7 @@ def part(whole, name, first, last):
 
 def test_the_name_of_a_test_file_changed_what_is_fitted(tmp_path, whole, most):
     other = write_record(tmp_path, "other.csv", seed=1)
-    short = part(other, "short.csv", 0, 301)
+    short = part(write_record(tmp_path, "third.csv", seed=2), "short.csv", 0, 301)
     for budget, rows in ((ROWS, ROWS), (2000, 1500)):
         most(budget)
         alone, *judged = (

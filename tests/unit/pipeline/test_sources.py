@@ -115,11 +115,23 @@ def test_one_state_of_charge_was_believed_for_every_record_of_a_run(tmp_path):
     later = tmp_path / "later.csv"
     rows = pd.read_csv(whole).iloc[3 * PERIOD_S :]  # three fifths on, where a rest begins
     rows.to_csv(later, index=False)
-    data = {"kind": "files", "train": [str(whole)], "test": [str(later)]}
-    loaded = load(experiment(whole, data=data))
+    early = tmp_path / "early.csv"
+    pd.read_csv(whole).iloc[: 3 * PERIOD_S].to_csv(early, index=False)
+    data = {"kind": "files", "train": [str(early)], "test": [str(later)]}
+    loaded = load(experiment(early, data=data))
     drawn = np.trapezoid(pd.read_csv(whole)["current_a"][: 3 * PERIOD_S + 1]) / SECONDS_PER_HOUR
     capacity_ah = Cell.from_bpx(BPX).capacity_ah
-    assert loaded.soc0[str(whole)] == SOC0
+    assert loaded.soc0[str(early)] == SOC0
     assert loaded.soc0[str(later)] == pytest.approx(SOC0 - drawn / capacity_ah, abs=0.02)
     assert abs(loaded.soc0[str(later)] - SOC0) > OTHER_STATE
     assert any("later" in note and "not the 0.8 that was given" in note for note in loaded.notes)
+
+
+def test_a_unit_that_was_declared_wrongly_was_told_in_options_that_a_run_does_not_have(tmp_path):
+    config = experiment(write_record(tmp_path))
+    data = config.data.model_copy(update={"units": {"time_s": "min"}})
+    words = (
+        r"declared: .* time_s was converted from min as declared.* \(in an experiment file: data\.units\)\.$"
+    )
+    with pytest.raises(DataError, match=words):
+        load(config.model_copy(update={"data": data}))

@@ -8,7 +8,11 @@ import numpy as np
 from aesi.physics import simulate
 from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.discovery.discover import discovery_content
+from aesi.pipeline.report.words.discoveries import short_finding
 from aesi.tracer import discover
+from aesi.tracer.decide.temperatures import fitted_at_fault, other_temperatures
+from aesi.tracer.discovery import inverse_problem
+from aesi.tracer.likelihood.model_state import ModelState
 
 TRIED = {n: CATALOGUE[n] for n in ("self_heating", "ambient_temperature", "series_resistance")}
 
@@ -41,3 +45,41 @@ def test_a_search_for_nothing_but_what_was_measured_ended_in_a_traceback(cell, m
     unknown = discover(cell, [off], soc0=0.9, effects=alone).verdict
     assert unknown.word == "unknown"
     assert "with no effect added" in unknown.reason
+
+
+def warm_record(cell, make, column_degc):
+    """A record at 35 degC whose column has one number in every row."""
+    data = make()
+    warm = np.full(len(data), 35.0)
+    voltage = simulate(cell, data.time_s, data.current_a, 0.9, temperature_degc=warm).voltage_v
+    noise = 1e-3 * np.random.default_rng(3).normal(size=len(data))
+    return replace(data, voltage_v=voltage + noise, temperature_degc=np.full(len(data), column_degc))
+
+
+def test_a_model_was_written_that_made_up_for_a_dead_temperature(cell, make):
+    """Nine parameters at the ends of their ranges left three times what another temperature alone does."""
+    problem = inverse_problem(cell, [warm_record(cell, make, 0.0)], soc0=0.9, effects=TRIED)
+    others = other_temperatures(problem)
+    assert others[0].there_degc in (30.0, 40.0)
+    moved = ModelState(problem, {"soc0": {"0": 0.91}})
+    fault = fitted_at_fault(moved, others)
+    assert fault.startswith("what was fitted at 0 degC leaves")
+    assert fault.endswith("it makes up for a temperature that the record contradicts")
+    assert fitted_at_fault(ModelState(problem), others) is None  # nothing was fitted
+    as_good = {0: replace(others[0], there_v=others[0].left_v)}
+    assert fitted_at_fault(moved, as_good) is None
+
+
+def test_a_temperature_that_the_record_contradicts_is_told(cell, make):
+    found = discover(cell, [warm_record(cell, make, 0.0)], soc0=0.9, effects=TRIED)
+    assert found.other_temperature == ("made",)
+    assert found.warnings[0].startswith("made: its voltage contradicts its temperature. At 0 degC")
+    fitted = next(f for f in found.files if f.part == "fit")
+    assert np.array_equal(fitted.voltages["after"], fitted.voltages["before"])
+    assert "the voltage of made contradicts its temperature" in short_finding(discovery_content(found))
+
+
+def test_a_right_column_is_not_doubted(cell, make):
+    found = discover(cell, [warm_record(cell, make, 35.0)], soc0=0.9, effects=TRIED)
+    assert found.other_temperature == ()
+    assert not any("contradicts" in warning for warning in found.warnings)

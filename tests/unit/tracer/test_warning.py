@@ -82,8 +82,11 @@ def test_a_written_model_that_is_worse_than_declared_on_what_was_fitted_was_not_
     (sentence,) = warnings([fitted, outcome(4e-3)], verdict("unknown"))
     assert sentence == (
         "on the part that was fitted the written model leaves 9.40 mV of the rows as measured, the declared model "
-        "9.00 mV."
+        "9.00 mV and the recalibrated model 5.00 mV."
     )
+    (refit,) = warnings([outcome(7e-3, part="fit"), outcome(4e-3)], verdict("unknown"))
+    assert "leaves 7.00 mV of the rows as measured, the recalibrated model 5.00 mV." in refit
+    assert warnings([outcome(5.2e-3, part="fit"), outcome(4e-3)], verdict("found", "film_growth"))[1:] == ()
     assert warnings([outcome(9e-3, part="fit"), outcome(4e-3)], verdict("unknown")) == ()
 
 

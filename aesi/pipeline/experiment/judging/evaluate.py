@@ -122,7 +122,8 @@ def _row(one: Fitted, judged: Mapping[Role, Sequence[_Judged]], seconds: float) 
 
 
 def _free_run(judged: Mapping[Role, Sequence[_Judged]]) -> dict[str, float]:
-    """By part, per cent of the squared error of each physics that is taken off, and what is left; how the test went."""
+    """By part, per cent of the squared error of each physics that is taken off, and what is left, of the rows before a
+    simulation ran out by itself; how the test went."""
     figures: dict[str, float] = {}
     for role, records in judged.items():
         if records:
@@ -133,6 +134,9 @@ def _free_run(judged: Mapping[Role, Sequence[_Judged]]) -> dict[str, float]:
                 left_share = np.mean((error - predicted) ** 2) / np.mean(physics**2)
                 figures[f"{role}_{key}"] = 100.0 * (1.0 - float(left_share))
             figures[f"{role}_rmse_mv"] = MV_PER_V * rmse(error, predicted)
+            runs = _joined(r.series.runs for r in records)
+            if runs.any() and not runs.all():
+                figures[f"{role}_until_ran_out_rmse_mv"] = MV_PER_V * rms((error - predicted)[runs])
     test = judged["test"]
     figures["diverged"] = sum(r.free.diverged_at is not None for r in test)
     figures["outside_pct"] = 100.0 * float(np.mean(_joined(r.free.outside for r in test)))
@@ -188,9 +192,13 @@ def _record_figures(one: Fitted, record: _Judged) -> dict[str, float | None]:
     series, model = record.series, one.model
     left, declared = series.error_v - record.free.error_v, series.left_by(DECLARED)
     kept = model.kept(series) if isinstance(model, SparseModel) else np.ones(len(series))
-    visited = trained_on(model, one.bands)
+    visited, runs = trained_on(model, one.bands), series.runs
+    ran_out = {} if runs.all() else {"ran_out_s": series.ran_out_s}
+    if ran_out and runs.any():
+        ran_out["until_ran_out_mv"] = MV_PER_V * rms(left[runs])
     return {
         "rmse_mv": MV_PER_V * rms(left),
+        **ran_out,
         "mser_pct": 100.0 * (1.0 - float(np.mean(left**2) / np.mean(declared**2))),
         **trained_figures(record.free.outside, series.temperature_degc, model, visited, kept),
     }

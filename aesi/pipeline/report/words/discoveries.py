@@ -11,6 +11,7 @@ from aesi.constants import SECONDS_PER_HOUR
 from aesi.numerics.typing import Array
 from aesi.pipeline.report.views import DiscoveryView
 from aesi.pipeline.report.words.sizes import finding_line, refit_does_as_well, unexplained_by, with_size
+from aesi.tracer.decide.written import AS_GOOD
 
 LARGE_SHARE = 0.5
 """Of the remaining error: where a sparse correction could still explain more, a sentence says so. A convention."""
@@ -20,20 +21,42 @@ CERTAIN = 0.99
 
 def discovery_finding(view: DiscoveryView) -> str:
     """The verdict as one sentence; missing physics, wrong parameters and instrument faults are named as such, and so is
-    a test part that contradicts it, or on which a written model that is to explain the data does worse than another."""
-    claims = view.discovery["verdict"] != "unknown"  # of one that does not, the warning below says it
-    return "; ".join([_verdict(view)[:-1], *(_against(view.discovery) if claims else ())]) + "."
+    what speaks against it: a temperature that a record contradicts, a test part that does, and a written model that
+    does worse than another."""
+    return "; ".join([_verdict(view)[:-1], *_against(view.discovery)]) + "."
 
 
-def short_finding(discovery: Mapping[str, Any]) -> str:
-    """The verdict in one line, with what the test part says against it: of a row of a table, of a tracked run."""
-    return "; ".join([finding_line(discovery), *_against(discovery)])
+def short_finding(discovery: Mapping[str, Any], sure: bool = False) -> str:
+    """The verdict in one line, with what speaks against it: of a terminal, a row of a table, a tracked run.
+
+    sure : whether the confidence in the names stands behind them.
+    """
+    said = finding_line(discovery) + (name_confidence(discovery) if sure else "")
+    return "; ".join([said, *_against(discovery)])
 
 
 def _against(discovery: Mapping[str, Any]) -> list[str]:
-    contradicted = ["the test part contradicts it"] if discovery.get("contradicted") else []
-    worse = _worse_on_test(discovery)
-    return [*contradicted, worse] if worse else contradicted
+    records = discovery.get("other_temperature", ())
+    said = (
+        f"the voltage of {listed(records)} contradicts its temperature" if records else "",
+        "the test part contradicts it" if discovery.get("contradicted") else "",
+        _worse_on_test(discovery),
+        _worse_on_fit(discovery),
+    )
+    return [one for one in said if one]
+
+
+def _worse_on_fit(discovery: Mapping[str, Any]) -> str:
+    """Where the written model, another one than the declared, leaves notably more of what it was fitted to than the
+    recalibrated one, with the figures; '' where it does not."""
+    states = {state: discovery.get(state, {}).get("fit", {}) for state in ("recalibrated", "after")}
+    if not all(states.values()) or _written_as(discovery) == "before":
+        return ""
+    left = {state: round(errors["rmse_mv"], 2) for state, errors in states.items()}
+    if left["after"] <= AS_GOOD * left["recalibrated"]:
+        return ""
+    ours, refit = left["after"], left["recalibrated"]
+    return f"of what was fitted the written model leaves {ours:.2f} mV, recalibrated {refit:.2f}"
 
 
 def _worse_on_test(discovery: Mapping[str, Any]) -> str:

@@ -4,17 +4,74 @@ from __future__ import annotations
 
 import numpy as np
 
+from aesi.over_time import stamp
 from aesi.pipeline.product.trained import ALL_PCT, trained_sentence
 from aesi.pipeline.report.views import Row, RunView
+from aesi.pipeline.report.words.discoveries import listed
 
 NEARLY = 0.98
 """A one-step error above this share of persistence's is called no better than it."""
+HUNDREDTHS = 2
+"""Digits of a mV in which an error has to be less to be called less."""
 MOST_DIGITS = 3
 """Behind the point, of an error in mV."""
 
 
 def run_finding(view: RunView) -> str:
-    """What the correction buys on the test records in free run, and what the one-step figure is worth."""
+    """What the correction buys on the test records in free run, where a mere refit does better, and what is left before
+    a simulation ran out, where one did."""
+    return f"{_bought(view).removesuffix('.')}{_refit_better(view)}{_ran_out(view)}."
+
+
+def _refit_better(view: RunView) -> str:
+    """That the physics with its own parameters refitted errs less, where that is not what is corrected; from '; ' on,
+    '' where it does not."""
+    ours, refitted = _figure(view.model(view.chosen), "free_run", "test_rmse_mv"), _refitted_mv(view)
+    if ours is None or refitted is None or round(refitted, HUNDREDTHS) >= round(ours, HUNDREDTHS):
+        return ""
+    return (
+        f"; with its own parameters refitted to the training records, and nothing learnt, the {view.physics} errs less "
+        f"there: {_told(refitted, ours)[0]} mV"
+    )
+
+
+def _refitted_mv(view: RunView) -> float | None:
+    """What the refitted physics leaves of the test records, mV, where the model is held against it and not of it."""
+    model = view.model(view.chosen)
+    after, beyond = (
+        _figure(model, "free_run", key) for key in ("test_rmse_mv", "test_mser_recalibrated_pct")
+    )
+    if view.corrected not in (view.physics, view.chosen) or after is None:
+        return None
+    return None if beyond is None or beyond >= 100.0 else float(after / np.sqrt(1.0 - beyond / 100.0))
+
+
+def _ran_out(view: RunView) -> str:
+    """From when on the errors of test records say no more than that a model ran out, and what is left before that; from
+    '; ' on, '' where none did."""
+    model = view.model(view.chosen) or {}
+    records = {
+        name: figures["ran_out_s"]
+        for name, figures in (model.get("test_records") or {}).items()
+        if figures.get("ran_out_s") is not None
+    }
+    if not records:
+        return ""
+    where = " and ".join(f"{name} at {stamp(at_s)} s" for name, at_s in records.items())
+    text = (
+        f"; a simulation runs empty or full on {where}, from where on an error says that it ran out, not by how much "
+        "the model is off"
+    )
+    left = {
+        name: error
+        for name in dict.fromkeys((view.physics, view.corrected, view.chosen))
+        if (error := _figure(view.model(name), "free_run", "test_until_ran_out_rmse_mv")) is not None
+    }
+    told = listed([f"{error:.1f} mV by {name}" for name, error in left.items()])
+    return f"{text}: before that it is {told}" if told else text
+
+
+def _bought(view: RunView) -> str:
     model, physics = view.model(view.chosen), view.model(view.physics)
     before, after = (_figure(row, "free_run", "test_rmse_mv") for row in (physics, model))
     reduction = _figure(model, "free_run", "test_mser_pct")
@@ -60,9 +117,9 @@ def corrected_finding(view: RunView) -> str:
         return ""
     if view.corrected in (view.physics, view.chosen):
         beyond = _figure(model, "free_run", "test_mser_recalibrated_pct")
-        if view.corrected == view.chosen or beyond is None or beyond >= 100.0:
+        refitted = _refitted_mv(view)
+        if view.corrected == view.chosen or beyond is None or refitted is None:
             return ""
-        refitted = after / np.sqrt(1.0 - beyond / 100.0)
         worth = (
             f"the correction leaves {beyond:.1f} % less mean squared error than that"
             if beyond >= 0.0

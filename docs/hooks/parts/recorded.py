@@ -12,6 +12,17 @@ from flows.benchmarks.history import Entry, case_fields, case_of, figures, lates
 Line = dict[str, Any]
 LONG = 12
 """Rows beyond which a table is folded away."""
+LAYOUTS = ("all", "repeats", "schedules", "beyond")
+DESIGN = "scaled"
+"""Of bands, the one that is the default."""
+BAND_FIGURES = {
+    "deviation": ("coverage_sd_pct", 1),
+    "worst bin, %": ("worst_bin_coverage_pct", 1),
+    "width, mV": ("width_mv", 1),
+    "Winkler, mV": ("interval_score_mv", 1),
+    "score": ("score_ratio", 2),
+}
+"""Head of a column -> figure of a line, and its digits."""
 
 
 def table_of(bench: str, entries: Sequence[Entry]) -> str:
@@ -38,6 +49,44 @@ def over_time(entries: Sequence[Entry]) -> str:
     ]
     table = ["| benchmark | case | figure | recorded |", "|---|---|---|---|", *rows]
     return _folded(f"{len(rows)} figures", table)
+
+
+def bands(entries: Sequence[Entry]) -> str:
+    """Of the bands of virtual cells: every layout and horizon of the default, other designs at a short horizon and
+    over whole drives."""
+    lines = [(entry, line) for entry, line in latest(entries).values() if line["bench"] == "bands"]
+    if not lines:
+        return _nothing("bands")
+    origins = dict.fromkeys(_origin(entry) for entry, _ in lines)
+    shown = sorted(
+        (line for _, line in lines if _is_shown(line)),
+        key=lambda line: (LAYOUTS.index(line["layout"]), line["method"] == DESIGN),
+    )
+    rows = [
+        [
+            line["layout"],
+            line["method"],
+            "whole drive" if line["horizon_s"] is None else f"{line['horizon_s']:g} s",
+            f"{line['coverage_pct']:.1f} ± {line['coverage_se_pct']:.1f}",
+            *(f"{line[key]:.{digits}f}" for key, digits in BAND_FIGURES.values()),
+        ]
+        for line in shown
+    ]
+    head, *body = (
+        "| " + " | ".join(row) + " |"
+        for row in (["layout", "design", "horizon", "coverage, %", *BAND_FIGURES], *rows)
+    )
+    align = "|" + "---|" * 3 + "---:|" * (1 + len(BAND_FIGURES))
+    return "\n".join([*(f"{text}\n" for text in origins), head, align, *body, ""])
+
+
+def _is_shown(line: Line) -> bool:
+    if line["method"] == DESIGN:
+        return True
+    short = line["horizon_s"] in (1.0, None)
+    return short and (
+        line["layout"] == LAYOUTS[0] or (line["layout"] == "beyond" and "reach" in line["method"])
+    )
 
 
 def _side_by_side(bench: str, entries: Sequence[Entry]) -> str:

@@ -1,0 +1,77 @@
+"""A column of temperatures that the voltage of its record contradicts: a sensor that is dead, or not on the cell.
+
+The declared cell is simulated at other temperatures, each the same in every row. Where it follows the record at one of
+them and leaves many times as much at that of the column, the column is what is wrong with the record, or the cell
+answers as one that much colder or warmer would: a single record does not tell which.
+
+The limits were set on 72 pairs of a measured record with a temperature and a file that was calibrated to its cell, and
+on 58 with the file of another cell sized to it. Where the best other temperature leaves FOLLOWS_V or less, the column
+leaves at most 2.6 times that; files of other cells follow none. With 0 degC for their column, the drives at 25 degC
+leave 9 to 157 times that of the right one, those at -10 to 10 degC with 30 degC for it, where their file follows them,
+2.7 to 16 times.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from aesi.constants import MV_PER_V
+from aesi.numerics.typing import Array
+
+GRID_DEGC = (-20.0, -10.0, 0.0, 10.0, 20.0, 30.0, 40.0, 50.0)
+"""Tried, and that of the cell's file."""
+CLEAR_V = 0.03
+"""An error of the declared cell below it is no evidence against a temperature: models of measured cells err by that."""
+FOLLOWS_V = 0.04
+"""What the declared cell leaves where it follows a record: calibrated files at most of those, at their temperature."""
+TIMES = 3.0
+"""What the column leaves, over what another temperature does: above the 2.6 of the measured records."""
+FURTHER_K = 8.0
+"""A step of the grid, less what a cell warms by: closer temperatures are no other ones."""
+
+
+@dataclass(frozen=True)
+class OtherTemperature:
+    """degc : in the mean of the column, at which the declared cell leaves `left_v` (RMS).  there_degc, there_v : of the
+    temperature at which it leaves least."""
+
+    degc: float
+    left_v: float
+    there_degc: float
+    there_v: float
+
+    def sentence(self, name: str, model: str = "the declared model") -> str:
+        """For a reader.  name : of the record.  model : that was simulated, in words."""
+        return (
+            f"{name}: its voltage contradicts its temperature. At {self.degc:.4g} degC, which it is taken at, {model} "
+            f"leaves {MV_PER_V * self.left_v:.1f} mV, at {self.there_degc:.4g} degC {MV_PER_V * self.there_v:.1f} mV: "
+            "it is in another unit (--unit temperature_degc=degF), its sensor is at fault or not on the cell (--column "
+            "temperature_degc= leaves it out), or the cell answers as one at that temperature would."
+        )
+
+
+def other_temperature(
+    column_degc: Array, declared_degc: float, error_v: Callable[[Array], float | None]
+) -> OtherTemperature | None:
+    """Another temperature by which the declared cell follows a record; None where its column is not contradicted.
+
+    column_degc : (n,) of the record.  declared_degc : of the cell's file.
+    error_v : RMS, V, that the declared cell leaves at temperatures (n,) degC; None where it cannot be simulated.
+    """
+    left_v, mean = error_v(column_degc), float(np.mean(column_degc))
+    if left_v is None or left_v <= CLEAR_V:
+        return None
+    tried = {
+        degc: there_v
+        for degc in {*GRID_DEGC, round(declared_degc, 2)}
+        if abs(degc - mean) >= FURTHER_K and (there_v := error_v(np.full(len(column_degc), degc))) is not None
+    }
+    if not tried:
+        return None
+    best = min(tried, key=lambda degc: tried[degc])
+    if tried[best] > FOLLOWS_V or left_v < TIMES * tried[best]:
+        return None
+    return OtherTemperature(mean, left_v, best, tried[best])

@@ -1,0 +1,65 @@
+"""Which records contradict their own temperature, and whether that explains more than what was fitted at it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
+from aesi.errors import AesiError
+from aesi.numerics.metrics import rms
+from aesi.numerics.typing import Array
+from aesi.physics.start.temperature import OtherTemperature, other_temperature
+from aesi.tracer.case.problem import InverseProblem
+from aesi.tracer.likelihood.model_state import ModelState
+
+LEAVES_TIMES = 2.0
+"""What a model that was fitted leaves of a record, over what the declared one leaves at another temperature: one number
+then explains more than all that was moved. A convention: the zeros of a dead column leave 2.8 times that on a drive of
+the NMC cell, with nine parameters moved."""
+
+
+def other_temperatures(problem: InverseProblem) -> dict[int, OtherTemperature]:
+    """Number of a record -> the temperature by which the declared model follows what fits see of it, of those whose
+    column that contradicts."""
+    out: dict[int, OtherTemperature] = {}
+    declared_degc = problem.cell.initial_temperature_k - ZERO_CELSIUS_K
+    for index, seen in enumerate(problem.seen):
+        if seen.temperature_degc is None:
+            continue
+        found = other_temperature(seen.temperature_degc, declared_degc, partial(_left_v, problem, index))
+        if found is not None:
+            out[index] = found
+    return out
+
+
+def _left_v(problem: InverseProblem, index: int, degc: Array) -> float | None:
+    record, there = problem.records[index], replace(problem.seen[index], temperature_degc=degc)
+    try:
+        run = problem.run(there, record.soc0, problem.fixed, record.thin_hold)
+    except AesiError:
+        return None
+    return rms(there.voltage_v - run.voltage_v)
+
+
+def fitted_at_fault(written: ModelState, others: Mapping[int, OtherTemperature]) -> str | None:
+    """Why a fitted model is not written: of a record that contradicts its temperature it leaves far more than the
+    declared one does at another. What it moved makes up for the temperature then. None where that holds of none."""
+    problem = written.problem
+    if written.values is None:
+        return None
+    for index, other in others.items():
+        record = problem.records[index]
+        rows = slice(0, record.n_fit)
+        voltage_v = written.simulated(record, index, thin=True).voltage_v[rows]
+        left_v = rms(np.asarray(record.thin.voltage_v[rows] - voltage_v))
+        if left_v > LEAVES_TIMES * other.there_v:
+            return (
+                f"what was fitted at {other.degc:.4g} degC leaves {MV_PER_V * left_v:.1f} mV of {record.name}, the "
+                f"declared model at {other.there_degc:.4g} degC {MV_PER_V * other.there_v:.1f}: it makes up for a "
+                "temperature that the record contradicts"
+            )
+    return None

@@ -1,0 +1,47 @@
+"""A temperature that the voltage of a record contradicts."""
+
+import numpy as np
+import pytest
+
+from aesi.physics.start.temperature import CLEAR_V, other_temperature
+
+COLUMN_DEGC = np.zeros(5)
+
+
+def error_of(true_degc, slope_v=4e-3, floor_v=0.01):
+    """What a declared cell leaves of a record that was taken at one temperature."""
+    return lambda degc: float(floor_v + slope_v * abs(np.mean(degc) - true_degc))
+
+
+def test_a_dead_column_is_told_with_the_temperature_that_the_record_shows():
+    found = other_temperature(COLUMN_DEGC, 25.0, error_of(25.0))
+    assert (found.degc, found.there_degc) == (0.0, 25.0)
+    assert (found.left_v, found.there_v) == pytest.approx((0.11, 0.01))
+    assert "At 0 degC, which it is taken at, the declared model leaves 110.0 mV, at 25 degC 10.0 mV" in (
+        found.sentence("drive")
+    )
+
+
+@pytest.mark.parametrize(
+    ("error_v", "why"),
+    [
+        (error_of(1.0), "the column is right"),
+        (error_of(25.0, slope_v=0.7e-3), "the error is one that models of measured cells have"),
+        (error_of(25.0, floor_v=0.06), "the cell follows the record at no temperature"),
+        (error_of(-5.0, slope_v=9e-3), "the temperature that is closer is no other one"),
+        (lambda degc: None, "the cell cannot be simulated"),
+    ],
+)
+def test_a_column_is_not_doubted_without_clear_evidence(error_v, why):
+    assert other_temperature(COLUMN_DEGC, 25.0, error_v) is None, why
+
+
+def test_a_small_error_is_not_asked_about():
+    asked = []
+
+    def error_v(degc):
+        asked.append(float(degc[0]))
+        return CLEAR_V
+
+    assert other_temperature(COLUMN_DEGC, 25.0, error_v) is None
+    assert asked == [0.0]
