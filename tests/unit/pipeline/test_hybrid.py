@@ -326,10 +326,10 @@ def test_a_start_that_was_read_is_the_first_to_check_where_a_record_runs_empty(m
         {"time_s": time, "current_a": current, "voltage_v": np.where(time < 300.0, rest_v, 3.3)}
     )
     frame.to_csv(tmp_path / "record.csv", index=False)
+    asked = ProfileRequest(soc0)
     for todo in (simulate_file, predict_file):
         said: list[str] = []
-        with pytest.raises(SimulationError, match="asks for more charge|solid diffusion"):
-            asked = ProfileRequest(soc0)
+        with pytest.raises(SimulationError, match="the surface of the"):
             todo(folder, tmp_path / "record.csv", tmp_path / "out.csv", asked, say_notes=said.extend)
         assert any("was read from its voltage, 0.2" in note for note in said) == (soc0 is None)
 
