@@ -18,7 +18,8 @@ from scipy.optimize import brentq
 from aesi.errors import SimulationError
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
-from aesi.physics.cell.parts import Balance
+from aesi.physics.cell.parts import Balance, Soc
+from aesi.physics.cell.relations import value_at
 
 EDGE = 1e-6
 """How near a stoichiometry comes to 0 or 1, where potentials have poles."""
@@ -72,17 +73,18 @@ def same_rest(declared: Cell, aged: Cell, soc: float) -> float:
     where a potential that turns beyond its window rests there twice, the nearer to `soc`.
     """
     before, after = declared.balance, aged.balance
-    alike = replace(after, window_n=before.window_n, window_p=before.window_p)
-    return soc if alike == after else _same_rest(alike, after, soc)
+    if (before.window_n, before.window_p) == (after.window_n, after.window_p):
+        return soc
+    return _same_rest(replace(after, window_n=before.window_n, window_p=before.window_p), after, soc)
 
 
 @lru_cache(maxsize=REMEMBERED)
 def _same_rest(before: Balance, after: Balance, soc: float) -> float:
     """State of charge of `after` where it rests as `before` does at `soc`."""
-    voltage = float(before.rest_voltage_v(soc)[0])
+    voltage = before.rest_voltage_at(soc)
 
     def excess(z: float) -> float:
-        return float(after.rest_voltage_v(z)[0]) - voltage
+        return after.rest_voltage_at(z) - voltage
 
     low, high = _range(after)
     grid = np.linspace(low, high, GRID)
@@ -123,34 +125,42 @@ def _at_rest(
     name : of the cell, for what cannot be.
     """
     q_n, q_p = sizes_ah
-    voltage_v = float(declared.rest_voltage_v(soc)[0])
+    voltage_v = declared.rest_voltage_at(soc)
 
-    def positive(theta_n: Array) -> Array:
+    def positive(theta_n: Soc) -> Soc:
         return (lithium_ah - q_n * theta_n) / q_p
 
-    def excess(theta_n: Array) -> Array:
+    def on_grid(theta_n: Array) -> Array:
         return declared.ocp_p(positive(theta_n)) - declared.ocp_n(theta_n) - voltage_v
+
+    def excess(theta_n: float) -> float:
+        return value_at(declared.ocp_p, positive(theta_n)) - value_at(declared.ocp_n, theta_n) - voltage_v
 
     low = max(EDGE, (lithium_ah - q_p * (1.0 - EDGE)) / q_n)
     high = min(1.0 - EDGE, (lithium_ah - q_p * EDGE) / q_n)
-    theta_n = _root(excess, low, high, name)
+    theta_n = _root(excess, on_grid, low, high, name)
     return theta_n, (lithium_ah - q_n * theta_n) / q_p
 
 
-def _root(excess: Callable[[Array], Array], low: float, high: float, name: str) -> float:
-    """Where a rising function crosses nought, or the nearer end; a grid narrows the bracket in one evaluation."""
+def _root(
+    excess: Callable[[float], float], on_grid: Callable[[Array], Array], low: float, high: float, name: str
+) -> float:
+    """Where a rising function crosses nought, or the nearer end; a grid narrows the bracket in one evaluation.
+
+    on_grid : the function of many numbers at once.
+    """
     if not low < high:
         raise SimulationError(
             f"{name}: after this loss no stoichiometries are left; a smaller loss is needed."
         )
     grid = np.linspace(low, high, GRID)
-    values = excess(grid)
+    values = on_grid(grid)
     if values[0] >= 0.0:
         return low
     if values[-1] <= 0.0:
         return high
     k = int(np.flatnonzero(values > 0.0)[0])
-    return float(brentq(lambda x: float(excess(np.array([x]))[0]), grid[k - 1], grid[k], xtol=1e-13))
+    return float(brentq(excess, grid[k - 1], grid[k], xtol=1e-13))
 
 
 def _with_windows(cell: Cell, full: tuple[float, float], empty: tuple[float, float]) -> Cell:

@@ -13,7 +13,7 @@ import numpy as np
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
 from aesi.physics.cell.parts import NO_FILM, UNITY
-from aesi.physics.cell.relations import Constant
+from aesi.physics.cell.relations import Constant, hashed_once
 
 DEFAULT_SOLID_ORDER = 12
 """Against 24, it moves the voltage by 0.001 mV RMS at most: LG M50 to 2C, the load of `aesi bench espm`; 8 by 0.03
@@ -68,6 +68,7 @@ class HeatBalance:
 PLAIN = Interface()
 
 
+@hashed_once
 @dataclass(frozen=True)
 class EspmModel:
     """A cell and what is assumed of it; the single particle ("espm") and the porous electrode ("dfn") both solve this.

@@ -13,8 +13,10 @@ from typing import Any, Self
 from aesi.physics.cell.bpx_read import read_bpx
 from aesi.physics.cell.bpx_write import write_bpx
 from aesi.physics.cell.parts import CellParameters
+from aesi.physics.cell.relations import hashed_once
 
 
+@hashed_once
 @dataclass(frozen=True)
 class Cell(CellParameters):
     """A cell as a BPX file declares it; its fields are those of `CellParameters`."""

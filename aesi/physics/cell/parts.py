@@ -16,7 +16,7 @@ from aesi.constants import FARADAY_C_MOL, SECONDS_PER_HOUR
 from aesi.errors import CellError
 from aesi.numerics.typing import Array
 from aesi.physics.cell.health import Soh, checked_soh, day_of, shares_by_day
-from aesi.physics.cell.relations import Constant, Relation
+from aesi.physics.cell.relations import Constant, Relation, hashed_once, value_at
 
 Soc = TypeVar("Soc", float, Array)
 
@@ -44,6 +44,7 @@ RATE_FACTORS = {side: f"{side} electrode reaction rate factor" for side in ("Neg
 DOUBLE_LAYERS = {side: f"{side} electrode double-layer capacity [F.m-2]" for side in ("Negative", "Positive")}
 
 
+@hashed_once
 @dataclass(frozen=True)
 class Electrode:
     """A porous electrode of one active material.
@@ -94,6 +95,7 @@ class Separator:
     transport_efficiency: float
 
 
+@hashed_once
 @dataclass(frozen=True)
 class Electrolyte:
     """Concentration in mol/m3, conductivity in S/m and diffusivity in m2/s as functions of concentration."""
@@ -125,6 +127,11 @@ class Balance:
         """(n,) V at the reference temperature."""
         theta_n, theta_p = self.stoichiometries(np.atleast_1d(np.asarray(soc, dtype=float)))
         return self.ocp_p(theta_p) - self.ocp_n(theta_n)
+
+    def rest_voltage_at(self, soc: float) -> float:
+        """V, one of `rest_voltage_v`."""
+        theta_n, theta_p = self.stoichiometries(soc)
+        return value_at(self.ocp_p, theta_p) - value_at(self.ocp_n, theta_n)
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ far apart, so that slow tests cost as little as short ones, and fewer points acr
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -49,6 +50,7 @@ def fewer_points(model: EspmModel) -> EspmModel:
 FEWER_POINTS = Effect("fewer_points", "instrument", __doc__ or "", on_model=fewer_points).activate()
 
 
+@lru_cache(maxsize=64)
 def stepping(data: Measurement) -> tuple[ActiveEffect, ...]:
     """What a record is simulated with: nothing, or longer steps where samples are far apart."""
     gaps = np.diff(data.time_s)

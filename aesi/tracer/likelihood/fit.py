@@ -20,9 +20,10 @@ from aesi.tracer.likelihood.gaussian import (
     Linearised,
     Posterior,
     PredictiveScore,
+    Weighed,
     best_over_sizes,
     block_sums,
-    score_at,
+    weighed,
 )
 from aesi.tracer.likelihood.model_error import PRIORS, Size, SplitTable, off_within_seconds, whitened
 
@@ -167,15 +168,14 @@ def beyond_expected(white: Array) -> float:
 def scored(problem: InverseProblem, blocks: Blocks, point: Linearised) -> PredictiveScore:
     """The predictive score of a linear form, over sizes of the model error."""
     prior, table = PRIORS[problem.trust], SplitTable(problem, blocks, point.table())
-    return best_over_sizes([said_at(table, point, size, prior.log_density(size)) for size in prior.sizes])
+    said = [said_at(table, point, size, prior.log_density(size)) for size in prior.sizes]
+    return best_over_sizes(said, len(point.x))
 
 
-def said_at(table: SplitTable, point: Linearised, size: Size, log_prior: float = 0.0) -> PredictiveScore:
-    """The predictive score of a linear form at one size of the model error.  table : that of the point."""
-    blocks = table.blocks
-    sums = block_sums(blocks, *table.whitened(size))
-    said = score_at(blocks, sums, point.padded_x, point.padded_bounds, size, log_prior)
-    return said.of(np.arange(len(point.x)))
+def said_at(table: SplitTable, point: Linearised, size: Size, log_prior: float = 0.0) -> Weighed:
+    """A linear form at one size of the model error.  table : that of the point."""
+    sums = block_sums(table.blocks, *table.whitened(size))
+    return weighed(table.blocks, sums, point.padded_x, point.padded_bounds, size, log_prior)
 
 
 @dataclass(frozen=True, eq=False)

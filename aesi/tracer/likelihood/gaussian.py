@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -78,21 +78,43 @@ def block_sums(blocks: Blocks, table: Array, log_det: Array) -> BlockSums:
 class Solved(NamedTuple):
     """A^-1 b of (2); each may stand for a stack of systems.
 
-    root : (m, m) lower triangular factor of A.  shift : (m,) A^-1 b.  gain : b'A^-1 b - log|A|, nats.
+    root : (m, m) lower triangular factor of A.  shift : (m,) A^-1 b.
     """
 
     root: Array
     shift: Array
-    gain: Array
 
     @classmethod
     def of(cls, gram: Array, moment: Array, x: Array) -> Solved:
         """gram : (..., m, m) J'J.  moment : (..., m) J'r.  x : (m,) the point."""
         a, b = gram + np.eye(len(x)), moment - x
         root = np.asarray(np.linalg.cholesky(a), dtype=float)
-        shift = np.asarray(np.linalg.solve(a, b[..., None])[..., 0], dtype=float)
-        log_det = 2.0 * np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1)
-        return cls(root, shift, (b * shift).sum(axis=-1) - log_det)
+        return cls(root, np.asarray(np.linalg.solve(a, b[..., None])[..., 0], dtype=float))
+
+
+def gains(gram: Array, moment: Array, x: Array) -> Array:
+    """(f,) b'A^-1 b - log|A| of (2), nats.  gram : (f, m, m) J'J.  moment : (f, m) J'r.  x : (m,) the point.
+
+    A factor of A with b below it holds L^-1 b in its last row, L that of A, so that nothing has to be solved.
+    """
+    m, b = len(x), moment - x
+    bordered = np.zeros((len(b), m + 1, m + 1))
+    bordered[:, :m, :m] = gram + np.eye(m)
+    bordered[:, m, :m] = b
+    bordered[:, m, m] = 1.0 + 2.0 * (b**2).sum(axis=-1)  # more than b'A^-1 b, since A is more than 1
+    root = np.linalg.cholesky(bordered)
+    log_det = 2.0 * np.log(np.diagonal(root, axis1=-2, axis2=-1)[:, :m]).sum(axis=-1)
+    return np.asarray((root[:, m, :m] ** 2).sum(axis=-1) - log_det, dtype=float)
+
+
+@lru_cache(maxsize=64)
+def _left_out(folds: tuple[tuple[int, ...], ...], blocks: int) -> Array:
+    """(f, b) one where the fold leaves the block out."""
+    out = np.zeros((len(folds), blocks))
+    for k, fold in enumerate(folds):
+        out[k, list(fold)] = 1.0
+    out.flags.writeable = False
+    return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,13 +128,10 @@ class Posterior:
     x: Array
     folds: tuple[tuple[int, ...], ...]
 
-    @cached_property
+    @property
     def _left_out(self) -> Array:
         """(f, b) one where the fold leaves the block out."""
-        out = np.zeros((len(self.folds), len(self.sums.square)))
-        for k, fold in enumerate(self.folds):
-            out[k, list(fold)] = 1.0
-        return out
+        return _left_out(self.folds, len(self.sums.square))
 
     @cached_property
     def solved(self) -> Solved:
@@ -120,11 +139,25 @@ class Posterior:
         return Solved.of(self.sums.gram.sum(axis=0), self.sums.moment.sum(axis=0), self.x)
 
     @cached_property
+    def _without(self) -> tuple[Array, Array]:
+        """(f, m, m) J'J and (f, m) J'r without each fold."""
+        kept = 1.0 - self._left_out
+        return np.tensordot(kept, self.sums.gram, axes=(1, 0)), kept @ self.sums.moment
+
+    @cached_property
     def _solved_without(self) -> Solved:
         """(f,) without each fold."""
-        kept = 1.0 - self._left_out
-        gram = np.tensordot(kept, self.sums.gram, axes=(1, 0))
-        return Solved.of(gram, kept @ self.sums.moment, self.x)
+        return Solved.of(*self._without, self.x)
+
+    @cached_property
+    def _gains(self) -> Array:
+        """(f + 1,) b'A^-1 b - log|A| without each fold, and from all data."""
+        gram, moment = self._without
+        return gains(
+            np.concatenate([gram, self.sums.gram.sum(axis=0)[None]]),
+            np.concatenate([moment, self.sums.moment.sum(axis=0)[None]]),
+            self.x,
+        )
 
     @property
     def covariances_without(self) -> Array:
@@ -136,13 +169,13 @@ class Posterior:
     def log_density(self) -> Array:
         """(f,) log p(y_F | y_-F) of each fold, nats."""
         own = self._left_out @ (self.sums.square + self.sums.log_det + LOG_2PI * self.sums.rows)
-        return np.asarray(-0.5 * (own - self.solved.gain + self._solved_without.gain))
+        return np.asarray(-0.5 * (own - self._gains[-1] + self._gains[:-1]))
 
     @cached_property
     def evidence(self) -> float:
         """log p(y) of all blocks, nats."""
         own = float(np.sum(self.sums.square + self.sums.log_det + LOG_2PI * self.sums.rows))
-        return -0.5 * (own + float(self.x @ self.x) - float(self.solved.gain))
+        return -0.5 * (own + float(self.x @ self.x) - float(self._gains[-1]))
 
     @property
     def shifts(self) -> Array:
@@ -233,7 +266,7 @@ def held_at_bounds(posterior: Posterior, bounds: Array) -> tuple[Array, BoolArra
     """Change (m,) that takes those parameters to their bounds that all data together push there, zero for the others,
     and which (m,) are held.  bounds : (m, 2) of the coordinates."""
     low, high = bounds[:, 0] - posterior.x, bounds[:, 1] - posterior.x
-    root, best, _ = posterior.solved
+    root, best = posterior.solved
     if np.all((low < best) & (best < high)):
         return np.zeros(len(best)), np.zeros(len(best), dtype=bool)
     ends = np.maximum(high, low + TINY)
@@ -243,33 +276,69 @@ def held_at_bounds(posterior: Posterior, bounds: Array) -> tuple[Array, BoolArra
     return np.where(held, inside, 0.0), held
 
 
-def score_at(
+@dataclass(frozen=True, eq=False)
+class Weighed:
+    """A hypothesis at one size of the model error, worked out as far as it takes to compare sizes.
+
+    posterior : of the parameters that are free.  folds : by partition.  x : (m,) the point.
+    to_bounds, held : (m,) change to the bounds of those that are not free, and which these are.  log_prior : of the
+    size.
+    """
+
+    posterior: Posterior
+    folds: Mapping[str, Sequence[Sequence[int]]]
+    x: Array
+    to_bounds: Array
+    held: BoolArray
+    size: Size
+    log_prior: float
+
+    def _by_partition(self, of_folds: Array) -> dict[str, Array]:
+        ends = np.cumsum([len(folds) for folds in self.folds.values()])[:-1]
+        return dict(zip(self.folds, np.split(of_folds, ends), strict=True))
+
+    @cached_property
+    def log_density(self) -> dict[str, Array]:
+        """By partition, (f,) nats of each fold."""
+        return self._by_partition(self.posterior.log_density)
+
+    @cached_property
+    def total(self) -> float:
+        """As `PredictiveScore.total`."""
+        parts = self.log_density
+        conditions = [float(parts[name].sum()) for name in PARTITIONS_OF_CONDITIONS if name in parts]
+        return 0.5 * float(parts["block"].sum()) + 0.5 * float(np.mean(conditions)) + self.log_prior
+
+    @property
+    def score(self) -> PredictiveScore:
+        """All that is said at this size."""
+        posterior, free, m = self.posterior, np.flatnonzero(~self.held), len(self.x)
+        whole = np.tile(self.to_bounds, (len(posterior.folds), 1))
+        whole[:, free] = posterior.shifts
+        shift, covariance = self.to_bounds.copy(), np.zeros((m, m))
+        shift[free], covariance[np.ix_(free, free)] = posterior.shift, posterior.covariance
+        evidence = posterior.evidence - 0.5 * float(np.sum((self.x + self.to_bounds)[self.held] ** 2))
+        shifts = self._by_partition(whole)
+        return PredictiveScore(self.size, self.log_density, self.total, evidence, shifts, shift, covariance)
+
+
+def weighed(
     blocks: Blocks, sums: BlockSums, x: Array, bounds: Array, size: Size, log_prior: float
-) -> PredictiveScore:
-    """The score of a hypothesis at one size of the model error.
+) -> Weighed:
+    """A hypothesis at one size of the model error.
 
     x : (m,) the point.  bounds : (m, 2) of the coordinates.
     """
-    names = list(blocks.folds)
-    folds = tuple(fold for name in names for fold in blocks.folds[name])
+    folds = tuple(fold for of_name in blocks.folds.values() for fold in of_name)
     posterior = Posterior(sums, x, folds)
     to_bounds, held = held_at_bounds(posterior, bounds)
-    free = np.flatnonzero(~held)
     if held.any():
+        free = np.flatnonzero(~held)
         posterior = Posterior(sums.moved(to_bounds).take(free), x[free], folds)
-    ends = np.cumsum([len(blocks.folds[name]) for name in names])[:-1]
-    parts = dict(zip(names, np.split(posterior.log_density, ends), strict=True))
-    conditions = [float(parts[name].sum()) for name in PARTITIONS_OF_CONDITIONS if name in parts]
-    total = 0.5 * float(parts["block"].sum()) + 0.5 * float(np.mean(conditions)) + log_prior
-    whole = np.tile(to_bounds, (len(folds), 1))
-    whole[:, free] = posterior.shifts
-    shift, covariance = to_bounds.copy(), np.zeros((len(x), len(x)))
-    shift[free], covariance[np.ix_(free, free)] = posterior.shift, posterior.covariance
-    evidence = posterior.evidence - 0.5 * float(np.sum((x + to_bounds)[held] ** 2))
-    shifts = dict(zip(names, np.split(whole, ends), strict=True))
-    return PredictiveScore(size, parts, total, evidence, shifts, shift, covariance)
+    return Weighed(posterior, blocks.folds, x, to_bounds, held, size, log_prior)
 
 
-def best_over_sizes(scores: Sequence[PredictiveScore]) -> PredictiveScore:
-    """The size of the model error at which most is said."""
-    return max(scores, key=lambda s: s.total)
+def best_over_sizes(sizes: Sequence[Weighed], own: int) -> PredictiveScore:
+    """The score at the size of the model error at which most is said, of the first `own` parameters; the others are
+    marginalised."""
+    return max(sizes, key=lambda one: one.total).score.of(np.arange(own))

@@ -34,7 +34,7 @@ from aesi.tracer.likelihood.gaussian import (
     best_over_sizes,
     block_sums,
     bounds_of_own,
-    score_at,
+    weighed,
 )
 from aesi.tracer.likelihood.model_error import PRIORS, Size, SplitTable, off_within_seconds, whitened
 
@@ -266,7 +266,7 @@ def promise(parent: Parent, slopes_v: Array) -> float:
         known, log_det = parent.white[size]
         new, _ = own.whitened(size)
         sums = block_sums(parent.blocks, np.column_stack([new[:, :1], known, new[:, 1:]]), log_det)
-        said.append(score_at(parent.blocks, sums, x, bounds, size, prior.log_density(size)).total)
+        said.append(weighed(parent.blocks, sums, x, bounds, size, prior.log_density(size)).total)
     return max(said)
 
 
@@ -289,14 +289,13 @@ def _scored(growth: EffectGrowth, u: Array, e: Array, jacobian: Array) -> Grown:
         new, log_det = own_columns.whitened(size)
         table = np.column_stack([new[:, :1], known[:, growth.rest], new[:, 1:]])
         sums = block_sums(parent.blocks, table, log_det)
-        said = score_at(parent.blocks, sums, padded_x, padded_bounds, size, prior.log_density(size))
-        out.append(said.of(np.arange(len(x))))
+        out.append(weighed(parent.blocks, sums, padded_x, padded_bounds, size, prior.log_density(size)))
     hypothesis = (*fit.hypothesis, growth.effect)
     free = (*(fit.free[j] for j in growth.rest), *(f for f, i in zip(growth.added, inside, strict=True) if i))
     slopes = np.column_stack([fit.point.jacobian_v[:, growth.rest], jacobian[:, inside]])
     point = Linearised(x, e, slopes, bounds, growth.off_v)
     on_bounds = {f.key: f.value(float(v)) for f, v, i in zip(growth.added, u, inside, strict=True) if not i}
-    score, held = best_over_sizes(out), growth.held_on_bounds()
+    score, held = best_over_sizes(out, len(x)), growth.held_on_bounds()
     return Grown(hypothesis, free, point, score, growth.simulations, on_bounds, held, u, jacobian)
 
 

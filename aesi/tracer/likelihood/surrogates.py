@@ -96,7 +96,7 @@ class _Sums:
 
 def _gains(blocks: Blocks, sums: _Sums, known: int, effects: Sequence[tuple[int, int]]) -> Array:
     """(e, s) nats: what each effect says of unseen data more than nothing, on each of s surrogates, blocks and
-    conditions weighted as in `gaussian.score_at`.
+    conditions weighted as in `gaussian.Weighed`.
 
     sums : with the sensitivities of the `known` parameters first.  effects : first column of each and the one after its
     last.

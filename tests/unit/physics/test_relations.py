@@ -1,6 +1,8 @@
 """Constitutive relations: values, scaling, and the way into a file."""
 
 import json
+import pickle
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -13,10 +15,12 @@ from aesi.physics.cell.relations import (
     Product,
     Scaled,
     Sum,
+    hashed_once,
     relation,
     scaled,
     tabulated,
     to_bpx,
+    value_at,
 )
 from aesi.physics.espm.tables import ocp_table
 
@@ -32,6 +36,54 @@ def test_sums_products_and_factors():
     mix = Sum(Scaled(TABLE, 2.0), Product(Constant(3.0), Expression("1 + 2 * x ** 2")))
     assert mix(X) == pytest.approx(2.0 * TABLE(X) + 3.0 * (1.0 + 2.0 * X**2))
     assert tabulated(mix, 0.0, 1.0, 7) == pytest.approx(mix(X))
+
+
+@pytest.mark.parametrize(
+    "item",
+    [
+        Constant(3.0),
+        TABLE,
+        Expression("2"),
+        Expression("tanh(3 * x) - exp(-x ** 2.5) / (x - 0.5) + log(x)"),  # poles, as potentials have
+        Sum(Scaled(TABLE, 2.0), Product(Constant(3.0), Expression("sqrt(x) * 10 ** x"))),
+    ],
+)
+def test_a_value_is_to_the_last_digit_that_of_an_array(item):
+    # A root that moves by round-off moves the slopes of a fit by a million times as much of them.
+    each = [value_at(item, float(x)) for x in X]
+    assert np.array_equal(each, [item(np.array([x]))[0] for x in X], equal_nan=True)
+
+
+class Text(str):
+    """A word that counts how often its hash is asked for."""
+
+    asked = 0
+
+    def __hash__(self):
+        Text.asked += 1
+        return super().__hash__()
+
+
+@hashed_once
+@dataclass(frozen=True)
+class Held:
+    word: str
+
+
+def test_a_hash_is_worked_out_once_and_by_value():
+    one = Held(Text("x"))
+    assert hash(one) == hash(one) == hash(Held("x"))
+    assert Text.asked == 1
+    assert {one: 1}[Held("x")] == 1
+    assert hash(one) != hash(Held("y"))
+
+
+def test_a_pickle_holds_no_hash_since_words_have_another_one_in_each_process():
+    hash(TABLE)
+    there = pickle.loads(pickle.dumps(TABLE))
+    assert set(vars(there)) <= {"x", "y", "_points"}
+    assert there == TABLE
+    assert hash(there) == hash(TABLE)
 
 
 def test_a_factor_of_one_changes_nothing_and_factors_join():
