@@ -20,7 +20,7 @@ UNLIKELY = {
     "time_s": r"step|rest\b|date|stamp|real|absolute|cycle|dpt|dt\b|/dt",
     "current_a": r"density|range|limit|capacity|control|set\b|rate|time|temp|dq|power|shunt|offset",
     "voltage_v": r"limit|control|set\b|max|min|dv|range|aux|offset|power|upper|lower",
-    "temperature_degc": r"time|/dt|set\b|limit|circuit|\bamb|chamber|env|room|umgebung|kammer",
+    "temperature_degc": r"time|/dt|set\b|limit|circuit|\bt?amb|chamber|env|room|umgebung|kammer",
     "state": r"time|of charge|soc",
 }
 WHOLE_TIME = r"total|test|cumul|elapsed"
@@ -55,7 +55,13 @@ def temperatures(header: Sequence[str]) -> list[str]:
 def stem(name: str) -> str:
     """A column's name without its unit."""
     found = UNIT.search(name)
-    return plain(name[: found.start()] if found else name)
+    # A last word is a unit only where it is one: T_chamber is not T.
+    is_unit = found is not None and (found.group(3) is None or _spelt_anywhere(found.group(3)))
+    return plain(name[: found.start()] if found is not None and is_unit else name)
+
+
+def _spelt_anywhere(text: str) -> bool:
+    return any(units.spelt(quantity, text) is not None for quantity in units.SPELLINGS)
 
 
 def unit_in(name: str) -> str:

@@ -20,7 +20,7 @@ LONGEST_TEST_D = 1000.0
 def longer_unit(time_s: Array) -> str:
     """Of stamps that are too close for seconds, the unit that they rather are in, as `--unit time_s=` takes it."""
     if _of_a_spreadsheet(time_s):
-        return "d (days, as a spreadsheet writes dates)"
+        return "d"
     return "h, min or d"
 
 

@@ -54,6 +54,8 @@ def check_dead(columns: Columns, context: Context) -> None:
             sides += [f"--from-s {time[end]:.10g}"] * (end < len(current) - 1)
             where = f"{rows:,} rows, up to {time[end]:.10g} s," if sides else f"all {rows:,} rows"
             aside = f", or read one side of it: {' or '.join(sides)}" if sides else ""
+            if current[begin] != 0.0 and not np.min(current) < 0.0 < np.max(current):
+                aside += ", or the file holds magnitudes, and another column says which way it flows (--state COLUMN)"
             raise DataError(
                 f"{context.at('current_a', begin)}: the current is {current[begin]:.6g} A in {where} while the voltage "
                 f"turns {turns} times, rising and falling by more than {least:.2g} V, which only a current makes it "

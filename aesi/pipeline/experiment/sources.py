@@ -59,8 +59,7 @@ def sources_of(config: ExperimentConfig, cell: Path) -> Sources:
         for name, (path, called) in _placed(where, _listed(data)).items()
     }
     train, valid, test = ([records[name][0] for name in roles[role]] for role in ROLES)
-    for fitted in (train, valid, [*train, *valid]):
-        check_distinct(fitted, test)
+    check_distinct([*train, *valid], test)
     return Sources(records, roles)
 
 

@@ -74,7 +74,6 @@ FILMS = tuple(FileParameter(FILM, side, STEP, True, FILM_ENERGY_SD) for side in 
 ENERGIES_J_MOL = np.array([prior.energy_j_mol / prior.prior_sd for prior in (*PRIORS, *FILMS)])
 """(n_slopes,) deviation of each activation energy over that of the logarithm of its rate; 0 where there is none."""
 ALL = tuple(range(len(PRIORS)))
-HALF_FULL = 0.5
 INITIAL_STATE = (0,)
 RESISTOR = (1,)
 """Places in PRIORS of what a fit moves: everything, the state of charge at the start alone, the contact alone."""
@@ -169,9 +168,10 @@ def start_v(
     physics: PhysicsStart, record: Measurement, soc0: float, soc0_sd: float, hold: Hold, voltage_v: Array
 ) -> Array:
     """(n,) V, >= 0, how far the voltage_v (n,) of the record under the physics moves where it starts a deviation
-    `soc0_sd` nearer to half full.
+    `soc0_sd` fuller or emptier, whichever is more: a knee lies to one side. No cell starts beyond full or empty.
 
-    soc0 : as of `PhysicsStart.simulate`.  Nearer, since a cell may not start beyond full or empty.
+    soc0 : as of `PhysicsStart.simulate`.
     """
-    nearer = soc0 - soc0_sd if soc0 > HALF_FULL else soc0 + soc0_sd
-    return np.asarray(np.abs(physics.simulate(record, nearer, hold).voltage_v - voltage_v))
+    others = {float(np.clip(soc0 + sign * soc0_sd, 0.0, 1.0)) for sign in (-1.0, 1.0)}
+    moved = [np.abs(physics.simulate(record, other, hold).voltage_v - voltage_v) for other in others]
+    return np.asarray(np.max(moved, axis=0))

@@ -130,8 +130,13 @@ class HybridModel:
     ) -> Prediction:
         """`predict` of a record, under its name: one step ahead of its voltage, or in free run, which sees none.
 
-        soc0_sd : standard deviation of soc0, by what it is worth the band of a free run is wider.
+        soc0_sd : standard deviation of soc0, by what it is worth the band of a free run is wider. Raises InputError
+        for one that is no number from 0 to 1.
         """
+        if not 0.0 <= soc0_sd <= 1.0:  # this way round, NaN fails too
+            raise InputError(
+                f"soc0_sd = {soc0_sd!r} is no standard deviation of a state of charge; give 0 to 1."
+            )
         measured = record.voltage_v
         if one_step and not np.isfinite(measured).all():
             row = int(np.flatnonzero(~np.isfinite(measured))[0])

@@ -9,7 +9,7 @@ be, and is asked about: a cell that has lost lithium since the good records read
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -19,7 +19,7 @@ from aesi.numerics.typing import BoolArray
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.decide.carry_over import ORDINARY_C, range_fault
 from aesi.tracer.decide.evidence import MEASURED_EFFECTS, Answer, Evidence, with_confidence
-from aesi.tracer.decide.verdict import MOST_SDS, Thresholds, Verdict, best_gain, beyond, look_alikes
+from aesi.tracer.decide.verdict import Thresholds, Verdict, best_gain, beyond, look_alikes, tolerance_v
 from aesi.tracer.decide.written import limits_of
 from aesi.tracer.likelihood.fit import FittedHypothesis, held_out_residual
 from aesi.tracer.likelihood.growth import Explanation, Parent
@@ -29,7 +29,7 @@ from aesi.tracer.search.fitted import fitted_hypothesis
 from aesi.tracer.search.forward import searched
 from aesi.tracer.search.grown import grown_with
 from aesi.tracer.search.path import Path, Report
-from aesi.tracer.search.plausible import alike
+from aesi.tracer.search.plausible import ALIKE_NATS, alike, lag
 from aesi.tracer.search.wrong_parameters import NINETY
 
 
@@ -42,7 +42,13 @@ def gathered_beside(
     """
     beside = replace(problem, trust="beside")
     path = searched(beside, min(max_effects, MEASURED_EFFECTS), archive, report)
-    verdict = of_one_age(judged_beside(path, thresholds), path.chosen, _of_another_age(path, archive))
+    usual = Usual.of(path, thresholds)
+    verdict = judged_beside(path, thresholds, usual)
+    if verdict.word != "none":
+        aged = [
+            one for one in _of_another_age(path, archive) if usual.said_nats(path, one) > path.admission_nats
+        ]
+        verdict = of_one_age(verdict, path.chosen if verdict.effects else path.base, aged)
     return Answer(path, verdict, {"beside": path}, partial(_settled, path))
 
 
@@ -58,62 +64,95 @@ def _settled(path: Path, verdict: Verdict) -> Evidence:
 
 
 def _of_another_age(path: Path, archive: Archive) -> list[FittedHypothesis]:
-    """What the records would be left with if instead of what is named the cell had aged beside the good ones."""
-    if not path.chosen.hypothesis:
-        return []
+    """What the records would be left with if, instead of what is named, the cell had aged beside the good ones; the
+    best first."""
     names = [name for name, effect in path.problem.effects.items() if effect.of_age]
     grown = grown_with(Parent(path.problem, path.blocks, path.base), names, archive)
     fits = (fitted_hypothesis(path.problem, path.blocks, one.hypothesis, one, archive) for one in grown)
-    return [fit for fit in fits if fit is not None]
+    return sorted((fit for fit in fits if fit is not None), key=lambda fit: -fit.score.total)
 
 
-def of_one_age(verdict: Verdict, named: Explanation, aged: Sequence[Explanation]) -> Verdict:
+def of_one_age(verdict: Verdict, believed: Explanation, aged: Sequence[Explanation]) -> Verdict:
     """The verdict, with what an age of its own would say as well of the records among the look-alikes; no name where
     it says more.
 
-    named : what the verdict names.  aged : what an age would say instead.
+    believed : what the verdict names, or the model without an effect.  aged : what an age would say instead, the best
+    first.
     """
+    better = tuple(one for one in aged if not alike(one, believed))
+    if better:
+        nats = better[0].score.total - believed.score.total
+        instead = verdict.effects[0] if verdict.effects else "no effect"
+        reason = (
+            f"{better[0].hypothesis[0]} says {nats:.1f} nats more of unseen data than {instead} does, and records of "
+            "one age do not differ by it: the good records seem to be of another age; leave out --good to ask what the "
+            "cell has lost since its file"
+        )
+        names = tuple(one.hypothesis[0] for one in better)
+        return replace(
+            verdict, word="unknown", effects=(), confidence_sets=(), reason=reason, margin=0.0, aged=names
+        )
     if not verdict.effects:
         return verdict
-    better = [one for one in aged if not alike(one, named)]
-    if better:
-        most = max(better, key=lambda one: one.score.total)
-        reason = (
-            f"{most.hypothesis[0]} says {most.score.total - named.score.total:.1f} nats more of unseen data than "
-            f"{verdict.effects[0]} does, and records of one age do not differ by it: the good records seem to be of "
-            "another age; leave out --good to ask what the cell has lost since its file"
-        )
-        return replace(verdict, word="unknown", effects=(), confidence_sets=(), reason=reason, margin=0.0)
-    as_well = tuple(one.hypothesis[0] for one in aged if alike(named, one))
+    lags = [(one.hypothesis[0], *lag(believed, one)) for one in aged]
+    as_well = tuple(one.hypothesis[0] for one in aged if alike(believed, one))
+    others = [nats / max(sd, ALIKE_NATS) for name, nats, sd in lags if name not in as_well]
+    verdict = replace(verdict, margin=min([verdict.margin, *others]))
     if not as_well:
         return verdict
-    (known,) = verdict.confidence_sets or (verdict.effects,)
+    known = (
+        verdict.confidence_sets[0] if verdict.confidence_sets else verdict.effects
+    )  # one name is the most here
     reason = (
         f"{verdict.reason}; {' or '.join(as_well)} would say as much if the good records are of another age"
     )
     return replace(verdict, confidence_sets=((*known, *as_well),), reason=reason)
 
 
-def judged_beside(path: Path, thresholds: Thresholds) -> Verdict:
+@dataclass(frozen=True)
+class Usual:
+    """What a right answer may leave of the records in question, V beyond the noise.
+
+    good_v : what the model leaves of the good records.  usual_v : with what a right hypothesis leaves of any.
+    allowed_v : with chance, by which the errors of two records differ.
+    """
+
+    good_v: float
+    usual_v: float
+    allowed_v: float
+
+    @classmethod
+    def of(cls, path: Path, thresholds: Thresholds) -> Usual:
+        """Of a search, by what it chose."""
+        problem, good = path.problem, path.problem.good_rows
+        good_v = left_v(path, path.chosen, good & problem.compared)
+        usual_v = float(np.hypot(good_v, tolerance_v(problem, thresholds)))
+        return cls(good_v, usual_v, usual_v * (1.0 + NINETY * _relative_sd(problem, good)))
+
+    def said_nats(self, path: Path, one: FittedHypothesis) -> float:
+        """What a hypothesis says more than none, by the error that these records show for themselves: nats count by
+        the ratio of the mean squares where more is left than may be."""
+        left = left_v(path, one, ~path.problem.good_rows)
+        return path.gain(one) * (1.0 if left <= self.allowed_v else (self.usual_v / left) ** 2)
+
+
+def judged_beside(path: Path, thresholds: Thresholds, usual: Usual) -> Verdict:
     """The verdict on a search beside good records; its confidence is still to be read off the margin."""
-    problem = path.problem
-    good = problem.good_rows
-    before, left = (left_v(path, one, ~good) for one in (path.base, path.chosen))
-    usual = left_v(path, path.chosen, good & problem.compared)
-    allowed = usual * (1.0 + NINETY * _relative_sd(problem, good))
+    problem, allowed = path.problem, usual.allowed_v
+    before, left = (left_v(path, one, ~problem.good_rows) for one in (path.base, path.chosen))
     named = path.chosen.hypothesis
-    if left > allowed and path.gain(path.chosen) * (usual / left) ** 2 < path.admission_nats:
+    if left > allowed and usual.said_nats(path, path.chosen) < path.admission_nats:
         named = ()  # of the error that these records show by themselves it does not say enough
     groups, margin = look_alikes(path, thresholds, max(allowed, left)) if named else ((), -best_gain(path))
     others = ", ".join(r.name for r in problem.records if not r.good)
     reason = (
         f"{1e3 * before:.1f} mV beyond the noise on unseen data of {others} before, {1e3 * left:.1f} mV after; "
-        f"{1e3 * usual:.1f} mV on the good records"
+        f"{1e3 * usual.good_v:.1f} mV on the good records"
     )
     if left > allowed:
         reason += f", beyond {1e3 * allowed:.1f} mV no chance: not all of what is different is explained"
         if not named:
-            margin = float(np.log(left / allowed)) if allowed > 0.0 else MOST_SDS
+            margin = float(np.log(left / allowed))
         return Verdict("unknown", named, groups, 0.0, left, allowed, reason, max(margin, 0.0))
     return Verdict("found" if named else "none", named, groups, 0.0, left, allowed, reason, margin)
 

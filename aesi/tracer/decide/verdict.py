@@ -63,6 +63,7 @@ class Verdict:
     margin : what the confidence is read off, see `decide.confidence`. Of an answer with names, standard deviations by
     which the closest rival lags, or of the weakest name's gain. Of `none` the nats that the best effect says less. Of
     `unknown` without names the logarithm of what is left over what may be, nought where too little was foretold.
+    aged : what would explain more than is named if the good records beside the others are of another age.
     """
 
     word: Word
@@ -73,6 +74,7 @@ class Verdict:
     tolerance_v: float
     reason: str
     margin: float = 0.0
+    aged: tuple[str, ...] = ()
 
     @property
     def groups(self) -> tuple[tuple[str, ...], ...]:

@@ -40,6 +40,19 @@ def test_a_voltage_that_leapt_for_single_rows_was_taken_in_silence(tmp_path, lea
     assert "(rows like it: 3)" in said
 
 
+def test_the_end_of_a_discharge_in_rows_of_a_minute_was_a_glitch(tmp_path):
+    """After pulses that tell a resistance of 35 mohm a knee falls ever faster, and the load ends."""
+    time = 60.0 * np.arange(60.0)
+    current = np.where(np.arange(60) % 10 < 5, 0.0, 2.3)
+    current[40:55], current[55:] = 2.3, 0.0
+    voltage = 3.3 - 1e-3 * np.arange(60) - 0.035 * current
+    voltage[49:55] = [3.1, 2.95, 2.75, 2.593, 2.385, 2.038]
+    voltage[55:] = [2.719, 2.894, 2.946, 2.96, 2.97]
+    assert "glitch" not in notes(tmp_path, current, voltage, time=time)
+    voltage[20] -= 0.5
+    assert "at row 21 (line 22) alone" in notes(tmp_path, current, voltage, time=time)
+
+
 def test_a_current_that_leaps_was_held_for_magnitudes(tmp_path):
     """Its steps move the voltage neither way; what signs and units are told by are the other rows."""
     current = np.abs(CURRENT)
@@ -126,7 +139,7 @@ def test_a_unit_that_was_declared_wrongly_was_advised_another(tmp_path, declared
 
 
 def test_the_days_of_a_spreadsheet_are_named(tmp_path):
-    assert "--unit time_s=d (days" in refusal(tmp_path, CURRENT, VOLTAGE, 45000.0 + TIME / 86400.0)
+    assert "declare it: --unit time_s=d." in refusal(tmp_path, CURRENT, VOLTAGE, 45000.0 + TIME / 86400.0)
 
 
 def test_a_time_in_whole_minutes_was_advised_to_drop_nearly_all_rows(tmp_path):
@@ -153,6 +166,10 @@ def test_the_temperature_that_was_taken_is_told_from_those_that_were_not(tmp_pat
     assert "taken from column 'temperature_degc', and not from 'T_amb [°C]', 'T_chamber'." in said
     said = notes(tmp_path, header=header.format("T_cell [°C]"), more=degc)
     assert "Column 'T_cell [°C]' looks like a temperature and is not used" in said
+    names = "Tambient [°C],T_cell,T_chamber"
+    said = notes(tmp_path, header=f"time_s,current_a,voltage_v,{names}", more=degc)
+    assert "Column 'T_cell' looks like a temperature and is not used" in said
+    assert "there is also 'Tambient [°C]', 'T_chamber'" in said
     said = notes(
         tmp_path,
         header="time_s,current_a,voltage_v,temperature_degc,temperature_k",

@@ -1,15 +1,18 @@
 """Records that are the same test, told from tests of the same protocol."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from aesi.errors import DataError
+from aesi.physics import Cell, simulate
 from aesi.pipeline.distinct import check_distinct
 from aesi.records import Measurement
 
 TIME = np.arange(0.0, 3000.0, 1.0)
+CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
 
 
 def drive(name, seed=1, noise=1e-3):
@@ -55,6 +58,19 @@ def test_what_is_shared_is_told_with_its_times():
 def test_a_second_test_of_the_same_protocol_is_another():
     check_distinct([RECORD, drive("day 2", 2)], [drive("day 3", 3)])
     check_distinct([drive("quiet", 2, 1e-4)], [drive("quiet 2", 3, 1e-4)])
+
+
+@pytest.mark.parametrize("noise_v", [0.0, 3e-4])
+@pytest.mark.parametrize("step_s", [10.0, 60.0])
+def test_two_cycles_of_one_cell_in_coarse_numbers_were_one_test(noise_v, step_s):
+    cell = Cell.from_bpx(CELLS / "lfp_prada2013.bpx.json")
+    time = np.arange(0.0, 3000.0, step_s)
+    cycles = []
+    for k, soc0 in enumerate((1.0, 0.9997)):
+        voltage = simulate(cell, time, np.full(len(time), 2.3), soc0, hold="backward").voltage_v
+        voltage = voltage + noise_v * np.random.default_rng(k).normal(size=len(time))
+        cycles.append(Measurement(time, np.full(len(time), 2.3), np.round(voltage, 2), name=f"cycle {k}"))
+    check_distinct(cycles)
 
 
 def test_parts_of_one_test_that_meet_are_apart():

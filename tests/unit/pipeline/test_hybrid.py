@@ -52,12 +52,14 @@ def model(record):
 
 def test_the_band_of_a_free_run_is_wider_by_what_the_start_is_uncertain_by(model, data):
     sure, unsure = (model.predict_record(data, SOC0, soc0_sd=sd) for sd in (0.0, 0.02))
-    moved = model.predict_record(data, SOC0 - 0.02)
+    moved = [model.predict_record(data, SOC0 + off).physics_v - sure.physics_v for off in (-0.02, 0.02)]
     np.testing.assert_array_equal(sure.voltage_v, unsure.voltage_v)
     narrow, wide = ((each.upper_v - each.voltage_v)[-1] for each in (sure, unsure))
-    start_v = abs(moved.physics_v - sure.physics_v)[-1]  # SOC0 is above a half
+    start_v = np.abs(moved).max(axis=0)[-1]  # to whichever side is more
     assert wide == pytest.approx(np.hypot(narrow, 1.645 * start_v), rel=1e-3)
     assert wide > 1.2 * narrow
+    with pytest.raises(InputError, match="soc0_sd = nan is no standard deviation"):
+        model.predict_record(data, SOC0, soc0_sd=float("nan"))
 
 
 def test_the_folder_holds_no_pickle_and_predicts_the_same(model, data, tmp_path):

@@ -11,11 +11,12 @@ from aesi.physics.effects import CATALOGUE
 from aesi.tracer import discover
 from aesi.tracer.case.free_parameter import acting_on, of_all_records
 from aesi.tracer.case.problem import BESIDE_TIMES
-from aesi.tracer.decide.beside import judged_beside, left_v, of_one_age
+from aesi.tracer.decide.beside import Usual, judged_beside, left_v, of_one_age
 from aesi.tracer.decide.verdict import Thresholds, Verdict
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.search.archive import context_of
 from aesi.tracer.search.grown import addable
+from aesi.tracer.search.plausible import lag
 
 OFFSET_V = 8e-3
 TRIED = ("series_resistance", "current_sensor_gain", "voltage_sensor_offset", "ocv_hysteresis")
@@ -181,11 +182,12 @@ def test_what_leaves_more_than_the_good_records_has_to_say_it_at_that_error(monk
     )
     monkeypatch.setattr("aesi.tracer.decide.beside.left_v", lambda path, one, rows: 4e-3 if rows[0] else 8e-3)
     monkeypatch.setattr("aesi.tracer.decide.beside.look_alikes", lambda *given: ((), 1.0))
-    verdict = judged_beside(path, Thresholds())
+    verdict = judged_beside(path, Thresholds(), Usual.of(path, Thresholds()))
     assert (verdict.word, verdict.effects) == ("unknown", named)
     # Without a name the confidence of `unknown` is read off the logarithm of what is left over what may be, 8 over 4 mV
-    # and what two records of a million rows each differ by.
-    assert verdict.margin == (1.0 if named else pytest.approx(np.log(2.0), abs=2e-3))
+    # with 0.6 that right hypotheses leave anyway, and what two records of a million rows each differ by.
+    may_be = np.hypot(4.0, np.hypot(0.45, 0.4))
+    assert verdict.margin == (1.0 if named else pytest.approx(np.log(8.0 / may_be), abs=2e-3))
 
 
 def said(name, total, scatter=1.0):
@@ -209,8 +211,26 @@ def test_what_an_age_says_as_well_is_a_look_alike_and_what_it_says_better_takes_
     assert "of another age" in alike.reason
     other = of_one_age(named, gain, [worse, better])
     assert (other.word, other.effects, other.confidence_sets) == ("unknown", (), ())
+    assert other.aged == ("lithium_inventory_loss",)
     assert "30.0 nats more" in other.reason
     assert "leave out --good" in other.reason
+
+
+def test_an_age_that_lags_less_than_any_other_rival_is_what_the_confidence_is_read_off():
+    named = Verdict("found", ("series_resistance",), (), 0.0, 0.0, 1.0, "so", margin=9.0)
+    believed = said("series_resistance", 40.0)
+    assert of_one_age(named, believed, [said("film_growth", 10.0)]).margin == 9.0
+    scattered = said("film_growth", 10.0, scatter=3.0)
+    nats, deviation = lag(believed, scattered)
+    assert of_one_age(named, believed, [scattered]).margin == nats / deviation < 9.0
+
+
+def test_where_nothing_is_named_an_age_that_says_enough_is_told():
+    left = Verdict("unknown", (), (), 0.0, 8e-3, 4e-3, "left", margin=0.7)
+    told = of_one_age(left, said("nothing", 0.0), [said("lithium_inventory_loss", 30.0)])
+    assert (told.word, told.effects, told.aged) == ("unknown", (), ("lithium_inventory_loss",))
+    assert "than no effect does" in told.reason
+    assert of_one_age(left, said("nothing", 0.0), []) == left
 
 
 def test_an_aged_cell_was_a_current_that_reads_too_low(cell, erring):
@@ -227,3 +247,23 @@ def test_an_aged_cell_was_a_current_that_reads_too_low(cell, erring):
         "active_material_loss_negative",
     )
     assert "another age" in found.verdict.reason
+
+
+def test_a_fault_is_found_beside_a_good_record_that_the_model_follows_to_the_noise(cell, tried, make):
+    good, other = (replace(make(seed=seed, n=5400), name=name) for seed, name in ((1, "good"), (2, "other")))
+    other = replace(other, current_a=1.02 * other.current_a)
+    found = discover(cell, [other], soc0=0.9, effects=tried, good=[good])
+    assert (found.verdict.word, found.verdict.effects) == ("found", ("current_sensor_gain",))
+    assert found.verdict.confidence < 0.99
+
+
+def test_lost_lithium_that_nothing_else_explains_is_told_beside_a_fresh_record(cell, tried, make):
+    lost = CATALOGUE["lithium_inventory_loss"].activate(loss=0.15)
+    good, other = (
+        replace(make(seed=1, n=5400), name="good"),
+        replace(make([lost], seed=2, n=5400), name="other"),
+    )
+    effects = {"voltage_sensor_offset": tried["voltage_sensor_offset"], "lithium_inventory_loss": lost.effect}
+    found = discover(cell, [other], soc0=0.9, effects=effects, good=[good])
+    assert (found.verdict.word, found.verdict.effects) == ("unknown", ())
+    assert found.verdict.aged == ("lithium_inventory_loss",)

@@ -141,7 +141,11 @@ def finding_line(discovery: Mapping[str, Any]) -> str:
 
 
 def unexplained_by(discovery: Mapping[str, Any]) -> str:
-    """What goes on after 'something real': ' that no effect of the catalogue explains', or which of them were tried."""
+    """What goes on after 'something real': ' that no effect of the catalogue explains', or which of them were tried, or
+    that the good records beside the others seem to be of another age."""
+    aged = discovery.get("of_another_age", ())
+    if aged:
+        return f" that {aged[0].replace('_', ' ')} explains if the good records are of another age"
     tried = discovery.get("tried", CATALOGUE)
     if not tried:
         return "; no effect was tried on it"
