@@ -103,7 +103,9 @@ def calibrate(
         model=model,
         x=x,
         covariance=covariance,
-        against_temperature=against_temperature(cell, model.records, model.model_name),
+        against_temperature=against_temperature(
+            _of_size(cell, model.cell), model.records, model.model_name, conditions.temperatures_degc
+        ),
     )
 
 
@@ -226,6 +228,16 @@ def _sized(cell: Cell, records: Sequence[Measurement], same_cell: bool) -> tuple
     zero = zero_of(roughly, records)
     start, sentences = sized(cell, [zero.taken_out(r, roughly.nominal_capacity_ah) for r in records])
     return start, zero, sentences
+
+
+def _of_size(cell: Cell, sized_cell: Cell) -> Cell:
+    """The start file of the size that the records tell, with no typical value that is filled in: the limits of what
+    contradicts a temperature were set with files as they are."""
+    return replace(
+        cell,
+        electrode_area_m2=sized_cell.electrode_area_m2,
+        nominal_capacity_ah=sized_cell.nominal_capacity_ah,
+    )
 
 
 def _of_small_span(span_k: float, n_records: int) -> tuple[str, ...]:

@@ -83,8 +83,8 @@ times the capacity of their own cell's file, the drive of an LG M50T 1.31 times 
 ABOVE_FULL_V = 0.1
 """A voltage at rest further above that of a full cell belongs to another chemistry."""
 MOST_C_RATE = 100.0
-"""Of a current without a voltage: the pulses that cells are sold for are of 50C at most, a drive in mA is of 1000C and
-more."""
+"""Of a current without a voltage in every row: the pulses that cells are sold for are of 50C at most, a drive in mA is
+of 1000C and more."""
 MOST_CAPACITIES = 10.0
 """Of a cell, that may flow one way: a schedule asks for several where a start or a capacity is wrong, one in ms for a
 thousand times what it is."""
@@ -136,20 +136,19 @@ def check_measured(cell: Cell, records: Sequence[Measurement]) -> None:
 
 def check_belongs(cell: Cell, records: Iterable[Measurement]) -> None:
     """Raises DataError, one sentence, for the first record that cannot be of this cell: of its voltages, before what
-    these and its charge say of the capacity, which means nothing where they are another cell's; of a current alone,
-    one that is of no cell of this capacity."""
+    these and its charge say of the capacity, which means nothing where they are another cell's; of a current
+    without a voltage in every row, one that is of no cell of this capacity."""
     for record in records:
-        if not np.any(np.isfinite(record.voltage_v)):
-            _check_current(cell, record)
         if not np.all(np.isfinite(record.voltage_v)):
+            _check_current(cell, record)
             continue
         _check_window(cell, record)
         _check_capacity(cell, record)
 
 
 def _check_current(cell: Cell, record: Measurement) -> None:
-    """Of a current without a voltage: one that no cell of this capacity carries, or that moves many times what it
-    holds, is in another unit."""
+    """Of a current without a voltage in every row: one that no cell of this capacity carries, or that moves many times
+    what it holds, is in another unit."""
     declared = max(cell.nominal_capacity_ah, cell.capacity_ah)
     row = int(np.argmax(np.abs(record.current_a)))
     rate = float(np.abs(record.current_a[row])) / declared

@@ -26,7 +26,7 @@ from aesi.tracer.case.records import PreparedRecord, prepare_all, prepare_test
 from aesi.tracer.decide.beside import gathered_beside
 from aesi.tracer.decide.evidence import Answer, Evidence, gathered
 from aesi.tracer.decide.model_choice import ModelChoice, with_model
-from aesi.tracer.decide.temperatures import fitted_at_fault, other_temperatures
+from aesi.tracer.decide.temperatures import fitted_at_fault, left_by_fit, other_temperatures
 from aesi.tracer.decide.verdict import Thresholds, Verdict
 from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_state import ModelState
@@ -100,7 +100,7 @@ class Discovery:
     contradicted : whether what explains the data leaves more of the test part than a right explanation may.
     warnings : that, records that contradict their own temperature, where the written model does worse than another one
     on the test part or on what was fitted, and where the test part has no load.
-    other_temperature : names of the records that contradict their own.
+    other_temperature : names of the records that contradict their own, and that nothing fitted at it explains.
     seconds : spent.  simulations : of the hypotheses that were tried, without what judges them.
     """
 
@@ -252,7 +252,9 @@ def _told(
     seconds: float,
 ) -> Discovery:
     problem, verdict = evidence.path.problem, evidence.verdict
-    records, others = problem.records, other_temperatures(problem)
+    # What explains the data is not always what is written: it may not run over the declared range.
+    fitted = evidence.after if verdict.word == "unknown" else ModelState.of(problem, evidence.path.chosen)
+    records, others = problem.records, left_by_fit(fitted, other_temperatures(problem))
     at_fault = fitted_at_fault(evidence.after, others)
     if at_fault is not None:
         evidence = replace(evidence, after=ModelState(problem), fault=at_fault, limits=())

@@ -93,7 +93,7 @@ def run(
     standing = {"seeds": 3} if whole else QUICK
     settings: dict[str, Any] = {**standing, **{k: v for k, v in asked.items() if v is not None}}
     runs = [
-        SplitRun(split, seed, experiments, (*_laid(split, seed, settings, models), *overrides))
+        SplitRun(split, seed, experiments, over(_laid(split, seed, settings, models), overrides))
         for split in chosen_splits(cells, settings.get("a_cell"), only, development)
         for seed in range(int(settings["seeds"]))
     ]
@@ -104,6 +104,17 @@ def run(
         yield row
     if write is not None:
         write_between(write, BEGIN, END, table(kept(keep) if keep else rows[:-1]))
+
+
+def over(laid: Sequence[str], overrides: Sequence[str]) -> tuple[str, ...]:
+    """What is laid over a file, less the keys that were asked for otherwise, and then these: no key twice, which an
+    experiment refuses."""
+    asked = {_key(override) for override in overrides}
+    return (*(one for one in laid if _key(one) not in asked), *overrides)
+
+
+def _key(override: str) -> str:
+    return override.partition("=")[0].strip()
 
 
 def _files(run: SplitRun) -> Iterator[Path]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from functools import partial
 
 from aesi.calibration.records.prepared import Prepared
@@ -15,9 +15,18 @@ from aesi.physics.cell import Cell
 from aesi.physics.simulation import ModelName
 from aesi.physics.start.temperature import other_temperature
 
+OTHER_CELL = "the start file is of a cell with other kinetics, and what the fit moves is right"
+"""Where the temperature is right."""
 
-def against_temperature(cell: Cell, records: Sequence[Prepared], model: ModelName) -> tuple[str, ...]:
-    """A sentence for each such record: by the cell of the start file, before a fit makes up for it."""
+
+def against_temperature(
+    cell: Cell, records: Sequence[Prepared], model: ModelName, given: Container[str] = ()
+) -> tuple[str, ...]:
+    """A sentence for each such record: by the start file, before a fit makes up for it.
+
+    cell : of the start file, of the size that the records tell.
+    given : names of the records whose temperature no column has.
+    """
     out = []
     declared_degc = cell.initial_temperature_k - ZERO_CELSIUS_K
     for record in records:
@@ -26,7 +35,7 @@ def against_temperature(cell: Cell, records: Sequence[Prepared], model: ModelNam
         left_v = partial(_left_v, cell, record, model)
         found = other_temperature(record.kelvin - ZERO_CELSIUS_K, declared_degc, left_v)
         if found is not None:
-            out.append(found.sentence(record.name, "the start file"))
+            out.append(found.sentence(record.name, "the start file", OTHER_CELL, given=record.name in given))
     return tuple(out)
 
 

@@ -35,7 +35,7 @@ FURTHER_K = 8.0
 
 @dataclass(frozen=True)
 class OtherTemperature:
-    """degc : in the mean of the column, at which the declared cell leaves `left_v` (RMS).  there_degc, there_v : of the
+    """degc : in the mean of the rows, at which the declared cell leaves `left_v` (RMS).  there_degc, there_v : of the
     temperature at which it leaves least."""
 
     degc: float
@@ -43,13 +43,26 @@ class OtherTemperature:
     there_degc: float
     there_v: float
 
-    def sentence(self, name: str, model: str = "the declared model") -> str:
-        """For a reader.  name : of the record.  model : that was simulated, in words."""
+    def sentence(
+        self,
+        name: str,
+        model: str = "the declared model",
+        otherwise: str = "the cell answers as one at that temperature would",
+        *,
+        given: bool = False,
+    ) -> str:
+        """For a reader.  name : of the record.  model : that was simulated, in words.  otherwise : what is so where the
+        temperature is right.  given : it was, with --temperature, and there is no column."""
+        wrong = (
+            "what was given is not the cell's (correct --temperature FILE=DEGC)"
+            if given
+            else "it is in another unit (--unit temperature_degc=degF), its sensor is at fault or not on the cell "
+            "(--column temperature_degc= leaves it out)"
+        )
         return (
-            f"{name}: its voltage contradicts its temperature. At {self.degc:.4g} degC, which it is taken at, {model} "
-            f"leaves {MV_PER_V * self.left_v:.1f} mV, at {self.there_degc:.4g} degC {MV_PER_V * self.there_v:.1f} mV: "
-            "it is in another unit (--unit temperature_degc=degF), its sensor is at fault or not on the cell (--column "
-            "temperature_degc= leaves it out), or the cell answers as one at that temperature would."
+            f"{name}: its voltage contradicts its temperature. At {self.degc:.4g} degC, which it is taken at, "
+            f"{model} leaves {MV_PER_V * self.left_v:.1f} mV, at {self.there_degc:.4g} degC "
+            f"{MV_PER_V * self.there_v:.1f} mV: {wrong}, or {otherwise}."
         )
 
 
@@ -62,16 +75,18 @@ def other_temperature(
     error_v : RMS, V, that the declared cell leaves at temperatures (n,) degC; None where it cannot be simulated.
     """
     left_v, mean = error_v(column_degc), float(np.mean(column_degc))
-    if left_v is None or left_v <= CLEAR_V:
+    if left_v is None or not CLEAR_V < left_v < np.inf:  # this way round, NaN is no evidence
         return None
     tried = {
         degc: there_v
         for degc in {*GRID_DEGC, round(declared_degc, 2)}
-        if abs(degc - mean) >= FURTHER_K and (there_v := error_v(np.full(len(column_degc), degc))) is not None
+        if abs(degc - mean) >= FURTHER_K
+        and (there_v := error_v(np.full(len(column_degc), degc))) is not None
+        and np.isfinite(there_v)
     }
     if not tried:
         return None
     best = min(tried, key=lambda degc: tried[degc])
-    if tried[best] > FOLLOWS_V or left_v < TIMES * tried[best]:
+    if not (tried[best] <= FOLLOWS_V and left_v >= TIMES * tried[best]):
         return None
     return OtherTemperature(mean, left_v, best, tried[best])

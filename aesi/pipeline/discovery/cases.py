@@ -93,5 +93,6 @@ def case_of_experiment(config: ExperimentConfig) -> Case:
         model=config.cell.model,
         soh=config.cell.soh,
         good=good,
+        of_experiment=True,
     )
     return within_budget(case)

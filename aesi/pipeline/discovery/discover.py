@@ -19,6 +19,7 @@ from aesi.physics.effects import CATALOGUE, Effect, known_effects, selected
 from aesi.physics.folded import folded
 from aesi.physics.simulation import ModelName
 from aesi.pipeline.distinct import check_distinct
+from aesi.pipeline.experiment.sources import with_keys
 from aesi.pipeline.notes import of_day, on_temperatures, temperature_sentence, together
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
@@ -50,6 +51,7 @@ class Case:
     max_effects : most that are added; it is said where this is less than usual.
     soh : share of the cell's capacity that it had then, or the day of the test; None takes all of it.
     good : records of the same cell that are known to be good.
+    of_experiment : an experiment file describes it, whose keys are named beside the options of a command.
     """
 
     cell: Path | HybridModel
@@ -65,6 +67,7 @@ class Case:
     model: ModelName | None = None
     soh: Soh | None = None
     good: tuple[Measurement, ...] = ()
+    of_experiment: bool = False
 
     def __post_init__(self) -> None:
         """Raises DataError for a record that is given twice."""
@@ -143,7 +146,7 @@ def run_case(case: Case, out: Path | None = None, progress: Progress | None = No
     given = case.declared()
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
-    return discover(
+    found = discover(
         given.cell,
         case.measurements,
         case.tests,
@@ -158,6 +161,7 @@ def run_case(case: Case, out: Path | None = None, progress: Progress | None = No
         model=case.model or ("dfn" if given.model == "dfn" else None),
         good=case.good,
     )
+    return replace(found, warnings=tuple(map(with_keys, found.warnings))) if case.of_experiment else found
 
 
 def write_discovery(out: Path, case: Case, found: Discovery, mlflow_run_id: str = "") -> dict[str, Any]:

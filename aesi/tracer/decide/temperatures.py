@@ -45,20 +45,40 @@ def _left_v(problem: InverseProblem, index: int, degc: Array) -> float | None:
     return rms(there.voltage_v - run.voltage_v)
 
 
+def left_by_fit(fitted: ModelState, others: Mapping[int, OtherTemperature]) -> dict[int, OtherTemperature]:
+    """Those of the records of which a fitted model, too, leaves more than the declared one does at another temperature,
+    or that it does not simulate to their end: what it leaves less of is explained at its own, as where the kinetics are
+    off."""
+    out = {}
+    for index, other in others.items():
+        try:
+            explained = _left_by_v(fitted, index) <= other.there_v
+        except AesiError:
+            explained = False
+        if not explained:
+            out[index] = other
+    return out
+
+
+def _left_by_v(fitted: ModelState, index: int) -> float:
+    """RMS, V, of what fits see of a record."""
+    record = fitted.problem.records[index]
+    rows = slice(0, record.n_fit)
+    voltage_v = fitted.simulated(record, index, thin=True).voltage_v[rows]
+    return rms(np.asarray(record.thin.voltage_v[rows] - voltage_v))
+
+
 def fitted_at_fault(written: ModelState, others: Mapping[int, OtherTemperature]) -> str | None:
     """Why a fitted model is not written: of a record that contradicts its temperature it leaves far more than the
     declared one does at another. What it moved makes up for the temperature then. None where that holds of none."""
-    problem = written.problem
     if written.values is None:
         return None
     for index, other in others.items():
-        record = problem.records[index]
-        rows = slice(0, record.n_fit)
-        voltage_v = written.simulated(record, index, thin=True).voltage_v[rows]
-        left_v = rms(np.asarray(record.thin.voltage_v[rows] - voltage_v))
+        left_v = _left_by_v(written, index)
         if left_v > LEAVES_TIMES * other.there_v:
+            name = written.problem.records[index].name
             return (
-                f"what was fitted at {other.degc:.4g} degC leaves {MV_PER_V * left_v:.1f} mV of {record.name}, the "
+                f"what was fitted at {other.degc:.4g} degC leaves {MV_PER_V * left_v:.1f} mV of {name}, the "
                 f"declared model at {other.there_degc:.4g} degC {MV_PER_V * other.there_v:.1f}: it makes up for a "
                 "temperature that the record contradicts"
             )

@@ -114,8 +114,11 @@ def written(
 def of_refit(
     declared: Option, recalibrations: Sequence[Option], options: Sequence[Option], taken: ModelState
 ) -> str | None:
-    """Why the recalibration that carries best is not what is written, and what is in its place where that is neither
-    the declared model; None where it is written, or where nothing speaks against it."""
+    """Why the recalibration that carries best is not what is written, and what is in its place where that is not the
+    declared model; None where it is written, or where nothing speaks against it.
+
+    options : recalibrations that may be written, those among them.
+    """
     if not recalibrations:
         return None
     best = carries_best(recalibrations)
@@ -128,8 +131,8 @@ def of_refit(
         return why
     left_mv, before_mv = 1e3 * other.left_out.pooled_v, 1e3 * declared.left_out.pooled_v
     return (
-        f"{why}; written is one whose parameters moved less, which leaves {left_mv:.1f} mV of data left out, the "
-        f"declared one {before_mv:.1f}"
+        f"{why}; written is another fit of its parameters, which leaves {left_mv:.1f} mV of data left out, the "
+        f"declared model {before_mv:.1f}"
     )
 
 

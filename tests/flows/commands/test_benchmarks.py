@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from aesi.errors import InputError
+from aesi.errors import ConfigError, InputError
 from flows import benchmarks
+from flows.benchmarks import splits
 from flows.benchmarks.cases import Cases
 from flows.benchmarks.cases import tracked as of_cases
 from flows.benchmarks.history import (
@@ -338,3 +339,27 @@ def test_a_benchmark_without_its_peer_said_so_after_half_a_minute(monkeypatch, c
     assert (
         err == "aesi: `aesi bench spci` compares with mapie, not installed here: pip install 'mapie>=1.5'.\n"
     )
+
+
+@pytest.mark.parametrize(
+    ("override", "section", "key", "value"),
+    [
+        ("search.block=50", "search", "block", 50),
+        ("data.dt_s=2.0", "data", "dt_s", 2.0),
+        ("conformal.method=spci_boosted", "conformal", "method", "spci_boosted"),
+    ],
+)
+def test_what_a_split_lays_over_its_file_could_not_be_asked_for_otherwise(
+    monkeypatch, override, section, key, value
+):
+    """It was refused as overridden twice."""
+    monkeypatch.setattr(splits, "tracked", lambda cases, workers, address: iter(cases.specs))
+    folder = str(Path(__file__).resolve().parents[3] / "experiments")
+    asked = {"experiments": folder, "cells": ["hg2"], "a_cell": 1}
+    (plain,) = benchmarks.run("splits", **asked)
+    (run,) = benchmarks.run("splits", **asked, overrides=[override])
+    assert getattr(getattr(run.config, section), key) == value
+    assert getattr(getattr(plain.config, section), key) != value
+    (twice,) = benchmarks.run("splits", **asked, overrides=[override, override])
+    with pytest.raises(ConfigError, match="overridden twice"):
+        _ = twice.config

@@ -189,3 +189,14 @@ def test_a_current_alone_in_milliampere_or_over_milliseconds_was_simulated_as_it
     check_belongs(
         m50, [replace(lone, current_a=10.0 * lone.current_a)]
     )  # more than it holds, in no other unit
+
+
+def test_a_current_in_milliampere_was_simulated_where_its_first_row_alone_has_a_voltage(m50, record):
+    voltage = np.full_like(record.voltage_v, np.nan)
+    voltage[0] = record.voltage_v[0]
+    started = replace(record, voltage_v=voltage)
+    check_belongs(m50, [started])
+    with pytest.raises(DataError, match="the current is in mA"):
+        check_belongs(m50, [replace(started, current_a=1e3 * started.current_a)])
+    with pytest.raises(DataError, match="the time is in ms"):
+        check_belongs(m50, [replace(started, time_s=1e3 * started.time_s)])

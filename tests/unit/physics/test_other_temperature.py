@@ -20,6 +20,15 @@ def test_a_dead_column_is_told_with_the_temperature_that_the_record_shows():
     assert "At 0 degC, which it is taken at, the declared model leaves 110.0 mV, at 25 degC 10.0 mV" in (
         found.sentence("drive")
     )
+    assert "--column temperature_degc= leaves it out" in found.sentence("drive")
+
+
+def test_of_a_temperature_that_was_given_the_column_was_to_be_left_out():
+    found = other_temperature(COLUMN_DEGC, 25.0, error_of(25.0))
+    told = found.sentence("drive", given=True)
+    assert "correct --temperature FILE=DEGC" in told
+    assert "column" not in told
+    assert "unit" not in told
 
 
 @pytest.mark.parametrize(
@@ -30,6 +39,12 @@ def test_a_dead_column_is_told_with_the_temperature_that_the_record_shows():
         (error_of(25.0, floor_v=0.06), "the cell follows the record at no temperature"),
         (error_of(-5.0, slope_v=9e-3), "the temperature that is closer is no other one"),
         (lambda degc: None, "the cell cannot be simulated"),
+        (lambda degc: np.nan, "nothing is known of the cell at any temperature"),
+        (
+            lambda degc: 0.1 if degc[0] == 0.0 else np.nan,
+            "nothing is known of the cell at another temperature",
+        ),
+        (lambda degc: 0.01 if degc[0] else np.nan, "nothing is known of the cell at that of the column"),
     ],
 )
 def test_a_column_is_not_doubted_without_clear_evidence(error_v, why):
@@ -45,3 +60,12 @@ def test_a_small_error_is_not_asked_about():
 
     assert other_temperature(COLUMN_DEGC, 25.0, error_v) is None
     assert asked == [0.0]
+
+
+@pytest.mark.parametrize("unknown_degc", [-20.0, 20.0, 50.0])
+def test_a_temperature_at_which_nothing_is_known_was_taken_for_the_closest(unknown_degc):
+    error_v = error_of(30.0)
+    found = other_temperature(
+        COLUMN_DEGC, 25.0, lambda degc: np.nan if degc[0] == unknown_degc else error_v(degc)
+    )
+    assert found.there_degc == 30.0

@@ -1,6 +1,6 @@
 """Cases of the tracer from experiment files."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
 
@@ -12,7 +12,9 @@ from aesi.calibration import Conditions
 from aesi.data import read_measurement
 from aesi.errors import CellError, ConfigError, DataError, InputError
 from aesi.pipeline.calibrate import Request, calibrate_files
+from aesi.pipeline.discovery import discover as tracing
 from aesi.pipeline.discovery.cases import case_of_experiment, case_of_files
+from aesi.pipeline.discovery.discover import run_case
 from aesi.pipeline.experiment.config import read_experiment
 from aesi.pipeline.experiment.load import load
 from aesi.records import Spectrum
@@ -185,3 +187,17 @@ def test_an_experiment_has_a_cell_of_the_day_of_its_test(tmp_path, dated_file):
     whole, aged = (load(experiment(record, cell=c)) for c in (cell, cell | {"soh": date(2018, 1, 6)}))
     assert aged.cell.capacity_ah == pytest.approx(0.95 * whole.cell.capacity_ah)
     assert "the cell as of 2018-01-06: 0.950 of its file's capacity" in " ".join(aged.notes)
+
+
+def test_a_discovery_of_an_experiment_advised_options_that_it_does_not_have(tmp_path, monkeypatch):
+    @dataclass(frozen=True)
+    class Found:
+        warnings: tuple[str, ...]
+
+    found = Found(("drive: its sensor is at fault (--column temperature_degc= leaves it out).",))
+    monkeypatch.setattr(tracing, "discover", lambda *args, **options: found)
+    record = write_record(tmp_path)
+    settings = experiment(record, discover={"fit": [str(record)]})
+    (told,) = run_case(case_of_experiment(settings)).warnings
+    assert told.endswith("leaves it out) (in an experiment file: data.columns).")
+    assert run_case(case_of_files(BPX, [record])) == found

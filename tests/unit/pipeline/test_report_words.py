@@ -36,7 +36,7 @@ def test_an_error_of_661_mv_did_not_say_that_the_model_ran_empty(views):
     emptied = replace(view, models=(physics, chosen, other))
     assert runs.run_finding(emptied) == runs.run_finding(view).removesuffix(".") + (
         "; a simulation runs empty or full on a at 7976 s, from where on an error says that it ran out, not by how "
-        f"much the model is off: before that it is 240.1 mV by ESPM and 234.8 mV by {view.chosen}."
+        f"much the model is off: before that the error is 240.1 mV by ESPM and 234.8 mV by {view.chosen}."
     )
     assert runs.run_finding(
         replace(emptied, models=(view.models[0], chosen | {"free_run": view.models[1]["free_run"]}))
@@ -59,7 +59,8 @@ def test_a_correction_that_does_not_beat_the_physics_it_was_learned_on_is_told_s
     assert runs.corrected_finding(view) == ""
     figures = view.models[1]["free_run"] | {"test_rmse_mv": 4.0, "test_mser_recalibrated_pct": -300.0}
     refit_does = replace(view, models=(view.models[0], {**view.models[1], "free_run": figures}))
-    assert "errs by 2.0 mV there: recalibrate it first" in runs.corrected_finding(refit_does)
+    told_twice = runs.corrected_finding(refit_does)  # that the refit errs less, and by how much
+    assert told_twice == "Recalibrate the ESPM first (cell.start: recalibrated)."
     first = "and nothing learnt, the ESPM errs less there: 2.0 mV."
     assert runs.run_finding(refit_does).endswith(first)
     none = replace(refit_does, chosen="ESPM", models=({**view.models[0], "free_run": figures},))

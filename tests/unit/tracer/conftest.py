@@ -51,3 +51,15 @@ def make(cell):
         return Measurement(time, current, noisy, name="made")
 
     return measurement
+
+
+@pytest.fixture
+def slow_kinetics():
+    """The cell and the record of an LG M50 at a right 25 degC whose reactions are half as fast as declared."""
+    m50 = Cell.from_bpx(CELLS / "lg_m50_chen2020.bpx.json")
+    rng, time = np.random.default_rng(1), np.arange(0.0, 2400.0, 2.0)
+    current, degc = steps(len(time), 6.0, rng), np.full(len(time), 25.0)
+    truth = (CATALOGUE["charge_transfer_kinetics"].activate(),)
+    voltage = simulate(m50, time, current, 0.9, truth, temperature_degc=degc).voltage_v
+    noisy = voltage + 5e-4 * rng.normal(size=len(time))
+    return m50, Measurement(time, current, noisy, degc, "slow", hold="linear")

@@ -243,8 +243,8 @@ def test_at_one_current_there_are_no_ranges_of_it_and_own_parameters_are_not_wri
     assert of_refit(declared, [moved], [moved], moved.state) is None
     third = replace(declared, state=replace(declared.state), left_out=LeftOut((0.5,), (0.5,)))
     why = of_refit(declared, [moved], [moved, third], third.state)  # it was written without a reason
-    assert why.startswith(f"the recalibrated model: {UNTESTED}; written is one whose parameters moved less")
-    assert "leaves 500.0 mV of data left out, the declared one 1000.0" in why
+    assert why.startswith(f"the recalibrated model: {UNTESTED}; written is another fit of its parameters")
+    assert "leaves 500.0 mV of data left out, the declared model 1000.0" in why
     named = replace(moved, state=replace(moved.state, hypothesis=("ambient_temperature",)))
     assert written(declared, [moved], [named]) == (declared.state, f"ambient_temperature: {UNTESTED}")
 

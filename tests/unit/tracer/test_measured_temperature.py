@@ -10,10 +10,11 @@ from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.discovery.discover import discovery_content
 from aesi.pipeline.report.words.discoveries import short_finding
 from aesi.tracer import discover
-from aesi.tracer.decide.temperatures import fitted_at_fault, other_temperatures
+from aesi.tracer.decide.temperatures import fitted_at_fault, left_by_fit, other_temperatures
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.model_state import ModelState
 
+KINETICS = {"charge_transfer_kinetics": CATALOGUE["charge_transfer_kinetics"]}
 TRIED = {n: CATALOGUE[n] for n in ("self_heating", "ambient_temperature", "series_resistance")}
 
 
@@ -68,6 +69,9 @@ def test_a_model_was_written_that_made_up_for_a_dead_temperature(cell, make):
     assert fitted_at_fault(ModelState(problem), others) is None  # nothing was fitted
     as_good = {0: replace(others[0], there_v=others[0].left_v)}
     assert fitted_at_fault(moved, as_good) is None
+    assert left_by_fit(moved, others) == others
+    assert left_by_fit(ModelState(problem), others) == others
+    assert left_by_fit(ModelState(problem), as_good) == {}
 
 
 def test_a_temperature_that_the_record_contradicts_is_told(cell, make):
@@ -83,3 +87,14 @@ def test_a_right_column_is_not_doubted(cell, make):
     found = discover(cell, [warm_record(cell, make, 35.0)], soc0=0.9, effects=TRIED)
     assert found.other_temperature == ()
     assert not any("contradicts" in warning for warning in found.warnings)
+
+
+def test_slow_kinetics_at_a_right_temperature_were_told_as_a_contradiction_of_it(slow_kinetics):
+    """What was found explained the record to the noise, and its temperature was doubted all the same."""
+    cell, record = slow_kinetics
+    assert other_temperatures(inverse_problem(cell, [record], soc0=0.9, effects=KINETICS))
+    found = discover(cell, [record], soc0=0.9, effects=KINETICS, max_effects=1, model="espm")
+    assert max(file.errors("after").rmse_v for file in found.files) < 1e-3
+    assert found.other_temperature == ()
+    assert not any("contradicts" in warning for warning in found.warnings)
+    assert "contradicts" not in short_finding(discovery_content(found))

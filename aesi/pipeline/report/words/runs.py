@@ -68,7 +68,7 @@ def _ran_out(view: RunView) -> str:
         if (error := _figure(view.model(name), "free_run", "test_until_ran_out_rmse_mv")) is not None
     }
     told = listed([f"{error:.1f} mV by {name}" for name, error in left.items()])
-    return f"{text}: before that it is {told}" if told else text
+    return f"{text}: before that the error is {told}" if told else text
 
 
 def _bought(view: RunView) -> str:
@@ -110,7 +110,7 @@ def _bought(view: RunView) -> str:
 
 def corrected_finding(view: RunView) -> str:
     """What the correction brings beyond the physics that it was learned on, in words; where that is as declared, beyond
-    a mere refit of its parameters."""
+    a mere refit of its parameters, or what to do where that does better."""
     corrected, model = view.model(view.corrected), view.model(view.chosen)
     before, after = (_figure(row, "free_run", "test_rmse_mv") for row in (corrected, model))
     if before is None or after is None:
@@ -120,14 +120,13 @@ def corrected_finding(view: RunView) -> str:
         refitted = _refitted_mv(view)
         if view.corrected == view.chosen or beyond is None or refitted is None:
             return ""
-        worth = (
-            f"the correction leaves {beyond:.1f} % less mean squared error than that"
-            if beyond >= 0.0
-            else "recalibrate it first (cell.start: recalibrated)"
-        )
+        if beyond < 0.0:  # by how much the refit errs less is in the first sentence
+            advice = f"Recalibrate the {view.physics} first (cell.start: recalibrated)."
+            return advice if _refit_better(view) else ""
         return (
             f"With its own parameters refitted to the training records and nothing learnt, the {view.physics} errs by "
-            f"{_told(refitted, after)[0]} mV there: {worth}."
+            f"{_told(refitted, after)[0]} mV there: the correction leaves {beyond:.1f} % less mean "
+            "squared error than that."
         )
     if after >= before:
         return ""  # which the first sentence says
