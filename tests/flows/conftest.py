@@ -38,6 +38,12 @@ def home(folder):
         os.environ.pop("AESI_HOME") if before is None else os.environ.update(AESI_HOME=before)
 
 
+def laid_under(more):
+    """The overrides of a small run, without those keys that `more` sets, which may be given once."""
+    set_again = {text.partition("=")[0] for text in more}
+    return [*(text for text in (*SMALL, *ASIDE) if text.partition("=")[0] not in set_again), *more]
+
+
 @pytest.fixture(scope="session")
 def empty_store(tmp_path_factory):
     """An empty MLflow database: making its tables takes seconds, copying it takes none."""
@@ -124,7 +130,7 @@ def arguments():
     """
 
     def make(*more, prefect=False):
-        pairs = (part for text in (*SMALL, *ASIDE, *more) for part in ("--set", text))
+        pairs = (part for text in laid_under(more) for part in ("--set", text))
         return ["run", str(SMOKE), "--prefect" if prefect else "--no-prefect", *pairs]
 
     return make
@@ -136,7 +142,7 @@ def run(tracked):
     from flows.jobs.start import start
 
     def go(*more, **options):
-        return start(SMOKE, [*SMALL, *ASIDE, *more], use_prefect=False, **options)
+        return start(SMOKE, laid_under(more), use_prefect=False, **options)
 
     return go
 
