@@ -59,7 +59,9 @@ def sources_of(config: ExperimentConfig, cell: Path) -> Sources:
         for name, (path, called) in _placed(where, _listed(data)).items()
     }
     train, valid, test = ([records[name][0] for name in roles[role]] for role in ROLES)
-    check_distinct([*train, *valid], test)
+    check_distinct(train, test)
+    check_distinct(valid, test)
+    check_distinct([*train, *valid])
     return Sources(records, roles)
 
 
