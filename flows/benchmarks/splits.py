@@ -20,7 +20,7 @@ from aesi.bench.hybrid.split_figures import summary, table
 from aesi.bench.hybrid.splits import EXPERIMENTS, SplitCase, chosen_splits, judged
 from aesi.bench.limit import Stopwatch
 from aesi.errors import AesiError, FitError
-from aesi.pipeline.experiment.config import ExperimentConfig, read_experiment
+from aesi.pipeline.experiment.config import ExperimentConfig, overridden_key, read_experiment
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.load import Loaded
 from aesi.pipeline.experiment.sources import named_files
@@ -109,12 +109,8 @@ def run(
 def over(laid: Sequence[str], overrides: Sequence[str]) -> tuple[str, ...]:
     """What is laid over a file, less the keys that were asked for otherwise, and then these: no key twice, which an
     experiment refuses."""
-    asked = {_key(override) for override in overrides}
-    return (*(one for one in laid if _key(one) not in asked), *overrides)
-
-
-def _key(override: str) -> str:
-    return override.partition("=")[0].strip()
+    asked = {overridden_key(override) for override in overrides}
+    return (*(one for one in laid if overridden_key(one) not in asked), *overrides)
 
 
 def _files(run: SplitRun) -> Iterator[Path]:

@@ -40,8 +40,9 @@ def home(folder):
 
 def laid_under(more):
     """The overrides of a small run, without those keys that `more` sets, which may be given once."""
-    set_again = {text.partition("=")[0] for text in more}
-    return [*(text for text in (*SMALL, *ASIDE) if text.partition("=")[0] not in set_again), *more]
+    from flows.benchmarks.splits import over
+
+    return [*over((*SMALL, *ASIDE), more)]
 
 
 @pytest.fixture(scope="session")

@@ -161,12 +161,17 @@ def read_experiment(path: str | Path, overrides: Sequence[str] = ()) -> Experime
         raise ConfigError(f"{path}: holds no keys; an experiment starts with `name:`, `data:`, `cell:`.")
     seen: set[str] = set()
     for override in overrides:
-        key = override.partition("=")[0].strip()
+        key = overridden_key(override)
         if key in seen:  # the last would count, and nobody be told
             raise ConfigError(f"{path}: {key!r} is overridden twice; give it once.")
         seen.add(key)
         _override(content, override)
     return parse_experiment(content, base=path.resolve().parent, where=str(path))
+
+
+def overridden_key(override: str) -> str:
+    """The key, with dots, that an override `key=value` sets."""
+    return override.partition("=")[0].strip()
 
 
 def parse_experiment(

@@ -29,7 +29,7 @@ from aesi.tracer.search.fitted import fitted_hypothesis
 from aesi.tracer.search.forward import searched
 from aesi.tracer.search.grown import grown_with
 from aesi.tracer.search.path import Path, Report
-from aesi.tracer.search.plausible import ALIKE_NATS, alike, lag
+from aesi.tracer.search.plausible import alike, lag, sds_behind
 from aesi.tracer.search.wrong_parameters import NINETY
 
 
@@ -94,10 +94,9 @@ def of_one_age(verdict: Verdict, believed: Explanation, aged: Sequence[Explanati
         )
     if not verdict.effects:
         return verdict
-    lags = [(one.hypothesis[0], *lag(believed, one)) for one in aged]
     as_well = tuple(one.hypothesis[0] for one in aged if alike(believed, one))
-    others = [nats / max(sd, ALIKE_NATS) for name, nats, sd in lags if name not in as_well]
-    verdict = replace(verdict, margin=min([verdict.margin, *others]))
+    behind = [sds_behind(*lag(believed, one)) for one in aged if one.hypothesis[0] not in as_well]
+    verdict = replace(verdict, margin=min([verdict.margin, *behind]))
     if not as_well:
         return verdict
     known = (

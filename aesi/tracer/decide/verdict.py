@@ -18,7 +18,7 @@ from aesi.tracer.likelihood.fit import LinearForm, held_out_residual, prediction
 from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_error import MEASURED_V, PRIORS
 from aesi.tracer.search.path import Path, unseen_rmse_v
-from aesi.tracer.search.plausible import ALIKE_NATS, ALIKE_SDS, alike, lag
+from aesi.tracer.search.plausible import ALIKE_NATS, ALIKE_SDS, alike, lag, sds_behind
 
 Word = Literal["found", "none", "unknown"]
 GROUP_SIZE = 3
@@ -238,7 +238,7 @@ def look_alikes(
             if close and _as_adequate(path, other, anchor, allowed_v):
                 same.append((nats, added))
             else:
-                margin = min(margin, nats / max(deviation, thresholds.alike_nats))
+                margin = min(margin, sds_behind(nats, deviation, thresholds.alike_nats))
         same.sort()
         if same:
             groups.append((name, *(other for _, other in same)))

@@ -30,6 +30,11 @@ def lag(better: Explanation, other: Explanation) -> tuple[float, float]:
     return better.score.total - other.score.total, deviation
 
 
+def sds_behind(nats: float, deviation: float, least_nats: float = ALIKE_NATS) -> float:
+    """Standard deviations by which a hypothesis lags, of a `lag`.  least_nats : the least that one counts."""
+    return nats / max(deviation, least_nats)
+
+
 def alike(better: Explanation, other: Explanation, sds: float = ALIKE_SDS, nats: float = ALIKE_NATS) -> bool:
     """Do the data not tell the second hypothesis from the first?"""
     behind, deviation = lag(better, other)
