@@ -14,7 +14,7 @@ prints a line a record, and a last one with means over the records.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -88,8 +88,13 @@ def main() -> None:
     for case in records():
         rows.append(fast_error(case))
         print(json.dumps(rows[-1]), flush=True)
-    ran = [row for row in rows if "sds" in row]
-    summary = {
+    print(json.dumps(_summary([row for row in rows if "sds" in row])))
+
+
+def _summary(ran: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Means over the records that could be fitted."""
+    return {
+        "summary": True,
         "records": len(ran),
         "rms_mv": round(float(np.exp(np.mean([np.log(row["rms_mv"]) for row in ran]))), 2),
         "lasts_s": round(float(np.exp(np.mean([np.log(row["lasts_s"]) for row in ran]))), 1),
@@ -103,7 +108,6 @@ def main() -> None:
             rms([sds for row in ran for name, sds in row["sds"].items() if name != THERE]), 2
         ),
     }
-    print(json.dumps({"summary": True, **summary}))
 
 
 if __name__ == "__main__":

@@ -80,15 +80,7 @@ class Ageing:
         if as_of is not None and not dates:
             raise DataError(f"as of {as_of}: no record has a date; give theirs (--date FILE=YYYY-MM-DD).")
         days = [day_of(dates[r.name]) if r.name in dates else None for r in records]
-        as_of = None if as_of is None else day_of(as_of)
-        told = [d for d in days if d is not None]
-        if as_of is not None and not min(told) <= as_of <= max(told):
-            raise DataError(
-                f"as of {as_of}: the dated records are of {min(told)} to {max(told)}, and nothing shows what the "
-                "cell was on another day; give a day from the first to the last of them."
-            )
-        loaded = [d for r, d in zip(records, days, strict=True) if d is not None and not r.slow]
-        day = as_of or max(loaded or told, default=None)
+        day = _file_day(records, days, None if as_of is None else day_of(as_of))
         since = np.array([0 if d is None or day is None else (d - day).days for d in days])
         losses = np.array([d is not None for d in days], dtype=bool)
         chain, loss_sd = _chain_and_sd(since, losses)
@@ -126,6 +118,21 @@ class Ageing:
         if self.day is None:
             return ()
         return (f"the file is in the state of {self.day}.",)
+
+
+def _file_day(records: Sequence[Prepared], days: Sequence[date | None], as_of: date | None) -> date | None:
+    """Of the file's state: the one asked for, else the last with a load, else the last; None without any date.
+
+    Raises DataError for one asked for that is not between the first and the last.
+    """
+    told = [d for d in days if d is not None]
+    if as_of is not None and not min(told) <= as_of <= max(told):
+        raise DataError(
+            f"as of {as_of}: the dated records are of {min(told)} to {max(told)}, and nothing shows what the cell was "
+            "on another day; give a day from the first to the last of them."
+        )
+    loaded = [d for r, d in zip(records, days, strict=True) if d is not None and not r.slow]
+    return as_of or max(loaded or told, default=None)
 
 
 def _chain_and_sd(since: Array, dated: BoolArray) -> tuple[Array, Array]:

@@ -234,10 +234,33 @@ class Model:
         those over the knots of potentials."""
         cell = self.cell_at(x)
         runs = [self.run(i, cell, x) for i in range(len(self.records))]
+        blocks, of_spectra = self._differences(cell, x, [run[0] for run in runs])
+        for i, (block, run) in enumerate(zip(blocks, runs, strict=True)):
+            surface_n = stretched(run[1], self.edge, self.silicon(i, x))
+            block[:, self._closed] = self.shapes.columns(x[self.layout.shapes], surface_n, run[2])
+            self._set_own_slopes(i, cell, x, run[0], block)
+        parts = []
+        for block, run, record, w in zip(blocks, runs, self.records, self.weights, strict=True):
+            lenient = w * leniency(record.rows.voltage_v - run[0])
+            parts.append(-lenient[:, None] * block)
+        return np.vstack([*parts, of_spectra, np.eye(self.layout.size)])
+
+    @property
+    def _closed(self) -> slice:
+        """Where the working vector holds the knots of potentials."""
+        first = self.layout.shapes.start
+        return slice(first, first + self.shapes.closed)
+
+    def _differences(self, cell: Cell, x: Array, voltages_v: Sequence[Array]) -> tuple[list[Array], Array]:
+        """One-sided differences over what the records share: of each record's voltage, (rows, n), except over the knots
+        of potentials, and of the misfits of the spectra, (2 frequencies, n).
+
+        voltages_v : (rows,) of each record at x.
+        """
         blocks = [np.zeros((len(r.rows), self.layout.size)) for r in self.records]
-        closed = slice(self.layout.shapes.start, self.layout.shapes.start + self.shapes.closed)
         off = self.spectra.misfits(cell)
         of_spectra = np.zeros((len(off), self.layout.size))
+        closed = self._closed
         for j in range(self.layout.shapes.stop):
             h = STEP if x[j] + STEP <= self.high[j] else -STEP
             there = x.copy()
@@ -249,16 +272,8 @@ class Model:
                 continue
             for i, record in enumerate(self.records):
                 if j != self.layout.zero or record.slow:
-                    blocks[i][:, j] = (self.run(i, changed, there)[0] - runs[i][0]) / h
-        for i, (block, run) in enumerate(zip(blocks, runs, strict=True)):
-            surface_n = stretched(run[1], self.edge, self.silicon(i, x))
-            block[:, closed] = self.shapes.columns(x[self.layout.shapes], surface_n, run[2])
-            self._set_own_slopes(i, cell, x, run[0], block)
-        parts = []
-        for block, run, record, w in zip(blocks, runs, self.records, self.weights, strict=True):
-            lenient = w * leniency(record.rows.voltage_v - run[0])
-            parts.append(-lenient[:, None] * block)
-        return np.vstack([*parts, of_spectra, np.eye(self.layout.size)])
+                    blocks[i][:, j] = (self.run(i, changed, there)[0] - voltages_v[i]) / h
+        return blocks, of_spectra
 
     def _set_own_slopes(self, index: int, cell: Cell, x: Array, voltage_v: Array, block: Array) -> None:
         """Set the slopes of a record's voltage over what records have of their own: records of one course of ageing

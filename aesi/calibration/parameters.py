@@ -7,7 +7,7 @@ is a standard normal deviate.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -139,21 +139,9 @@ def free_parameters(
         Free("electrolyte.conductivity", 1.0, SALT_SD, "factor", TORTUOSITY, True),
         Free("electrolyte.diffusivity", 1.0, SALT_SD, "factor", TORTUOSITY, True),
         Free("contact.resistance", cell.contact_resistance_ohm, ohm, "ohm", CONTACTS, low=0.0, high=most_ohm),
-        *(
-            Free(course(side, what, k), 1.0, sd, "factor", source, True)
-            for side in ("negative", "positive")
-            for what, sd, source in (
-                ("diffusivity", COURSE_SD, COURSES),
-                ("rate", COURSE_SD, RATE_COURSES),
-                ("film", FILM_COURSE_SD, FILM_COURSES),
-            )
-            for k in range(len(PLACES))
-        ),
+        *_courses(),
+        *_interfaces(cell),
     ]  # fmt: skip
-    for side, electrode in (("negative", cell.negative), ("positive", cell.positive)):
-        typical = electrode.double_layer_f_m2 or DOUBLE_LAYER_F_M2
-        out.append(Free(f"{side}.double_layer", typical, LAYER_SD, "F/m2", LAYERS, True))
-        out.append(Free(f"{side}.film", 1.0, FILM_SD, "factor", FILMS, True))
     k = cell.thermal_conductivity_w_m_k
     if on_case and k is not None and cell.winding_resistance_k_w:
         out.append(Free("thermal.conductivity", k, CONDUCTIVITY_SD, "W/(m K)", CONDUCTIVITIES, True))
@@ -163,6 +151,26 @@ def free_parameters(
             for (part, rate), one in energy_priors(cell).items()
         ]
     return tuple(out)
+
+
+def _courses() -> Iterator[Free]:
+    """Factors at places over the stoichiometry of each electrode."""
+    for side in ("negative", "positive"):
+        for what, sd, source in (
+            ("diffusivity", COURSE_SD, COURSES),
+            ("rate", COURSE_SD, RATE_COURSES),
+            ("film", FILM_COURSE_SD, FILM_COURSES),
+        ):
+            for place in range(len(PLACES)):
+                yield Free(course(side, what, place), 1.0, sd, "factor", source, True)
+
+
+def _interfaces(cell: Cell) -> Iterator[Free]:
+    """Double layer and film of each electrode."""
+    for side, electrode in (("negative", cell.negative), ("positive", cell.positive)):
+        typical = electrode.double_layer_f_m2 or DOUBLE_LAYER_F_M2
+        yield Free(f"{side}.double_layer", typical, LAYER_SD, "F/m2", LAYERS, True)
+        yield Free(f"{side}.film", 1.0, FILM_SD, "factor", FILMS, True)
 
 
 def with_priors(free: Sequence[Free], priors: Mapping[str, tuple[float, float]]) -> tuple[Free, ...]:

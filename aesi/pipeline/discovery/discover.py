@@ -28,6 +28,7 @@ from aesi.pipeline.written import ARCHIVE, FINDING, MODEL, REPORT
 from aesi.records import Measurement
 from aesi.tracer import Discovery, discover
 from aesi.tracer.discovery import Progress
+from aesi.tracer.report.candidate_effects import CandidateEffect
 from aesi.tracer.report.outcome import Errors, Part, State
 from aesi.tracer.report.own_parameters import OwnParameter
 from aesi.tracer.report.yardstick import POINTS_TO, Pointer
@@ -218,21 +219,7 @@ def discovery_content(found: Discovery, asked: Sequence[str] = ()) -> dict[str, 
         "structured_mv": MV_PER_V * verdict.structured_v,
         "tolerance_mv": MV_PER_V * verdict.tolerance_v,
         "margin": verdict.margin,
-        "candidates": [
-            {
-                "effect": c.effect,
-                "kind": c.kind,
-                "score": c.score,
-                "test_rmse_mv": None if c.test_rmse_v is None else MV_PER_V * c.test_rmse_v,
-                "parameters": {
-                    name: {"value": p.value, "low": p.low, "high": p.high, "unit": p.unit}
-                    for name, p in c.parameters.items()
-                },
-                "hypothesis": list(c.hypothesis),
-                "remark": c.remark,
-            }
-            for c in found.candidates
-        ],
+        "candidates": [_candidate_row(c) for c in found.candidates],
         "own_parameters": {state: [_own_row(one) for one in rows] for state, rows in found.own.items()},
         "files": _file_rows(found),
         "dependence": _dependence(found),
@@ -266,6 +253,22 @@ def _errors(found: Discovery, state: State, part: Part) -> dict[str, float]:
         "rmse_mv": MV_PER_V * errors.rmse_v,
         "mae_mv": MV_PER_V * errors.mae_v,
         "max_mv": MV_PER_V * errors.max_v,
+    }
+
+
+def _candidate_row(candidate: CandidateEffect) -> dict[str, Any]:
+    test_v = candidate.test_rmse_v
+    return {
+        "effect": candidate.effect,
+        "kind": candidate.kind,
+        "score": candidate.score,
+        "test_rmse_mv": None if test_v is None else MV_PER_V * test_v,
+        "parameters": {
+            name: {"value": p.value, "low": p.low, "high": p.high, "unit": p.unit}
+            for name, p in candidate.parameters.items()
+        },
+        "hypothesis": list(candidate.hypothesis),
+        "remark": candidate.remark,
     }
 
 

@@ -121,18 +121,12 @@ def courses(parameters: Sequence[Row]) -> dict[str, Figure]:
     """The factors at the knots over stoichiometry, both electrodes, a panel a quantity; none without knots."""
     from plotly.subplots import make_subplots
 
-    found: dict[tuple[str, str], list[tuple[float, Row]]] = {}
-    for row in parameters:
-        course, is_knot, place = row["name"].partition(KNOT)
-        side, _, what = course.partition(".")
-        if is_knot and what in COURSES and side in SIDES:
-            found.setdefault((what, side), []).append((float(place.removesuffix(PERCENT)), row))
+    found = _knots(parameters)
     shown = [what for what in COURSES if any(key[0] == what for key in found)]
     if not shown:
         return {}
     fig = make_subplots(rows=1, cols=len(shown), horizontal_spacing=0.08)
     for (what, side), knots in sorted(found.items()):
-        knots.sort(key=lambda knot: knot[0])
         rows = [row for _, row in knots]
         fig.add_scatter(
             x=[place for place, _ in knots],
@@ -161,3 +155,14 @@ def courses(parameters: Sequence[Row]) -> dict[str, Figure]:
         "little."
     )
     return {"courses": style.framed(fig, "Courses over stoichiometry", caption, 340)}
+
+
+def _knots(parameters: Sequence[Row]) -> dict[tuple[str, str], list[tuple[float, Row]]]:
+    """(quantity, electrode) -> place in the window, %, and row of each knot, in order of the places."""
+    found: dict[tuple[str, str], list[tuple[float, Row]]] = {}
+    for row in parameters:
+        course, is_knot, place = row["name"].partition(KNOT)
+        side, _, what = course.partition(".")
+        if is_knot and what in COURSES and side in SIDES:
+            found.setdefault((what, side), []).append((float(place.removesuffix(PERCENT)), row))
+    return {key: sorted(knots, key=lambda knot: knot[0]) for key, knots in found.items()}

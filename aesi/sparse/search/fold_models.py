@@ -58,13 +58,7 @@ def fold_models(
     drives = problem.folds_are_drives
     if cut is None:
         cut = problem.folds if drives else pieces(problem.spans, max(1, n // N_PIECES))
-    augmented = np.empty((n, len(active) + 1), order="F")
-    augmented[:, :-1] = problem.theta(active).T
-    augmented[:, -1] = problem.target
-    augmented *= np.sqrt(problem.row_weights)[:, None]
-    q_rows, r = orthonormal(augmented)
-    factors = triangular_factors(weighted_grams(q_rows, leave_out_weights(cut, n)), r)
-    for i, ((a, b), factor) in enumerate(zip(cut, factors, strict=True)):
+    for i, ((a, b), factor) in enumerate(zip(cut, _factors_without(problem, active, cut), strict=True)):
         coefficients = sum((member.coefficients(factor) for member in members), start=np.zeros(len(active)))
         if not coefficients.any():
             continue
@@ -79,6 +73,17 @@ def fold_models(
             model = replace(model, fade=Fade(judged.fade.amplitude, region))
         record, rows = fold_samples(problem, a, b)
         yield model, left_out[i].series if drives and left_out else record, rows
+
+
+def _factors_without(problem: Problem, active: IntArray, cut: Sequence[Span]) -> Array:
+    """(pieces, m + 1, m + 1) triangular factors of the active terms (m,) and the target, each without one piece."""
+    n = len(problem.target)
+    augmented = np.empty((n, len(active) + 1), order="F")
+    augmented[:, :-1] = problem.theta(active).T
+    augmented[:, -1] = problem.target
+    augmented *= np.sqrt(problem.row_weights)[:, None]
+    q_rows, r = orthonormal(augmented)
+    return triangular_factors(weighted_grams(q_rows, leave_out_weights(cut, n)), r)
 
 
 @dataclass(frozen=True, eq=False)

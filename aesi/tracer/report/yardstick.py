@@ -112,18 +112,7 @@ def _at(series: ErrorSeries, dt_s: float) -> ErrorSeries:
 
 
 def _measured(records: Sequence[ErrorSeries]) -> Yardstick:
-    rows = sum(map(len, records))
-    block = max(int(BLOCK_S / records[0].dt_s), 10)
-    options = Options(
-        inputs=INPUTS,
-        p_c=ORDER,
-        d=DEGREE,
-        mixed=False,
-        resamples=RESAMPLES,
-        block=block,
-        fold=max(rows // PIECES, block),
-        balance=False,
-    )
+    options = _options(records)
     try:
         problem = Problem.build(Split(tuple(records), (), ()), options)
     except DataError:  # too few samples, or nothing that varies
@@ -146,6 +135,21 @@ def _measured(records: Sequence[ErrorSeries]) -> Yardstick:
         for text, share in shares.items()
     }
     return Yardstick(float(np.sqrt(_share(best) * square)), pointers)
+
+
+def _options(records: Sequence[ErrorSeries]) -> Options:
+    rows = sum(map(len, records))
+    block = max(int(BLOCK_S / records[0].dt_s), 10)
+    return Options(
+        inputs=INPUTS,
+        p_c=ORDER,
+        d=DEGREE,
+        mixed=False,
+        resamples=RESAMPLES,
+        block=block,
+        fold=max(rows // PIECES, block),
+        balance=False,
+    )
 
 
 def _candidate(problem: Problem, terms: BoolArray, ridge: float, feedback: bool) -> Candidate | None:
