@@ -27,7 +27,7 @@ from aesi.numerics.typing import Array
 BURNT = 0.5
 """Share of the steps, at the start, that is thrown away."""
 FEWEST_STEPS = 4
-"""Of which half are burnt."""
+"""Fewest steps of each walker; half of them are burnt."""
 SPREAD = 0.5
 """Walkers start this many deviations of the linearised fit about it."""
 
@@ -103,8 +103,8 @@ def sampled(found: Calibration, steps: int, seed: int = 0) -> PosteriorSamples:
 
 
 def _log_probability(found: Calibration) -> Callable[[Array], float]:
-    """The logarithm of the posterior over the global parameters, (n,); the others are integrated out where it is linear
-    in them, at the fit."""
+    """Logarithm of the posterior over the global parameters, (n,). All others are integrated out, linearised at the
+    fit."""
     model, n = found.model, len(found.model.free)
     weights = information_weights(model, found.x)
     linear = weights[:, None] * model.jacobian(found.x)[:, n:]

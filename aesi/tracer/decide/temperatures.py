@@ -17,14 +17,14 @@ from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.model_state import ModelState
 
 LEAVES_TIMES = 2.0
-"""What a model that was fitted leaves of a record, over what the declared one leaves at another temperature: one number
-then explains more than all that was moved. A convention: the zeros of a dead column leave 2.8 times that on a drive of
-the NMC cell, with nine parameters moved."""
+"""A fitted model explains less than a change of temperature where it leaves more than this many times what the
+declared model leaves at another temperature. A convention: with the zeros of a dead column it leaves 2.8 times that
+on a drive of the NMC cell, with nine parameters moved."""
 
 
 def other_temperatures(problem: InverseProblem) -> dict[int, OtherTemperature]:
-    """Number of a record -> the temperature by which the declared model follows what fits see of it, of those whose
-    column that contradicts."""
+    """Number of a record -> the temperature at which the declared model follows what fits see of it, for those
+    records that contradict their own column of temperature."""
     out: dict[int, OtherTemperature] = {}
     declared_degc = problem.cell.initial_temperature_k - ZERO_CELSIUS_K
     for index, seen in enumerate(problem.seen):
@@ -46,9 +46,9 @@ def _left_v(problem: InverseProblem, index: int, degc: Array) -> float | None:
 
 
 def left_by_fit(fitted: ModelState, others: Mapping[int, OtherTemperature]) -> dict[int, OtherTemperature]:
-    """Those of the records of which a fitted model, too, leaves more than the declared one does at another temperature,
-    or that it does not simulate to their end: what it leaves less of is explained at its own, as where the kinetics are
-    off."""
+    """Those of the records that a fitted model does not explain at their own temperature: it leaves more of them
+    than the declared model does at another one, or is not simulated to their end. What it leaves less of, as where
+    the kinetics are off, is explained."""
     out = {}
     for index, other in others.items():
         try:
@@ -70,7 +70,8 @@ def _left_by_v(fitted: ModelState, index: int) -> float:
 
 def fitted_at_fault(written: ModelState, others: Mapping[int, OtherTemperature]) -> str | None:
     """Why a fitted model is not written: of a record that contradicts its temperature it leaves far more than the
-    declared one does at another. What it moved makes up for the temperature then. None where that holds of none."""
+    declared model does at another one, so what it moved only makes up for the temperature. None where there is no
+    such record."""
     if written.values is None:
         return None
     for index, other in others.items():

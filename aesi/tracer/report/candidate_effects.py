@@ -16,7 +16,7 @@ from aesi.tracer.likelihood.model_error import whitened
 from aesi.tracer.search.path import Path
 
 SHARE = 0.9
-"""Of the posterior density of a parameter, that its interval covers."""
+"""Share of the posterior density of a parameter that its interval covers."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def estimates(path: Path, one: Explanation, effect: str) -> dict[str, Estimate]:
 
 
 def _parent(path: Path, one: Explanation) -> FittedHypothesis:
-    """What a hypothesis grew from."""
+    """The hypothesis that another one grew from."""
     steps = (step for step in path.steps if any(grown is one for grown in step.grown))
     return next(fit for step in steps for fit in step.parents if fit.hypothesis == one.hypothesis[:-1])
 

@@ -36,7 +36,7 @@ PIECES = 10
 RIDGES = (1.0, 100.0)
 """Weights tried, in the units of the scaled library."""
 THRESHOLD = 1e-3
-"""Coefficients below are dropped."""
+"""Coefficients below this are dropped."""
 SHOWN = 4
 """Terms that are named for each of POINTS_TO."""
 
@@ -159,12 +159,12 @@ def _candidate(problem: Problem, terms: BoolArray, ridge: float, feedback: bool)
 
 
 def _share(candidate: Candidate | None) -> float:
-    """Of the mean square error, what the candidate explains of pieces that it has not seen, in free run."""
+    """Share of the mean square error that the candidate explains of pieces that it has not seen, in free run."""
     return 0.0 if candidate is None else max(0.0, 1.0 - candidate.loss_valid)
 
 
 def _of(library: Library, names: Sequence[str]) -> BoolArray:
-    """(m,) the constant and the terms that hold no other variables than these."""
+    """(m,) the constant, and the terms that hold no variables but these."""
     wanted = {library.variables.index(name) for name in names if name in library.variables}
     return np.array([{variable for variable, _ in term.factors} <= wanted for term in library.terms])
 
