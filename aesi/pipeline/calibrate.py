@@ -45,11 +45,11 @@ ROUND_OFF = 1e-9
 
 @dataclass(frozen=True)
 class Request:
-    """What a calibration is asked for beside its records.
+    """A request for a calibration, beside its records.
 
-    conditions : of the records; where they name no model, that of a saved model is fitted, or that the file was fitted
-    with, else "espm".
-    impedance : spectra to hold the result against, beside those that the conditions have to be fitted.
+    conditions : of the records. Where they name no model, the model of a saved model is fitted, or the one that the
+    file was fitted with, else "espm".
+    impedance : spectra to hold the result against, beside those among the conditions, which are fitted.
     posterior : steps of each walker, 0 for none; seed : of these.
     title : name of the cell that is written.
     """
@@ -62,8 +62,7 @@ class Request:
 
 
 def check_request(cell: Path, request: Request) -> None:
-    """Raises CellError, DataError or InputError, one sentence, for what is asked of a fit and needs no record to be
-    refused."""
+    """Raises CellError, DataError or InputError, one sentence, for a request that can be refused without a record."""
     check_posterior(request.posterior)
     check_distinct_spectra(request.conditions.spectra, request.impedance)
     check_names(declared_model(cell).cell, request.conditions.priors)
@@ -137,8 +136,8 @@ def fit_traces(found: Calibration) -> tuple[DiscoveryTrace, ...]:
 
 
 def effects_left(given: HybridModel) -> tuple[str, ...]:
-    """What of a cell or a saved model is not fitted, in sentences: what its file declares and no simulation takes, and
-    the model's effects."""
+    """Sentences on what a fit leaves out of a cell or a saved model: what its file declares and no simulation takes,
+    and the model's effects."""
     if not given.effects:
         return given.cell.unread
     names = ", ".join(effect.id for effect in given.effects)

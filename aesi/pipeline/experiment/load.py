@@ -42,14 +42,16 @@ DFN_NOTE = "The physics is the porous electrode: DFN in tables and figures, wher
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """What an experiment works on.
+    """The data that an experiment works on.
 
     config : the experiment as it is run, with data and cell of the fallback where `fallback` says why.
-    digests : record name -> content hash of what was measured.  notes : what a reader of the report should know
-    about the data: resampling, dropped rows, a fallback.  soc0 : state of charge at the first row, by record.
-    cell, soc0 : of the physics that is corrected (`cell.start`).  files : hash of the files that say what the cell is
-    declared to be.  left_out : the training drives under physics
-    that was fitted without a part of one (`cuts`), or without one, each in turn.
+    cell, soc0 : of the physics that is corrected (`cell.start`); soc0 is the state of charge at the first row, by
+    record.
+    left_out : the training drives under physics that was fitted without a part of one (`cuts`), or without one, in
+    turn.
+    digests : record name -> content hash of what was measured.  notes : what a reader of the report should know about
+    the data: resampling, dropped rows, a fallback.
+    files : hash of the files that declare the cell.
     """
 
     cell: Cell
@@ -76,8 +78,8 @@ class Loaded:
 def load(config: ExperimentConfig) -> Loaded:
     """Measurements, simulated and subtracted, by role.
 
-    With a `fallback` section, data that cannot be had are replaced by it; what is wrong with data that are there is
-    raised. A note says so, and the experiment's own note, which is about the data that were asked for, is left out.
+    Where a `fallback` section is given, it replaces data that cannot be had; a note says so, and the experiment's own
+    note, which is about the data that were asked for, is left out. A fault in data that are there is raised.
     Raises ConfigError or DataError naming the file and what to do.
     """
     check_roles(config)
@@ -104,7 +106,7 @@ def load(config: ExperimentConfig) -> Loaded:
 
 
 def _called(config: ExperimentConfig) -> str:
-    """What the data of an experiment are, as a person says it."""
+    """The data of an experiment, in words."""
     if config.data.kind != "virtual":
         return str(config.data.set or config.cell.bpx)
     virtual = config.data.virtual
@@ -184,7 +186,7 @@ def _physics(given: HybridModel, training: TrainingDrives) -> tuple[PhysicsModel
 
 
 def _series(physics: PhysicsModels, training: TrainingDrives) -> tuple[dict[str, ErrorSeries], list[str]]:
-    """What the physics leaves of each record, with its slopes, and a sentence on each test that runs empty in it.
+    """The error series of each record under the physics, with its slopes, and a sentence on each test that runs empty.
 
     Raises SimulationError where another record does.
     """
@@ -211,8 +213,8 @@ def _declared_in(cell: Path, config: ExperimentConfig) -> str:
 def _on_grid(
     config: ExperimentConfig, given: HybridModel, sources: Sources
 ) -> tuple[dict[str, FitRecord], list[str]]:
-    """The records in even rows, each with its state of charge at the first of them and no row seen by a fit yet; and
-    what was assumed and done to them, in sentences.
+    """The records in even rows, each with its state of charge at the first row and no row open to a fit yet; and
+    sentences on what was assumed and done to them.
 
     Raises DataError where one cannot be of the cell.
     """

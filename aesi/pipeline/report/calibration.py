@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from aesi.pipeline.impedance import SpectrumError
 
 STATES = {"before": "start file", "recalibrated": "as the file is simulated", "after": "as fitted"}
-"""Of a trace: the state of the model -> what the page calls it."""
+"""State of the model in a trace -> what the page calls it."""
 COURSES = {"diffusivity": "solid diffusivity", "rate": "reaction rate", "film": "film resistance"}
 """Quantities that follow a course over stoichiometry: in the name of a knot -> in words."""
 SIDES = {"negative": style.BLUE, "positive": style.VERMILLION}
@@ -35,7 +35,7 @@ KNOT, PERCENT = "_at_", "_percent"
 
 @dataclass(frozen=True, eq=False)
 class CalibrationView:
-    """What the page shows.
+    """Everything the page shows.
 
     content : of the report in JSON (see `aesi.pipeline.calibrate.calibration_content`).  model : its name in words.
     traces : each record as it was fitted; `before_v` is of the start file, `recalibrated_v` of the file that was
@@ -69,7 +69,7 @@ def write_calibration_report(path: str | Path, view: CalibrationView) -> Path:
 
 
 def finding(content: Mapping[str, Any]) -> str:
-    """How far off the fit is on its records, and the start file before, in free run; then the file by itself."""
+    """Sentence on how far off the records the fit is, and was the start file, in free run; then the file by itself."""
     files = content["files"]
     after, before, simulated = (
         _range([row[f"{key}_rmse_mv"] for row in files]) for key in ("after", "before", "as_simulated")

@@ -216,7 +216,7 @@ def _tall(bars: int) -> int:
 
 
 def _symbols(terms: Sequence[Row]) -> str:
-    """What the names of these terms are made of, in sentences; empty where nothing has to be said."""
+    """Sentences on what the names of these terms mean; empty where nothing has to be said."""
     text = " ".join(row["term"] for row in terms)
     used = dict.fromkeys(VARIABLE.findall(text))
     words = [f"{name}, {VARIABLES[name]}" for name in VARIABLES if name in used]

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
 BESIDE_MEASURED = 0.1
-"""Of the span of the measured voltage: room on its axis above and below."""
+"""Room above and below the measured voltage on its axis, as a share of its span."""
 ROLE_NAMES = {"train": "I training", "valid": "II validation", "test": "III test"}
 
 
@@ -125,7 +125,7 @@ def residual_figure(traces: Sequence[DiscoveryTrace], labels: Mapping[str, str])
 
 
 def _measured_range(traces: Sequence[DiscoveryTrace]) -> tuple[float, float]:
-    """V, of an axis on which a simulation that runs empty does not flatten what was measured."""
+    """(low, high), V, of an axis on which a simulation that runs empty does not flatten what was measured."""
     low = min(float(np.nanmin(t.measured_v)) for t in traces)
     high = max(float(np.nanmax(t.measured_v)) for t in traces)
     room = BESIDE_MEASURED * (high - low)
