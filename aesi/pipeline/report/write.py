@@ -44,11 +44,12 @@ def write_run_report(path: str | Path, view: RunView) -> Path:
         chosen=chosen,
         physics=physics,
         corrected=corrected,
+        own_share=runs.own_share(view),
         finding=runs.run_finding(view),
         sentences=[
             sentence
             for sentence in (
-                runs.corrected_finding(view),
+                runs.refit_finding(view),
                 runs.constant_finding(view),
                 runs.others_finding(view),
                 runs.persistence_finding(chosen),

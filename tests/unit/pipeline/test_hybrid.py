@@ -496,6 +496,30 @@ def test_round_off_at_a_full_charge_was_told_as_rows_beyond_it(model, data):
         assert any("a state of charge outside 0 to 1" in note for note in told) == said
 
 
+def test_a_correction_that_harms_a_record_was_told_by_its_csv_alone(model, data):
+    soc = np.linspace(0.9, 0.5, len(data))
+    near, far = (data.voltage_v + sign * 1e-3 * size for sign, size in ((1, 2.0), (-1, 3.0)))
+    for ours, alone, end in (
+        (near, far, "at most 2.0 mV; the physics alone 3.00 mV RMSE."),
+        (
+            far,
+            near,
+            "at most 3.0 mV; the physics alone 2.00 mV RMSE: without the correction this record is met better.",
+        ),
+        (near, near, "at most 2.0 mV; the physics alone 2.00 mV RMSE."),
+        (near, None, "at most 2.0 mV."),
+    ):
+        assert reached(model.cell, data, ours, soc, alone)[1].endswith(end)
+
+
+def test_a_prediction_is_told_beside_the_physics_alone_where_the_two_know_the_same(model, record, tmp_path):
+    folder = model.save(tmp_path / "model")
+    for measured in (False, True):
+        said: list[str] = []
+        predict_file(folder, record, tmp_path / "o.csv", measured=measured, say_notes=said.extend)
+        assert any("; the physics alone " in note for note in said) != measured
+
+
 def test_a_voltage_of_no_cell_was_told_without_when_it_left_the_limits(model, data):
     voltage, low_v = np.full(len(data), 3.9), model.cell.lower_voltage_v
     voltage[10], voltage[12] = low_v - 0.1, -1.49
