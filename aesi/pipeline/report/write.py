@@ -75,16 +75,15 @@ def write_discovery_report(path: str | Path, view: DiscoveryView) -> Path:
         view=view,
         discovery=view.discovery,
         states=discoveries.states_of(view.discovery),
-        written=discoveries.written_model(view.discovery),
+        written=discoveries.discovery_consequence(view),
         finding=discoveries.discovery_finding(view),
         sentences=[
             sentence
             for sentence in (
-                discoveries.look_alike_finding(view),
-                discoveries.discovery_consequence(view),
-                discoveries.unchanged_finding(view.discovery),
-                *moved_findings(view.discovery),
                 discoveries.reason_finding(view.discovery),
+                discoveries.next_finding(view.discovery, view.titles),
+                discoveries.look_alike_finding(view),
+                *moved_findings(view.discovery),
                 discoveries.span_finding(view),
             )
             if sentence
@@ -93,7 +92,7 @@ def write_discovery_report(path: str | Path, view: DiscoveryView) -> Path:
         closest=discoveries.closest_finding(view),
         moved=_moved_rows(view.discovery),
         candidates=[
-            row | {"title": hypotheses.hypothesis_title(row, view.titles)}
+            row | {"title": discoveries.hypothesis_title(row, view.titles)}
             for row in sorted(view.discovery["candidates"], key=lambda row: -row["score"])
         ],
     )

@@ -9,6 +9,7 @@ import numpy as np
 
 from aesi.pipeline.report import style
 from aesi.pipeline.report.views import KIND_ORDER, Row
+from aesi.pipeline.report.words.discoveries import hypothesis_title
 from aesi.tracer.search.plausible import ALIKE_NATS
 
 if TYPE_CHECKING:
@@ -114,15 +115,6 @@ def dependence_bars(rows: Sequence[Row], labels: Mapping[str, str]) -> Figure:
     fig.update_xaxes(title_text="variance explained, %", range=[0, 100])
     fig.update_layout(legend={"traceorder": "reversed"})
     return fig
-
-
-def hypothesis_title(row: Row, titles: Mapping[str, str]) -> str:
-    """An effect as it did best: by itself, or beside the others of its hypothesis, whose score it shares."""
-    name, *others = (
-        titles.get(effect, effect.replace("_", " "))
-        for effect in dict.fromkeys((row["effect"], *row.get("hypothesis", ())))
-    )
-    return f"{name}, beside {' and '.join(others)}" if others else name
 
 
 def _label(row: Row, titles: Mapping[str, str], chosen: Sequence[str]) -> str:
