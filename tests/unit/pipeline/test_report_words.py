@@ -109,6 +109,17 @@ def test_the_band_that_a_simulation_has_is_told_beside_that_of_an_observer(views
     assert told.endswith("The band in free run covers 91.0 % of them and is 24.0 mV wide.")
 
 
+def test_a_band_of_92_mv_about_an_error_of_3_was_told_without_the_start_that_makes_it(views):
+    row = views.run_view(200).models[1]
+    told = runs.interval_finding(
+        row | {"free_run_intervals": row["free_run_intervals"] | {"start_v": 0.0123}}
+    )
+    assert told.endswith(
+        "24.0 mV wide, because where a record starts is read from its voltage: a standard deviation of that is worth "
+        "12.3 mV along it, and cell.soc0 gives a start that is known."
+    )
+
+
 def test_errors_that_are_told_apart_late_have_more_digits(views):
     view = views.run_view(200)
     row = {"name": "ESPM recalibrated", "free_run": {"test_rmse_mv": 4.13}}
@@ -399,6 +410,8 @@ def test_the_range_that_the_data_cover_is_told(views):
     text = discoveries.span_finding(replace(view, traces=(replace(t, soc=soc, current_a=current_a),)))
     assert "span 1.0 h, 20 to 90 % state of charge" in text
     assert "from -5 to 12.5 A" in text
+    idle = replace(view, traces=(replace(t, current_a=np.linspace(-0.00163, 12.6, 3601)),))
+    assert "from 0 to 12.6 A" in discoveries.span_finding(idle)
     assert discoveries.span_finding(replace(view, traces=())) == ""
 
 

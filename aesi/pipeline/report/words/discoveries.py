@@ -9,6 +9,7 @@ import numpy as np
 
 from aesi.constants import MV_PER_V, SECONDS_PER_HOUR
 from aesi.numerics.typing import Array
+from aesi.pipeline.digits import decimals
 from aesi.pipeline.report.views import DiscoveryView, Row
 from aesi.pipeline.report.words.sizes import finding_line, refit_does_as_well, unexplained_by, with_size
 from aesi.tracer.decide.written import AS_GOOD
@@ -212,10 +213,14 @@ def span_finding(view: DiscoveryView) -> str:
     if not view.traces:
         return ""
     hours = sum(float(t.time_s[-1] - t.time_s[0]) for t in view.traces) / SECONDS_PER_HOUR
-    current, soc = (_range(getattr(t, name) for t in view.traces) for name in ("current_a", "soc"))
+    (least, most), soc = (_range(getattr(t, name) for t in view.traces) for name in ("current_a", "soc"))
+    digits = decimals(max(abs(least), abs(most)))
+    least, most = (
+        round(end, digits) + 0.0 for end in (least, most)
+    )  # + 0.0: a rounded-away minus says nothing
     return (
         f"The data span {hours:.1f} h, {round(100 * soc[0])} to {round(100 * soc[1])} % state of charge and currents "
-        f"from {current[0]:.3g} to {current[1]:.3g} A (discharge positive); nothing is said beyond them."
+        f"from {least:g} to {most:g} A (discharge positive); nothing is said beyond them."
     )
 
 

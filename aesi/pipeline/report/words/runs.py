@@ -258,7 +258,16 @@ def interval_finding(model: Row) -> str:
     free, wide = (_figure(model, "free_run_intervals", key) for key in ("coverage_pct", "average_width_v"))
     if free is None or wide is None:
         return text
-    return f"{text} The band in free run covers {free:.1f} % of them and is {1e3 * wide:.1f} mV wide."
+    start = _figure(model, "free_run_intervals", "start_v")
+    why = (
+        ""
+        if start is None
+        else (
+            f", because where a record starts is read from its voltage: a standard deviation of that is worth "
+            f"{1e3 * start:.1f} mV along it, and cell.soc0 gives a start that is known"
+        )
+    )
+    return f"{text} The band in free run covers {free:.1f} % of them and is {1e3 * wide:.1f} mV wide{why}."
 
 
 def _told(first: float, other: float) -> tuple[str, str]:
