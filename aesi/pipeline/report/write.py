@@ -82,13 +82,14 @@ def write_discovery_report(path: str | Path, view: DiscoveryView) -> Path:
             for sentence in (
                 discoveries.reason_finding(view.discovery),
                 discoveries.next_finding(view.discovery, view.titles),
-                discoveries.look_alike_finding(view),
+                discoveries.look_alike_finding(view.discovery, view.titles),
                 *moved_findings(view.discovery),
                 discoveries.span_finding(view),
             )
             if sentence
         ],
         rest=discoveries.rest_finding(view.discovery),
+        look_alikes=discoveries.look_alikes_told(view.discovery, view.titles),
         closest=discoveries.closest_finding(view),
         moved=_moved_rows(view.discovery),
         candidates=[

@@ -416,9 +416,26 @@ def test_the_range_that_the_data_cover_is_told(views):
 
 
 def test_look_alikes_stand_next_to_the_verdict(views):
-    text = discoveries.look_alike_finding(views.discovery_view(200))
+    view = views.discovery_view(200)
+    text = discoveries.look_alike_finding(view.discovery, view.titles)
     assert text == "These data cannot tell apart self-heating and ambient temperature."
-    assert discoveries.look_alike_finding(views.discovery_view(200, verdict="none")) == ""
+    assert discoveries.look_alike_finding(views.discovery_view(200, verdict="none").discovery) == ""
+
+
+def test_what_fits_as_well_only_beside_another_was_told_as_if_it_did_alone(views, tmp_path):
+    view = views.discovery_view(200)
+    rows = [
+        row | {"hypothesis": ["ambient_temperature", "porosity"]}
+        if row["effect"] == "ambient_temperature"
+        else row | {"hypothesis": ["self_heating", row["effect"]]}
+        for row in view.discovery["candidates"]
+    ]
+    told = replace(view, discovery=view.discovery | {"candidates": rows})
+    assert discoveries.look_alike_finding(told.discovery, view.titles) == (
+        "These data cannot tell apart self-heating and ambient temperature (beside porosity)."
+    )
+    page = write_discovery_report(tmp_path / "r.html", told).read_text()
+    assert "<li>self-heating, ambient temperature (beside porosity)</li>" in page
 
 
 def test_lists_read_as_english():

@@ -278,14 +278,24 @@ def discovery_consequence(view: DiscoveryView) -> str:
     )
 
 
-def look_alike_finding(view: DiscoveryView) -> str:
+def look_alike_finding(discovery: Mapping[str, Any], titles: Mapping[str, str] | None = None) -> str:
     """A sentence on what else fits as well, beside the verdict."""
-    groups = [
-        [_title(view.titles, e) for e in group] for group in view.discovery.get("indistinguishable", [])
-    ]
+    groups = look_alikes_told(discovery, titles or {})
     if not groups:
         return ""
     return f"These data cannot tell apart {'; nor '.join(listed(group) for group in groups)}."
+
+
+def look_alikes_told(discovery: Mapping[str, Any], titles: Mapping[str, str]) -> list[list[str]]:
+    """The names of each group that the data cannot tell apart; what fits as well only beside others, with these."""
+    beside = {row["effect"]: row.get("hypothesis", ()) for row in discovery["candidates"]}
+    named = set(discovery["effects"])
+
+    def told(effect: str) -> str:
+        others = [_title(titles, one) for one in beside.get(effect, ()) if one not in {effect, *named}]
+        return _title(titles, effect) + (f" (beside {listed(others)})" if others else "")
+
+    return [[told(effect) for effect in group] for group in discovery.get("indistinguishable", [])]
 
 
 def closest_finding(view: DiscoveryView) -> str:
