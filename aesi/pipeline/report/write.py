@@ -132,22 +132,17 @@ def discovery_figures(view: DiscoveryView) -> dict[str, Figure]:
 
 
 def _over_the_range(traces: Sequence[DiscoveryTrace], states: Mapping[str, str]) -> dict[str, Figure]:
-    """Residual against current and SOC, and maps over both, at the first and the last of the states."""
-    first, *_, last = states
-    ends = (first, last)
+    """Residual against current and SOC, and maps over both, at each of the states."""
     current = np.concatenate([t.current_a for t in traces])
     soc = np.concatenate([t.soc for t in traces])
     errors = {
-        state: np.concatenate([t.measured_v - getattr(t, f"{state}_v") for t in traces]) for state in ends
+        state: np.concatenate([t.measured_v - getattr(t, f"{state}_v") for t in traces]) for state in states
     }
     limit = maps.shared_limit(current, soc, list(errors.values()), False)
     return {
         "against_current": maps.dependence_figure(current, errors, states, "current, A (discharge > 0)"),
         "against_soc": maps.dependence_figure(100 * soc, errors, states, "SOC, %"),
-        "map_before": maps.map_figure(
-            current, soc, errors[ends[0]], f"Mean error, {states[ends[0]]}", False, limit
-        ),
-        "map_after": maps.map_figure(
-            current, soc, errors[ends[1]], f"Mean error, {states[ends[1]]}", False, limit
-        ),
+    } | {
+        f"map_{state}": maps.map_figure(current, soc, errors[state], f"Mean error, {words}", False, limit)
+        for state, words in states.items()
     }

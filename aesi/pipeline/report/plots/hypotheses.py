@@ -27,9 +27,9 @@ def ranking_figure(candidates: Sequence[Row], titles: Mapping[str, str], chosen:
     best = max(rows[0]["score"], 0.0)
     caption = (
         "How much less each hypothesis says of data that it has not seen than the one that says most, in nats: 2.3 "
-        f"are odds of ten to one. In the shaded part, up to {ALIKE_NATS:g}, two say the same. A further name is added only "
-        "where it says more than chance would at its step, so that a hypothesis of more names may lie ahead of the star. "
-        "What stands beside another effect shares the score of both."
+        f"are odds of ten to one. In the shaded part, up to {ALIKE_NATS:g}, two say the same. A further name is added "
+        "only where it says more than chance would at its step, so that a hypothesis of more names may lie ahead of "
+        "the star. What stands beside another effect shares the score of both."
     )
     fig = style.figure("Hypotheses, behind the best", caption, max(240, 130 + 20 * (len(rows) + 1)))
     behind = {_label(row, titles, chosen): best - row["score"] for row in rows} | {DECLARED: best}
