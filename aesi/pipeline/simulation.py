@@ -213,12 +213,21 @@ def _placed(
 
 
 def _with_effects(record: Measurement, model: HybridModel) -> list[str]:
-    """A sentence on the effects that act, or that the cell holds, with their values, which may be defaults."""
-    acting = [
-        one for one in model.effects if record.temperature_degc is None or one.effect.infers != "temperature"
-    ]
-    said = [f"with {', '.join(map(repr, acting))}"] if acting else []
-    said += [f"by a cell whose values hold {', '.join(model.held)}"] if model.held else []
+    """A sentence on the effects that act, or that the cell holds, with their values, which may be defaults; of those
+    that were fitted beside what was found the names alone."""
+    acting = {
+        one.id: repr(one)
+        for one in model.effects
+        if record.temperature_degc is None or one.effect.infers != "temperature"
+    }
+    held = {words.partition("(")[0]: words for words in model.held}
+    told, inside = (
+        [words for id, words in each.items() if id not in model.beside] for each in (acting, held)
+    )
+    beside = [id for id in (acting | held) if id in model.beside]
+    said = [f"with {', '.join(told)}"] if told else []
+    said += [f"by a cell whose values hold {', '.join(inside)}"] if inside else []
+    said += [f"with what was fitted beside: {', '.join(beside)}"] if beside else []
     return [f"{record.name}: {'; '.join(said)}."] if said else []
 
 

@@ -15,6 +15,7 @@ from aesi.physics.effects import CATALOGUE, activated
 from aesi.physics.folded import folded
 from aesi.pipeline.discovery.cases import case_of_files
 from aesi.pipeline.experiment.load import load
+from aesi.pipeline.export import export
 from aesi.pipeline.product.error_series import error_series
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.product.model_folder import SCHEMA
@@ -479,6 +480,29 @@ def test_what_a_discovery_had_written_into_the_cell_was_simulated_without_a_word
     words = ": by a cell whose values hold series_resistance(resistance_ohm=0.002)."
     assert any(note.endswith(words) for note in said)
     assert "changed by series_resistance(resistance_ohm=0.002)" in repr(HybridModel.load(tmp_path / "found"))
+
+
+def test_what_was_fitted_beside_a_finding_was_told_with_its_values_as_if_found(model, record, tmp_path):
+    """`voltage_sensor_offset(offset_v=-6.574e-05)` stood first, before 8 mohm of contacts."""
+    offset = CATALOGUE["voltage_sensor_offset"].activate(offset_v=-6.6e-5)
+    held = ("series_resistance(resistance_ohm=0.008)", "solid_diffusivity(negative_factor=1.01)")
+    beside = ("voltage_sensor_offset", "solid_diffusivity")
+    found = HybridModel(model.cell, (offset,), held=held, beside=beside)
+    said: list[str] = []
+    simulate_file(found.save(tmp_path / "found"), record, tmp_path / "o.csv", say_notes=said.extend)
+    assert any(
+        note.endswith(
+            ": by a cell whose values hold series_resistance(resistance_ohm=0.008); with what was fitted beside: "
+            "voltage_sensor_offset, solid_diffusivity."
+        )
+        for note in said
+    )
+    lost = export(tmp_path / "found", tmp_path / "o.json").left
+    assert lost == ("voltage_sensor_offset, fitted beside what was found: BPX has no field for that.",)
+    alone = HybridModel(model.cell, (offset,)).save(tmp_path / "alone")
+    assert export(alone, tmp_path / "o.json").left == (
+        "voltage_sensor_offset (offset_v -6.6e-05 V): BPX has no field for it.",
+    )
 
 
 def test_what_a_model_was_found_to_be_worth_was_told_by_its_report_alone(model, record, tmp_path):
