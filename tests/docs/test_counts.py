@@ -60,7 +60,9 @@ def test_how_far_off_a_withheld_temperature_is_named(withheld, page):
     inside = sum(low <= there <= high for (_, low, high), there in zip(sizes, true, strict=True))
     half = [(high - low) / 2 for _, low, high in sizes]
     said = text_of(page)
-    assert re.search(rf"{round(median(off), 6):.1f} K (off )?in the median(,| and) {max(off):.0f} at worst", said)
+    assert re.search(
+        rf"{round(median(off), 6):.1f} K (off )?in the median(,| and) {max(off):.0f} at worst", said
+    )
     assert re.search(
         rf"\b{inside} within (the interval of )?\+/- {min(half):.0f} to {max(half):.0f} K \(90 %\)", said
     )
