@@ -13,13 +13,20 @@ leave 9 to 157 times that of the right one, those at -10 to 10 degC with 30 degC
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from aesi.constants import MV_PER_V
+from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
+from aesi.errors import AesiError
+from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
+from aesi.physics.cell import Cell
+from aesi.physics.effect import ActiveEffect
+from aesi.physics.simulation import ModelName, simulate
+from aesi.records import Hold, Measurement
 
 GRID_DEGC = (-20.0, -10.0, 0.0, 10.0, 20.0, 30.0, 40.0, 50.0)
 """Tried, and that of the cell's file."""
@@ -64,6 +71,51 @@ class OtherTemperature:
             f"{model} leaves {MV_PER_V * self.left_v:.1f} mV, at {self.there_degc:.4g} degC "
             f"{MV_PER_V * self.there_v:.1f} mV: {wrong}, or {otherwise}."
         )
+
+
+def contradicted_temperature(
+    cell: Cell,
+    record: Measurement,
+    soc0: float,
+    hold: Hold,
+    effects: Iterable[ActiveEffect] = (),
+    model: ModelName = "espm",
+) -> OtherTemperature | None:
+    """Another temperature by which a cell with its effects follows a record; None where the record's own is not
+    contradicted, and without one, or without a voltage in every row.
+
+    soc0 : state of charge at the first row.  hold : how the current runs between the rows.
+    """
+    if record.temperature_degc is None or not np.all(np.isfinite(record.voltage_v)):
+        return None
+    left_v = partial(_left_v, cell, record, soc0, hold, tuple(effects), model)
+    return other_temperature(record.temperature_degc, cell.initial_temperature_k - ZERO_CELSIUS_K, left_v)
+
+
+def _left_v(
+    cell: Cell,
+    record: Measurement,
+    soc0: float,
+    hold: Hold,
+    effects: tuple[ActiveEffect, ...],
+    model: ModelName,
+    degc: Array,
+) -> float | None:
+    try:
+        run = simulate(
+            cell,
+            record.time_s,
+            record.current_a,
+            soc0,
+            effects,
+            degc,
+            hold,
+            on_depletion="clip",
+            model=model,
+        )
+    except AesiError:
+        return None
+    return rms(record.voltage_v - run.voltage_v)
 
 
 def other_temperature(

@@ -151,6 +151,7 @@ def test_a_discovery_of_an_experiment_was_not_tracked_where_its_file_says(
 
     from aesi.pipeline.discovery import cases
     from flows.jobs import discovery, prefect_flows, start
+    from flows.jobs.run_request import RunRequest
     from flows.jobs.stages import PlainStages
     from flows.tracking.store import Store
 
@@ -163,7 +164,8 @@ def test_a_discovery_of_an_experiment_was_not_tracked_where_its_file_says(
         monkeypatch.setattr(start, "_with_or_without", lambda under_prefect, plainly, use: under_prefect())
         monkeypatch.setattr(prefect_flows, "discovery", prefect_flows.discovery.fn)
         monkeypatch.setattr(prefect_flows, "PrefectStages", PlainStages)
-    under = start.discover_experiment("told.yaml", [f"tracking.uri={uri}"], None, use_prefect=prefect)
+    request = RunRequest("told.yaml", (f"tracking.uri={uri}",))
+    under = start.discover_experiment(request, use_prefect=prefect)
     assert (under.name, under.tracking.uri) == ("told_where", uri)
     assert Store(uri).find_experiment("told_where") is not None
     assert not (workspace / "mlflow.db").exists()
