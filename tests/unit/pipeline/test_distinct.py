@@ -139,7 +139,9 @@ def in_means(rows, begin=0.0):
     ],
 )
 def test_an_export_on_other_times_was_taken_for_another_test(export):
-    told = "hold (one test on other times|the same rows of one test)"  # of rows that were moved to another time
+    told = (
+        "hold (one test on other times|the same rows of one test)"  # of rows that were moved to another time
+    )
     with pytest.raises(DataError, match=told + " .* and are both among the data and the tests"):
         check_distinct([RECORD], [export])
     with pytest.raises(DataError, match=told):
