@@ -9,7 +9,7 @@ cell, or is of the model before it (277 pairs), 12 are followed within FOLLOWS_V
 column leaves at most 2.28 times as much as that one: none is told. With files of other cells, brought to the size of
 theirs (837 pairs), 28 are followed so and 15 are told, for their kinetics are others, which the sentence leaves open:
 five drives of a Panasonic at 2 to 16 degC with files of an LG 18650HG2 (3.0 to 4.1 times), and five of the HG2 at 24
-degC with files of the Panasonic and of an NCA cell (3.1 to 7.0). With the LG M50 that the shipped cells were fitted from
+degC with files of the Panasonic and of an NCA cell (3.1 to 7.0). With the LG M50 that shipped cells were fitted from
 it is 2.9 times at most. With 0 degC for their column 11 of 28 are followed by their own file, and all are told (3.3 to
 153 times).
 """

@@ -218,3 +218,37 @@ def test_what_is_no_number_for_a_reason_is_told_with_it(tmp_path, cell, words):
     path.write_text("\n".join(["time_s,current_a,voltage_v", *rows, f"20,{cell},3.9"]) + "\n")
     with pytest.raises(DataError, match=words):
         read_measurement(path)
+
+
+def test_a_dead_sensor_with_noise_was_taken_for_a_current(tmp_path):
+    noise = 0.003 + 0.01 * np.random.default_rng(2).normal(size=len(TIME))
+    said = refusal(tmp_path, noise, VOLTAGE)
+    assert "the steps of the current" in said
+    assert "do not move it (their correlation is 0.0" in said
+    partly = CURRENT.copy()
+    partly[1500:2700] = noise[1500:2700]
+    said = refusal(tmp_path, partly, VOLTAGE)
+    assert "row 1501 (line 1502)" in said
+    assert "the current stays within -0.0" in said
+    assert "--to-s 1500 or --from-s 2699" in said
+
+
+@pytest.mark.parametrize("rows_late", [1, 2])
+def test_a_voltage_that_is_written_rows_late_is_no_dead_current(tmp_path, rows_late):
+    late = np.roll(VOLTAGE, rows_late)
+    late[:rows_late] = VOLTAGE[0]
+    read_measurement(written(tmp_path, CURRENT, late))
+
+
+@pytest.mark.parametrize(("noise_v", "told"), [(0.0, True), (1e-3, True), (0.01, False)])
+def test_two_tests_that_were_joined_in_a_rest_a_tenth_of_a_volt_apart(tmp_path, noise_v, told):
+    """At rest nothing explains a step; in noise that is as large, it is not told."""
+    current, voltage = CURRENT.copy(), VOLTAGE.copy()
+    current[1700:1900], voltage[1700:1900] = 0.0, 3.95 - 0.005 * np.exp(-np.arange(200) / 30.0)
+    voltage = voltage + noise_v * np.random.default_rng(3).normal(size=len(TIME))
+    assert "goes from" not in notes(tmp_path, current, voltage)
+    joined = voltage.copy()
+    joined[1800:] -= 0.09
+    assert (
+        "V at row 1801 (line 1802), 1 s after the row before it" in notes(tmp_path, current, joined)
+    ) == told
