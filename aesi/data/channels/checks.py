@@ -130,6 +130,8 @@ def _disorder(time_s: Array, step: Array) -> str:
             "; it is a clock that was put back, or that starts anew at midnight: give the time since the start of the "
             "test, or split the file there."
         )
+    if len(first) == 1 and step[-1] < 0:
+        return "; it is the last row alone, as a line of sums or means below a table is: remove it."
     if len(first) == 1:
         again = ", and starts again there, as that of a second test does"
         return (

@@ -60,9 +60,9 @@ def check_dead(columns: Columns, context: Context) -> None:
     if clearest is not None and abs(clearest[1]) < FOLLOWS:
         raise DataError(
             f"{context.at('current_a', 0)}: the voltage turns {turns} times, rising and falling by more than "
-            f"{least:.2g} V, and the steps of the current ({np.min(current):.4g} to {np.max(current):.4g} A) do not "
-            f"move it (their correlation is {abs(clearest[1]):.2f}, and above 0.8 where they do); check the sensor, and "
-            "whether the columns are of one test."
+            f"{least:.2g} V, and the steps of the current ({np.min(current):.4g} to {np.max(current):.4g} A) do "
+            f"not move it (their correlation is {abs(clearest[1]):.2f}, and above 0.8 where they do); check the "
+            "sensor, and whether the columns are of one test."
         )
 
 

@@ -252,3 +252,25 @@ def test_two_tests_that_were_joined_in_a_rest_a_tenth_of_a_volt_apart(tmp_path, 
     assert (
         "V at row 1801 (line 1802), 1 s after the row before it" in notes(tmp_path, current, joined)
     ) == told
+
+
+def test_a_line_of_means_below_a_table_was_a_second_test(tmp_path):
+    rows = np.append(np.arange(len(TIME)), 0)
+    said = refusal(tmp_path, CURRENT[rows], VOLTAGE[rows], TIME[rows])
+    assert "time runs back from 3599 s to 0 s; it is the last row alone, as a line of sums or means" in said
+
+
+@pytest.mark.parametrize(("hours", "told"), [(1.0, True), (2.0, False)])
+def test_a_clock_that_was_put_forward_was_rows_that_are_missing(tmp_path, hours, told):
+    time = TIME + np.where(np.arange(len(TIME)) > 1000, 3600.0 * hours, 0.0)
+    assert ("a clock that was put forward to summer time" in refusal(tmp_path, time=time)) == told
+
+
+@pytest.mark.parametrize("name", ["C-rate", "c_rate", "power_w", "Power", "Current (W)", "capacity (Ah)"])
+def test_a_c_rate_or_a_power_was_taken_for_a_current(tmp_path, name):
+    said = refusal(tmp_path, header=f"time_s,{name},voltage_v", reading={"columns": {"current_a": name}})
+    assert "by its name, and current_a is needed in A; convert the column" in said
+    read_measurement(
+        written(tmp_path, header="time_s,Power supply (A),voltage_v"),
+        columns={"current_a": "Power supply (A)"},
+    )
