@@ -32,6 +32,9 @@ FOLLOWS = 0.2
 """Correlation of the steps of current and voltage, over the clearest of three strides, below which one is not the
 other's. Of 99 measured and virtual records whose voltage turns so often it is 0.85 and more; with noise of a dead
 sensor for their current 0.04 at most."""
+UNANSWERED_SHARE = 0.2
+"""Of the steps of the current that move the voltage elsewhere, at which it has the value of the row before: 0.026 at
+most of those 99 records, and 0.64 and more where every third voltage of them is held for three rows."""
 FAR_ROWS = 3.0
 """Times the median interval: what the cell did between rows further apart, as those of the rests of a test alone, is
 not known."""
@@ -130,6 +133,24 @@ def check_stuck(columns: Columns, context: Context) -> None:
                 f"falls {ways[1]} times by what moves it elsewhere; check the sensor, or read one side of it: --to-s "
                 f"{time[begin]:.10g} or --from-s {time[end]:.10g}."
             )
+
+
+def held_doubts(columns: Columns) -> list[str]:
+    """A sentence on a voltage that is written less often than the current; none of others."""
+    clearest, answer = clearest_answer(columns), np.abs(np.diff(columns["voltage_v"]))
+    if clearest is None or clearest[0] >= 0 or not answer.any():
+        return []
+    steps = np.abs(np.diff(columns["current_a"]))
+    clear = steps > STEP_SHARE * float(np.max(steps))
+    clear &= -clearest[0] * steps > CLEAR_RESOLUTIONS * _smallest(answer)
+    unanswered = float(np.mean(answer[clear] == 0)) if int(np.sum(clear)) >= 2 * ENOUGH_STEPS else 0.0
+    if unanswered <= UNANSWERED_SHARE:
+        return []
+    return [
+        f"Its voltage is that of the row before at {unanswered:.0%} of the steps of the current, as where it is "
+        "written less often than the current: what a model leaves there is not the cell's; give the rows in which both "
+        "are new."
+    ]
 
 
 def _smallest(moves: Array) -> float:

@@ -274,3 +274,11 @@ def test_a_c_rate_or_a_power_was_taken_for_a_current(tmp_path, name):
         written(tmp_path, header="time_s,Power supply (A),voltage_v"),
         columns={"current_a": "Power supply (A)"},
     )
+
+
+@pytest.mark.parametrize(("rows", "told"), [(1, False), (4, True)])
+def test_a_voltage_that_is_written_less_often_than_its_current_was_taken_for_the_cell_s(tmp_path, rows, told):
+    held = np.round(VOLTAGE[np.arange(len(TIME)) // rows * rows], 4)
+    assert (
+        "of the steps of the current, as where it is written less often" in notes(tmp_path, CURRENT, held)
+    ) == told
