@@ -171,6 +171,28 @@ def test_a_discovery_of_an_experiment_was_not_tracked_where_its_file_says(
     assert not (workspace / "mlflow.db").exists()
 
 
+def test_an_experiment_was_read_again_after_it_was_checked(workspace, case, monkeypatch):
+    """Who edits the file meanwhile edits that of the next run."""
+    from aesi.pipeline.discovery import cases
+    from aesi.pipeline.experiment.config import read_experiment
+    from flows import cli
+    from flows.jobs import run_request, start
+
+    (workspace / "told.yaml").write_text(EXPERIMENT)
+    read, found = [], []
+
+    def counted(path, overrides):
+        read.append(path)
+        return read_experiment(path, overrides)
+
+    monkeypatch.setattr(run_request, "read_experiment", counted)
+    monkeypatch.setattr(cases, "case_of_experiment", lambda config: case)
+    monkeypatch.setattr(start, "discover", lambda case, folder, *rest: found.append((case, folder)))
+    cli.app(["discover", "told.yaml"], standalone_mode=False)
+    assert read == ["told.yaml"]
+    assert found == [(case, workspace / "runs" / "told_where" / "discovery")]
+
+
 def _only_tracked(case, out, run, console, under):
     from flows.jobs import discovery
 
