@@ -151,8 +151,8 @@ class SplitTable:
 
     @cached_property
     def at_one_volt(self) -> tuple[Array, Array]:
-        """Where both are told apart, rows as independent samples of what lasts and of what is gone within seconds, each
-        whitened at a size of 1 V: (n, m) each, which another size divides."""
+        """Where both are told apart, what lasts and what is gone within seconds, each whitened at a size of 1 V: (n, m)
+        each, which another size divides, since the amplitude of a measured cell's error is proportional to it."""
         slow, rest = self._parts
         root = np.sqrt(self.problem.independent)[:, None]
         return slow * root / self._amplitude(Size(1.0))[:, None], rest * root
