@@ -32,7 +32,7 @@ def test_the_measured_case_is_judged_where_its_fit_ends(shared_data, monkeypatch
 
 
 @pytest.mark.parametrize(
-    "experiment, overrides, hold",
+    ("experiment", "overrides", "hold"),
     [
         ("measured_nmc", [], "backward"),  # by its data.hold
         ("measured_nmc", ["discover.hold=linear"], "linear"),
