@@ -32,7 +32,7 @@ from aesi.pipeline.experiment.sources import (
     sources_of,
     with_keys,
 )
-from aesi.pipeline.notes import of_day, on_temperatures, temperature_sentence
+from aesi.pipeline.notes import of_contradiction, of_day, on_temperatures, temperature_sentence
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import ErrorSeries, Hold, LeftOutDrives, Role, Split, hold_sentence
@@ -231,12 +231,13 @@ def _on_grid(
         start = initial_state(
             cell, measurement, declared, data.hold, given.effects, shared=shared, model=given.model
         )
-        held = hold_sentence(measurement.name, data.hold, "hold" in data.model_fields_set, "data.hold: {}")
+        held = hold_sentence(measurement.name, data.hold, data.declared_hold is not None, "data.hold: {}")
         even = to_even(measurement, data.dt_s, data.hold)
         notes += [
             with_keys(start.sentence),
             held,
             temperature_sentence(cell, measurement, given.effects),
+            *map(with_keys, of_contradiction(given, even, start.soc, data.hold)),
             *map(with_keys, even.notes),
         ]
         records[name] = no_rows(even, start.soc, start.read_sd)
