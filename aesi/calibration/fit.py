@@ -47,18 +47,20 @@ from aesi.physics.depletion import ran_out
 from aesi.records import Measurement, Spectrum, measured_on_case
 
 EVALUATIONS = 100
-"""At most: the descents to the shipped files of the Panasonic NCR18650PF and of the LG 18650HG2 end before."""
+"""Most evaluations of a descent: those to the shipped files of the Panasonic NCR18650PF and of the LG 18650HG2 end
+before."""
 GAIN = 1e-5
-"""Of the cost: a step that gains less than this share of it is the last. With ten times as much the first descent to an
-LG 18650HG2 ends a deviation of the priors away, at 344.7 instead of 340.1."""
+"""Least gain of a step, as a share of the cost, before a descent ends. With ten times as much the first descent to
+an LG 18650HG2 ends a deviation of the priors away, at a cost of 344.7 instead of 340.1."""
 NOTED_ZERO = 0.02
-"""Of a record's typical current."""
+"""Share of a record's typical current above which a cycler's zero is noted."""
 NOTED_AGE = 0.01
-"""Of the active material: what a record's differs by and is told."""
+"""Share of its active material by which a record's cell has to differ from the file's to be noted."""
 NOTED_SILICON = 0.05
-"""The same of silicon, a sixth of what such a cell gives."""
+"""The same for the silicon, which gives a sixth of such a cell's charge."""
 NOTED_DEVIATIONS = 2.0
-"""Of a prior that was given: where a fit ends further from it, its records contradict it. A convention."""
+"""A fit that ends more than this many standard deviations from a prior that the user gave contradicts it. A
+convention."""
 OF_ROWS_LEFT_OUT = (
     "the state of charge that was given is that of its first row, which is not fitted; it starts where its "
     "voltage says."
@@ -126,9 +128,10 @@ def _fitted_twice(model: Model, evaluations: int) -> tuple[Array, Cell, tuple[st
 def _with_what_it_is_of(
     found: Cell, declared: Cell, model: Model, shares: Mapping[str, float], days: Mapping[str, date]
 ) -> Cell:
-    """The fitted cell as it is written: with which model and which records it was fitted.
+    """The fitted cell as it is written, with the model and the records that it was fitted with.
 
-    declared : at whose temperature records without one were taken.  shares : record -> of the capacity that is written.
+    declared : at whose temperature records without one were taken.  shares : record -> share of the capacity that is
+    written.
     days : by record name, of those that have one.
     """
     return replace(
@@ -141,7 +144,7 @@ def _with_what_it_is_of(
 
 
 def _errors(model: Model, states: Mapping[FitState, tuple[Cell, Array]]) -> tuple[RecordError, ...]:
-    """Of each record, what each state of the cell leaves of it."""
+    """The RMSE of each record under each state of the cell."""
     left_v = {name: [rms(error) for error in model.errors_of(*state)] for name, state in states.items()}
     return tuple(
         RecordError(r.name, _degc(r), left_v["declared"][i], left_v["fitted"][i], left_v["simulated"][i])
@@ -152,7 +155,7 @@ def _errors(model: Model, states: Mapping[FitState, tuple[Cell, Array]]) -> tupl
 def problem(
     cell: Cell, records: Sequence[Measurement], conditions: Conditions
 ) -> tuple[Model, tuple[str, ...]]:
-    """What is fitted, and sentences on how it was set up.
+    """The model that is fitted, and sentences on how it was set up.
 
     Raises DataError for records that do not fit the cell.
     """
@@ -231,8 +234,8 @@ def _sized(cell: Cell, records: Sequence[Measurement], same_cell: bool) -> tuple
 
 
 def _of_size(cell: Cell, sized_cell: Cell) -> Cell:
-    """The start file of the size that the records tell, with no typical value that is filled in: the limits of what
-    contradicts a temperature were set with files as they are."""
+    """The start file at the size that the records tell, without the typical values that a fit fills in: the limits
+    beyond which a record contradicts its temperature were set with files as they are."""
     return replace(
         cell,
         electrode_area_m2=sized_cell.electrode_area_m2,
@@ -253,7 +256,7 @@ def _of_small_span(span_k: float, n_records: int) -> tuple[str, ...]:
 
 
 def descended(model: Model, evaluations: int, x0: Array | None = None) -> Array:
-    """Where bounded least squares ends."""
+    """Working vector at which bounded least squares ends."""
     x = np.zeros(model.layout.size) if x0 is None else x0
     if not np.isfinite(model.residual(x)).all():
         raise FitError(
@@ -272,7 +275,7 @@ STATE_WORDS: dict[FitState, str] = {
     "fitted": "the fitted cell",
     "simulated": "the file as simulated",
 }
-"""In words, as a note names them."""
+"""State of the cell -> what notes call it."""
 
 
 def _ran_out(model: Model, states: Mapping[FitState, tuple[Cell, Array]]) -> tuple[str, ...]:
@@ -332,5 +335,5 @@ def _span_k(cell: Cell, records: Sequence[Prepared], spectra: Sequence[Spectrum]
 
 
 def _mean_kelvin(cell: Cell, record: Prepared) -> float:
-    """Of what a record is taken at: the file's temperature where it tells none."""
+    """Mean temperature of a record, K; the file's where the record tells none."""
     return cell.initial_temperature_k if record.mean_kelvin is None else record.mean_kelvin

@@ -16,20 +16,22 @@ from aesi.records import Measurement
 TYPICAL_SOLID_EA_J_MOL = 30e3
 TYPICAL_RATE_EA_J_MOL = 35e3
 TYPICAL_ELECTROLYTE_EA_J_MOL = 17.1e3
-"""Where the file declares none: a cell answers to temperature, and data at one temperature cannot say how much. Records
-of several temperatures move them from there, see `aesi.calibration.parameters`.
+"""Activation energies that stand in where the file declares none: a cell answers to temperature, and data at one
+temperature cannot say how much. Records of several temperatures move them from there, see
+`aesi.calibration.parameters`.
 Diffusion in graphite and the conductivity as in Ecker et al., J. Electrochem. Soc. 162 (2015) A1836 (30.3, 17.1), rates
 as of graphite in O'Kane et al., Phys. Chem. Chem. Phys. 24 (2022) 7909 (35), all as PyBaMM's parameter sets have
 them."""
 OPEN_SHARE = 1e-3
-"""Of the largest current of a record: below this no current flows (the relay is open), whatever the cycler reads."""
+"""Share of the largest current of a record below which no current flows (the relay is open), whatever the cycler
+reads."""
 FULL_WINDOW_V = 0.15
 """A discharge is a full one if it starts within this of the upper limit and ends within twice this of the lower."""
 ALL_OF_IT = 0.95
-"""Of the charge that a record takes out of a cell at most: where less has left at the lowest voltage, that was a pulse,
-which in the cold reaches the lower limit at any state of charge. A convention."""
+"""Least share of the most charge that a record takes out of a cell for which its lowest voltage counts as empty.
+Where less has left, a pulse reached the limit, which happens at any state of charge in the cold. A convention."""
 LONG_CHARGE = 0.3
-"""Of the capacity: a charge that changes the branch of the hysteresis, where there is one."""
+"""Share of the capacity: a longer charge changes the branch of the hysteresis, where there is one."""
 
 
 def sized(cell: Cell, measurements: Sequence[Measurement]) -> tuple[Cell, tuple[str, ...]]:
@@ -47,8 +49,8 @@ def sized(cell: Cell, measurements: Sequence[Measurement]) -> tuple[Cell, tuple[
 
 
 def size_assumed(cell: Cell, measurements: Sequence[Measurement]) -> str:
-    """That the size of the cell is the file's, a sentence; '' where a full discharge among the measurements tells it.
-    What a fit says of capacity is within its windows of stoichiometry then, and the size is no parameter of it."""
+    """A sentence that the size of the cell is the file's; '' where a full discharge among the measurements tells it.
+    A fit then speaks of capacity within its windows of stoichiometry only: the size is no parameter of it."""
     if any(_full_discharge_ah(cell, m) is not None for m in measurements):
         return ""
     return (

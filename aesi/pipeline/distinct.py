@@ -18,8 +18,8 @@ _Listed = Sequence[Measurement] | Sequence[Spectrum]
 
 @dataclass(frozen=True)
 class _Words:
-    """What is said of two of the same content: both `fitted`, one fitted and one that judges (`between`), or both that
-    judge (`judging`)."""
+    """Phrases for two records, or spectra, of the same content: both fitted (`fitted`), one fitted and one that
+    judges (`between`), or both that judge (`judging`)."""
 
     fitted: str
     between: str

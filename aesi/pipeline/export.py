@@ -32,14 +32,14 @@ class Exported:
 
 @dataclass(frozen=True)
 class _Pybamm:
-    """What PyBaMM needs beside the BPX file."""
+    """Content for PyBaMM beside the BPX file."""
 
     options: dict[str, Any] = field(default_factory=dict)
     values: dict[str, float] = field(default_factory=dict)
 
 
 def files_written(out: Path, to: Target) -> tuple[Path, ...]:
-    """What `export` writes: `out`, and for PyBaMM the BPX file that its script reads.
+    """The files that `export` writes: `out`, and for PyBaMM the BPX file that its script reads.
 
     Raises InputError where `out` has the wrong suffix.
     """
@@ -95,7 +95,7 @@ def _keep_unnamed(script: Path, bpx: Path, text: str) -> None:
 
 
 def _beyond_bpx(cell: Cell) -> list[str]:
-    """What a calibrated cell holds in its section User-defined that neither target takes over."""
+    """Sentences on what a calibrated cell holds in its section User-defined that neither target takes over."""
     both = (cell.negative, cell.positive)
     own = {
         "resistance of films": any(x.film_ohm_m2 != NO_FILM for x in both),

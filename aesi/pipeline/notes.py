@@ -20,7 +20,7 @@ from aesi.records import Hold, Measurement, at_its_temperature
 
 SEPARATOR = ": "
 TELLING_K = 5.0
-"""Further than this from a cell's reference temperature, activation energies tell: with 20 kJ/mol rates differ by a
+"""K from a cell's reference temperature beyond which activation energies tell: with 20 kJ/mol rates differ by a
 sixth. A convention."""
 
 
@@ -38,7 +38,7 @@ def together(notes: Iterable[str]) -> tuple[str, ...]:
 
 
 def temperature_sentence(cell: Cell, record: Measurement, effects: Sequence[ActiveEffect]) -> str:
-    """At what temperature a record is simulated, and on what that rests."""
+    """A sentence on the temperature at which a record is simulated, and on what that rests."""
     inferring = [active.id for active in effects if active.effect.infers == "temperature"]
     inferred, several = " and ".join(inferring), len(inferring) > 1
     if record.temperature_degc is not None:
@@ -95,7 +95,7 @@ def beyond_fitted(cell: Cell, temperatures_degc: Iterable[Array | float | None])
 def on_temperatures(
     cell: Cell, temperatures_degc: Iterable[Array | float | None], effects: Iterable[ActiveEffect] = ()
 ) -> tuple[str, ...]:
-    """All that is to be said of the temperatures that a cell is taken at: `without_energies` and `beyond_fitted`.
+    """Sentences on the temperatures that a cell is taken at: `without_energies` and `beyond_fitted`.
 
     temperatures_degc : of each record, None where it holds none and is taken as the cell's file declares, or as
     `effects` change that.

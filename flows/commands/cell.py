@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
 from aesi.errors import InputError
 from aesi.pipeline.written import calibration_files, discovery_files
 from flows.commands import options, outputs
-
-if TYPE_CHECKING:
-    from flows.jobs.run_request import RunRequest
 
 BESIDE_AN_EXPERIMENT = ("experiment", "out", "overrides", "prefect")
 """What `aesi discover` takes beside an experiment file, which says all else itself."""
@@ -200,9 +197,7 @@ def discover(
     experiment: Annotated[
         Path | None, typer.Argument(help="An experiment file instead of --cell and --data.")
     ] = None,
-    cell: Annotated[
-        Path | None, typer.Option("--cell", help="BPX file, or a model folder that `discover` wrote.")
-    ] = None,
+    cell: options.CellUnlessExperiment = None,
     data: Annotated[
         list[Path] | None, typer.Option("--data", help="Measurement; may be given again.")
     ] = None,
@@ -228,8 +223,8 @@ def discover(
             help="Last share of the data kept back, without --test: 0.3 where none is given.",
         ),
     ] = None,
-    max_effects: Annotated[int, typer.Option(min=0, max=10, help="Most effects that are added.")] = 3,
-    seed: Annotated[int, typer.Option(min=0, help="Of what is drawn at random.")] = 0,
+    max_effects: options.MaxEffects = 3,
+    seed: options.Seed = 0,
     effect_file: options.EffectFiles = None,
     hold: options.HoldOption = None,
     only: Annotated[
@@ -259,14 +254,7 @@ def discover(
         outputs.check_folder(out, given, discovery_files(out))
     if experiment is not None:
         options.check_unsaid(context, BESIDE_AN_EXPERIMENT)
-        options.say_reading([experiment])
-        from flows.jobs.run_request import RunRequest
-
-        request = RunRequest(str(experiment), tuple(overrides or ()))
-        _check_finding(request, out)
-        from flows.jobs.start import discover_experiment
-
-        discover_experiment(request, out, prefect)
+        _discover_experiment(experiment, list(overrides or []), out, prefect)
         return
     if cell is None or not data or out is None:
         raise InputError("give --cell, --data and --out, or an experiment file.")
@@ -299,14 +287,19 @@ def discover(
     flow(case, out, prefect)
 
 
-def _check_finding(request: RunRequest, out: Path | None) -> None:
-    """Raises InputError where the finding of an experiment would be written over a file that it names."""
+def _discover_experiment(experiment: Path, overrides: list[str], out: Path | None, prefect: bool) -> None:
+    """Raises InputError where the finding of the experiment would be written over a file that it names."""
+    options.say_reading([experiment])
     from aesi.pipeline.experiment.sources import named_files
     from flows.jobs.discovery import finding_folder
+    from flows.jobs.run_request import RunRequest
+    from flows.jobs.start import discover_experiment
 
+    request = RunRequest(str(experiment), tuple(overrides))
     place = out or finding_folder(request.config)
-    read = [Path(request.path), *named_files(request.config).values()]
+    read = [experiment, *named_files(request.config).values()]
     outputs.check_folder(place, read, discovery_files(place))
+    discover_experiment(request, out, prefect)
 
 
 def export(

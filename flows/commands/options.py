@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
 Value = TypeVar("Value")
 
-CellOption = Annotated[
-    Path, typer.Option("--cell", help="BPX file, or a model folder that `discover` wrote.")
-]
+_CELL = typer.Option("--cell", help="BPX file, or a model folder that `discover` wrote.")
+CellOption = Annotated[Path, _CELL]
+CellUnlessExperiment = Annotated[Path | None, _CELL]
 
 
 def share(option: str) -> Callable[[float | None], float | None]:
@@ -122,6 +122,10 @@ ModelOption = Annotated[
         "fitted with, else espm.",
     ),
 ]
+
+MaxEffects = Annotated[int, typer.Option("--max-effects", min=0, max=10, help="Most effects that are added.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Of what is drawn at random.")]
+StoreUri = Annotated[str | None, typer.Option("--uri", help="Tracking store; the workspace's without it.")]
 
 PrefectOption = Annotated[
     bool,

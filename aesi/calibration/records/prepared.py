@@ -25,8 +25,8 @@ SOC_SD = 0.005
 """Least standard deviation of an initial state of charge that was read from a voltage, since the potentials that it was
 read from are being fitted; one that the user gave keeps its own."""
 OTHER_CELL_SD = 0.01
-"""The same where the file is of another cell. The start file of the shipped ones, an LG M50, reads eight full charges
-of an LG 18650HG2 and a Panasonic NCR18650PF as 0.984 to 1.000, off by 0.010 in the root mean square; with 0.005 the
+"""The same where the file is of another cell. The start file of the shipped ones, an LG M50, reads eight full
+charges of an LG 18650HG2 and a Panasonic NCR18650PF as 0.984 to 1.000, off by 0.010 root mean square. With 0.005 the
 starts of the Panasonic's pulses at 10 and 0 degC, read as 0.976 and 0.977, end 3.9 deviations away, at 0.996."""
 
 

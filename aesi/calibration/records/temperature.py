@@ -10,7 +10,7 @@ from aesi.physics.simulation import ModelName
 from aesi.physics.start.temperature import contradicted_temperature
 
 OTHER_CELL = "the start file is of a cell with other kinetics, and what the fit moves is right"
-"""Where the temperature is right."""
+"""Another reason for the contradiction, where the temperature is right."""
 
 
 def against_temperature(

@@ -23,7 +23,7 @@ SOON_S = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Thinned:
-    """What a fit simulates.
+    """The rows that a fit simulates.
 
     data : the rows.  hold : how the current runs between them.
     trusted : (rows,) False where a step of the current lies within the row: instruments read current and voltage some

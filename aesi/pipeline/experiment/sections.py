@@ -78,7 +78,7 @@ class VirtualConfig(Section):
 
 
 READING_KEYS = ("columns", "units", "sign", "state_words", "duplicates")
-"""Of a data section: how its files are read."""
+"""Keys of a data section that say how its files are read."""
 
 
 class DataConfig(Section):

@@ -22,16 +22,19 @@ from aesi.records import Hold, Measurement, at_its_temperature, hold_sentence
 from aesi.tracer.case.thinned import ThinnedRecord, lost_v, thinned_record, thinned_together
 
 THINNED_SHARE = 0.5
-"""Of what thinning does to the declared model, what it may do to another one: with kinetics 1.4 times as fast 0.38 to
-0.48 of it are left on eight drives of blind cases at 10 Hz (seeds 13 and 18)."""
+"""Share of the voltage that thinning takes from the declared model that counts as noise, since it takes another
+amount from another model: with kinetics 1.4 times as fast 0.38 to 0.48 of it are left on eight drives of blind cases
+at 10 Hz (seeds 13 and 18)."""
 CONTINUATION_STEPS = 3.0
 """A file that starts within this many samples of another's end, on the same clock, continues it."""
 HOLD_OPTION = "--hold {0} (in an experiment discover.hold: {0})"
-"""What takes the current otherwise, by `hold_sentence`."""
+"""How a user declares another hold, for `hold_sentence`."""
 HALF_FULL = 0.5
-"""State of charge from which a smaller one is the safer to simulate: the middle, whatever the cell."""
+"""Above this state of charge a smaller one is safer to simulate, below it a larger one: the middle, whatever the
+cell."""
 SMALLEST_NOISE_V = 5e-5
-"""No cycler writes less: a virtual record without noise would count each microvolt."""
+"""Least noise that is assumed, V: no cycler writes less, and in a virtual record without noise each microvolt would
+count."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +76,8 @@ class PreparedRecord:
 
     @property
     def soc0_sd(self) -> float:
-        """What it is uncertain by, standard deviation: at least the difference between what was given and what its
-        voltage reads as; of two that disagree neither is known better than that."""
+        """Standard deviation of `soc0`. It is at least the difference between a state that was given and the one
+        that the voltage reads as: of two that disagree neither is known better than that."""
         return max(self.start.sd, self.start.doubt)
 
     @property

@@ -19,22 +19,22 @@ from aesi.tracer.case.records import PreparedRecord
 from aesi.tracer.likelihood.model_state import ModelState
 
 LEAVES_TIMES = 2.0
-"""What a model that was fitted leaves of a record, over what the declared one leaves at another temperature: one number
-then explains more than all that was moved. A convention: the zeros of a dead column leave 2.8 times that on a drive of
-the NMC cell, with nine parameters moved."""
+"""A fitted model explains less than a change of temperature where it leaves more than this many times what the
+declared model leaves at another temperature. A convention: with the zeros of a dead column it leaves 2.8 times that
+on a drive of the NMC cell, with nine parameters moved."""
 
 
 def other_temperatures(problem: InverseProblem) -> dict[int, OtherTemperature]:
-    """Number of a record -> the temperature by which the declared model follows what fits see of it, of those whose
-    column that contradicts."""
+    """Number of a record -> the temperature at which the declared model follows what fits see of it, for those
+    records that contradict their own column of temperature."""
     pairs = zip(problem.records, problem.seen, strict=True)
     found = {index: _other(problem, record, seen) for index, (record, seen) in enumerate(pairs)}
     return {index: other for index, other in found.items() if other is not None}
 
 
 def of_unseen(fitted: ModelState, records: Sequence[PreparedRecord]) -> dict[str, OtherTemperature]:
-    """Name of a record that no fit has seen -> the same, of those of which a fitted model, too, leaves more: it is
-    judged at a temperature that is not its own."""
+    """Name of a record that no fit has seen -> the same, for those records that a fitted model does not explain at
+    their own temperature: they are judged at one that is not theirs."""
     out = {}
     for record in records:
         other = _other(fitted.problem, record, record.thin)
@@ -61,9 +61,9 @@ def _left_v(problem: InverseProblem, record: PreparedRecord, seen: Measurement, 
 
 
 def left_by_fit(fitted: ModelState, others: Mapping[int, OtherTemperature]) -> dict[int, OtherTemperature]:
-    """Those of the records of which a fitted model, too, leaves more than the declared one does at another temperature,
-    or that it does not simulate to their end: what it leaves less of is explained at its own, as where the kinetics are
-    off."""
+    """Those of the records that a fitted model does not explain at their own temperature: it leaves more of them
+    than the declared model does at another one, or is not simulated to their end. What it leaves less of, as where
+    the kinetics are off, is explained."""
     records = fitted.problem.records
     return {
         index: other for index, other in others.items() if not _explains(fitted, records[index], index, other)
@@ -86,7 +86,8 @@ def _left_by_v(fitted: ModelState, record: PreparedRecord, index: int | None) ->
 
 def fitted_at_fault(written: ModelState, others: Mapping[int, OtherTemperature]) -> str | None:
     """Why a fitted model is not written: of a record that contradicts its temperature it leaves far more than the
-    declared one does at another. What it moved makes up for the temperature then. None where that holds of none."""
+    declared model does at another one, so what it moved only makes up for the temperature. None where there is no
+    such record."""
     if written.values is None:
         return None
     for index, other in others.items():

@@ -29,7 +29,8 @@ from aesi.tracer.likelihood.model_error import PRIORS, Size, SplitTable, off_wit
 from aesi.tracer.likelihood.size_sums import SizeSums
 
 GAIN_NATS = 0.05
-"""A descent stops when a step gains less than this, by an error as large as what is left (`beyond_expected`)."""
+"""A descent stops where a step gains less than this, in nats by an error as large as what is left
+(`beyond_expected`)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +175,7 @@ def scored(problem: InverseProblem, blocks: Blocks, point: Linearised) -> Predic
 
 
 def said_at(sums: SizeSums, point: Linearised, size: Size, log_prior: float = 0.0) -> Weighed:
-    """A linear form at one size of the model error.  sums : of its table."""
+    """A linear form, scored at one size of the model error.  sums : of its table."""
     return weighed(sums.table.blocks, sums.at(size), point.padded_x, point.padded_bounds, size, log_prior)
 
 
@@ -241,7 +242,8 @@ def _posterior(
     size: Size,
     folds: tuple[tuple[int, ...], ...] = (),
 ) -> Posterior:
-    """Of the parameters, and of what the file may be off by, where the model errs by as much as `size`."""
+    """Posterior of the parameters, and of what the file may be off by within seconds, at this size of the model
+    error."""
     white, log_det = whitened(problem, blocks, fit.point.table(), size)
     return Posterior(block_sums(blocks, white, log_det), fit.point.padded_x, folds)
 

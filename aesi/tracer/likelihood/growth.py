@@ -41,7 +41,7 @@ from aesi.tracer.likelihood.model_error import PRIORS, Size, SplitTable, off_wit
 from aesi.tracer.likelihood.size_sums import SizeSums
 
 ROUNDS = 6
-"""Slopes are taken so many times at most."""
+"""Most times that a descent takes slopes anew."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,13 +141,14 @@ class EffectGrowth:
 
     @cached_property
     def q(self) -> Array:
-        """Orthonormal basis of what the rest can take up, over its prior."""
+        """Orthonormal basis of the columns that the other parameters can take up, over their prior."""
         off = whitened(self.problem, self.parent.blocks, self.off_v, self.size)[0]
         known_columns = np.column_stack([self.parent.white(self.size)[0][:, self.rest], off])
         return np.linalg.qr(np.vstack([known_columns, np.eye(known_columns.shape[1])]))[0]
 
     def from_own_starts(self) -> EffectGrowth:
-        """The same descent from the starts of the effect, wherever another one ended; itself where it begins there."""
+        """The same growth, begun at the effect's own starts wherever another descent ended; itself where it begins
+        there."""
         return self if self.near is None else EffectGrowth(self.parent, self.effect, self.size)
 
     def error_v(self, u: Array) -> Array | None:
@@ -182,7 +183,7 @@ class EffectGrowth:
         return stacked - self.q @ (self.q.T @ stacked)
 
     def residual(self, u: Array) -> Array | None:
-        """What a descent minimises: (1) with the inner minimum taken, then the coordinates."""
+        """(1) as a descent minimises it: the residual with the inner minimum taken, then the coordinates."""
         e = self.error_v(u)
         if e is None:
             return None
@@ -190,7 +191,7 @@ class EffectGrowth:
         return np.concatenate([self.projected(e[:, None], tail)[:, 0], u])
 
     def slopes(self, u: Array, residual: Array) -> Array | None:
-        """Of the residual."""
+        """(rows, k) slopes of `residual` (rows,)."""
         e = self.error_v(u)
         jacobian = None if e is None else self.jacobian(u, e)
         if jacobian is None:
@@ -247,7 +248,7 @@ class EffectGrowth:
         return self.parent.fit.point.residual_v[:, None]
 
     def _most_promising(self) -> Array | None:
-        """Of the starts the one from which a step promises most; None where none can be simulated."""
+        """The start from which a step promises most; None where no start can be simulated."""
         if len(self.starts) == 1:
             return self.starts[0]
         promised = []
@@ -260,10 +261,10 @@ class EffectGrowth:
 
 
 def promise(parent: Parent, slopes_v: Array) -> float:
-    """What a parent with one effect more promises to say of unseen data, nats: to first order, without a simulation.
+    """Nats that a parent with one more effect promises to gain on unseen data, to first order, without a simulation.
 
     slopes_v : (n, k) V, those of the effect as they were on another parent.
-    The model error has the size that the parent needs or the one that a right hypothesis leaves, whichever says more.
+    The model error has the size that the parent needs or the one that a right hypothesis leaves, whichever gives more.
     """
     fit, prior = parent.fit, PRIORS[parent.problem.trust]
     own = SplitTable(parent.problem, parent.blocks, np.column_stack([fit.point.residual_v, slopes_v]))

@@ -87,7 +87,7 @@ class _Sums:
         return cls(gram, moment)
 
     def without(self, folds: Sequence[Sequence[int]]) -> _Sums:
-        """Of all data less each fold, and of all data last."""
+        """The sums over all blocks but those of each fold, and over all blocks last."""
         kept = np.ones((len(folds) + 1, len(self.gram)))
         for row, fold in zip(kept, folds, strict=False):
             row[list(fold)] = 0.0

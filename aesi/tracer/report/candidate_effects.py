@@ -16,7 +16,7 @@ from aesi.tracer.likelihood.model_error import whitened
 from aesi.tracer.search.path import Path
 
 SHARE = 0.9
-"""Of the posterior density of a parameter, that its interval covers."""
+"""Share of the posterior density of a parameter that its interval covers."""
 DIGITS = 6
 """After the point, of scores that are told apart. Round-off of a simulation, 4e-15 V, is carried on by fits: it moved
 scores of four discoveries by 1e-10 to 7e-8 nats, and those of what says nothing by 1e-14."""
@@ -107,7 +107,7 @@ def estimates(path: Path, one: Explanation, effect: str) -> dict[str, Estimate]:
 
 
 def _parent(path: Path, one: Explanation) -> FittedHypothesis:
-    """What a hypothesis grew from."""
+    """The hypothesis that another one grew from."""
     steps = (step for step in path.steps if any(grown is one for grown in step.grown))
     return next(fit for step in steps for fit in step.parents if fit.hypothesis == one.hypothesis[:-1])
 

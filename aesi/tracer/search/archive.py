@@ -71,7 +71,8 @@ class Archive:
 
 
 def fit_name(problem: InverseProblem, kind: str, hypothesis: Sequence[str]) -> str:
-    """Of a fit in the archive: its kind, what is believed of the own parameters and records, its effects in order."""
+    """Name of a fit in the archive: its kind, what is believed of the own parameters and records, its effects in
+    order."""
     ages = ", several ages" if problem.several_ages else ""
     energies = "" if problem.energies else ", energies as declared"
     return f"{kind} {problem.trust}{ages}{energies}: {'+'.join(hypothesis)}"
@@ -95,8 +96,8 @@ def context_of(problem: InverseProblem) -> str:
 
 
 def identity(effect: Effect) -> str:
-    """What an effect is: id, parameters with bounds and spreads, and the code of the file that defines it, with the
-    values that its functions are bound to."""
+    """All that makes an effect what it is: id, parameters with bounds and spreads, and the code of the file that
+    defines it, with the values that its functions are bound to."""
     places = (effect.on_model, effect.on_record, effect.on_voltage, effect.on_reading)
     return f"{effect.id} {_parameters(effect.parameters)} {[_told(place) for place in places]}"
 

@@ -10,6 +10,7 @@ import pytest
 from small_experiment import SOC0, experiment, fitted, write_record
 
 import aesi
+from aesi.data.resample import to_even
 from aesi.errors import DataError, InputError, SimulationError
 from aesi.physics.effects import CATALOGUE, activated
 from aesi.physics.folded import folded
@@ -87,9 +88,15 @@ def test_both_regimes_beat_the_physics_and_carry_bands(model, data):
 
 def test_another_sampling_is_brought_to_the_models_own_and_back(model, data):
     rows = np.r_[0:1000:2, 1000 : len(data) : 5]
-    prediction = model.predict(data.time_s[rows], data.current_a[rows], SOC0)
-    assert len(prediction.voltage_v) == len(rows)
-    assert np.isfinite(prediction.voltage_v).all()
+    time_s, current_a = data.time_s[rows], data.current_a[rows]
+    prediction = model.predict(time_s, current_a, SOC0)
+    own = aesi.simulate(model.cell, time_s, current_a, SOC0, model.effects, hold=model.hold)
+    np.testing.assert_allclose(prediction.physics_v, own.voltage_v, atol=1e-12)
+    even = to_even(aesi.Measurement(time_s, current_a, data.voltage_v[rows]), model.dt_s, model.hold)
+    stepped = model.predict(even.time_s, even.current_a, SOC0)
+    correction = np.interp(time_s, even.time_s, stepped.voltage_v - stepped.physics_v)
+    assert np.abs(correction).max() > 1e-3
+    np.testing.assert_allclose(prediction.voltage_v - prediction.physics_v, correction, atol=1e-12)
 
 
 def test_the_band_of_physics_alone_counted_rows_of_any_length_as_steps(model, record):
