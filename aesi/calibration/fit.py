@@ -34,12 +34,12 @@ from aesi.calibration.result import (
 )
 from aesi.calibration.rewind import capacities, rewound
 from aesi.calibration.shapes import Shapes
-from aesi.calibration.start import one_branch, size_assumed, sized, with_activation
+from aesi.calibration.start import one_branch, size_assumed, sized, tell_the_size, with_activation
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError, FitError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
-from aesi.physics.belongs import check_voltage
+from aesi.physics.belongs import check_voltage, unlike
 from aesi.physics.cell import Cell
 from aesi.physics.cell.energies import SPAN_K
 from aesi.physics.cell.health import day_of
@@ -163,6 +163,8 @@ def problem(
         start, [data for data, _ in kept], conditions.temperatures_degc
     )
     start, of_activation = with_activation(start)
+    telling = () if conditions.same_cell else tell_the_size(cell, records)
+    of_potentials = filter(None, (unlike(start, records[i]) for i in telling))
     cut = [r.name for r, whole in zip(placed, records, strict=True) if r.time_s[0] > whole.time_s[0]]
     model_name = conditions.model or "espm"
     ready = prepared(start, placed, conditions.soc0, model_name, conditions.same_cell, cut)
@@ -185,6 +187,7 @@ def problem(
     )
     return model, (
         *of_size,
+        *of_potentials,
         *zero.sentences,
         *(sentence for _, of_branch in kept for sentence in of_branch),
         *of_temperature,

@@ -17,7 +17,7 @@ from aesi.calibration.posterior import PosteriorSamples, check_posterior, sample
 from aesi.calibration.records.prepared import with_temperatures
 from aesi.calibration.records.spectra import BAND_HZ, check_spectra
 from aesi.calibration.rewind import start_soc
-from aesi.calibration.start import sized
+from aesi.calibration.start import sized, tell_the_size
 from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError
 from aesi.numerics.files.whole import write_whole
@@ -181,7 +181,8 @@ def scaled_to(
     its temperature.
     """
     start = sized(declared, measurements)[0]
-    check_measured(start, with_temperatures(start, measurements, temperatures_degc or {})[0])
+    placed = with_temperatures(start, measurements, temperatures_degc or {})[0]
+    check_measured(start, placed, tell_the_size(declared, measurements))
     return start
 
 
