@@ -362,6 +362,14 @@ def test_a_pulse_that_touched_the_lower_limit_half_way_was_taken_for_a_full_disc
     assert sized(start, [whole])[0].capacity_ah == pytest.approx(whole.discharged_ah("backward")[-1])
 
 
+def test_a_long_fit_said_nothing_until_its_end(start, records):
+    told = []
+    calibrate(start, records[:1], evaluations=3, progress=lambda steps, left: told.append((steps, left)))
+    assert [steps for steps, _ in told] == list(range(len(told)))
+    assert told[0][1] == 1.0
+    assert told[-1][1] < told[0][1]
+
+
 def cycled(cell, before_ah):
     """A charge of `before_ah` from empty to full, a rest at full, and a discharge of the cell's nominal capacity."""
     full_ah, rate = cell.nominal_capacity_ah, 0.2 * cell.nominal_capacity_ah
