@@ -49,7 +49,7 @@ class Context:
 
     def at(self, quantity: str, row: int) -> str:
         """'drive.csv, row 5 (line 6), column voltage_v'."""
-        name = self.header[quantity]
+        name = self.header.get(quantity, quantity)  # a temperature that was stated has no column
         column = quantity if name == quantity else f"{quantity} ({name!r})"
         return f"{self.file}, {self.where(row)}, column {column}"
 

@@ -399,6 +399,24 @@ def test_temperature_can_be_left_out(tmp_path):
     assert read_measurement(path, {"temperature_degc": None}).temperature_degc is None
 
 
+@pytest.mark.parametrize("stated", ["40", "-10.5", "0"])
+def test_a_temperature_that_is_known_needed_a_column(tmp_path, stated):
+    path = tmp_path / "drive.csv"
+    path.write_text(text())
+    record = read_measurement(path, {"temperature_degc": stated})
+    np.testing.assert_array_equal(record.temperature_degc, np.full(N, float(stated)))
+    assert [note for note in record.notes if "temperature" in note] == [
+        f"drive.csv: temperature_degc is {stated} in every row, as stated."
+    ]
+
+
+def test_a_stated_temperature_that_no_cell_has_is_refused(tmp_path):
+    path = tmp_path / "drive.csv"
+    path.write_text(text())
+    with pytest.raises(DataError, match="column temperature_degc"):
+        read_measurement(path, {"temperature_degc": "298.15"})
+
+
 def test_decimation_keeps_the_charge_and_is_said(tmp_path):
     measurement = read_measurement(written(tmp_path, text()), max_rows=50)
     assert len(measurement) <= 50
