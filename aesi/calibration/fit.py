@@ -59,7 +59,7 @@ NOTED_SILICON = 0.05
 """The same of silicon, a sixth of what such a cell gives."""
 NOTED_DEVIATIONS = 2.0
 """Of a prior that was given: where a fit ends further from it, its records contradict it. A convention."""
-Progress = Callable[[int, float], None]
+OnStep = Callable[[int, float], None]
 """Told at each step of a fit: their number so far, and the share of the misfit of the start that is left."""
 OF_ROWS_LEFT_OUT = (
     "the state of charge that was given is that of its first row, which is not fitted; it starts where its "
@@ -73,7 +73,7 @@ def calibrate(
     conditions: Conditions | None = None,
     *,
     evaluations: int = EVALUATIONS,
-    progress: Progress | None = None,
+    on_step: OnStep | None = None,
 ) -> Calibration:
     """Fit the parameters of a cell's file to records by maximum a posteriori: capacities, stoichiometry windows,
     potentials, diffusion, kinetics, electrolyte and contacts, with temperature. Gives the new cell, values with 95 %
@@ -87,7 +87,7 @@ def calibrate(
     began = time.perf_counter()
     conditions = conditions or Conditions()
     model, notes = problem(cell, records, conditions)
-    x, found, of_heat = _fitted_twice(_Told(model, progress), evaluations)
+    x, found, of_heat = _fitted_twice(_Told(model, on_step), evaluations)
     states = model.states(cell, x)
     scaled = model.jacobian(x) * information_weights(model, x)[:, None]
     covariance: Array = np.asarray(np.linalg.inv(scaled.T @ scaled), dtype=float)
@@ -113,10 +113,10 @@ def calibrate(
 
 
 class _Told:
-    """A model whose descents pass on where they stand.  progress : or nobody is told."""
+    """A model whose descents pass on where they stand.  on_step : or nobody is told."""
 
-    def __init__(self, model: Model, progress: Progress | None) -> None:
-        self.model, self._progress = model, progress
+    def __init__(self, model: Model, on_step: OnStep | None) -> None:
+        self.model, self._on_step = model, on_step
         self._steps, self._first, self._last = 0, 0.0, 0.0
 
     def residual(self, x: Array) -> Array:
@@ -128,8 +128,8 @@ class _Told:
     def jacobian(self, x: Array) -> Array:
         """The model's, which a descent asks for once a step, where it has taken it."""
         self._first = self._first or self._last
-        if self._progress is not None:
-            self._progress(self._steps, self._last / self._first if self._first else 1.0)
+        if self._on_step is not None:
+            self._on_step(self._steps, self._last / self._first if self._first else 1.0)
         self._steps += 1
         return self.model.jacobian(x)
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from aesi.calibration import Calibration, Conditions, calibrate
-from aesi.calibration.fit import Progress
+from aesi.calibration.fit import OnStep
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.parameters import check_names
 from aesi.calibration.posterior import PosteriorSamples, check_posterior, sampled
@@ -74,11 +74,11 @@ def calibrate_files(
     measurements: Sequence[Measurement],
     out: Path,
     request: Request | None = None,
-    progress: Progress | None = None,
+    on_step: OnStep | None = None,
 ) -> dict[str, Any]:
     """Calibrate the cell of a BPX file; writes `out` (BPX) and the report beside it, and returns the report.
 
-    progress : told at each step of the fit.
+    on_step : told at each step of the fit.
 
     Raises CellError or DataError, one sentence, for what cannot be used.
     """
@@ -91,7 +91,7 @@ def calibrate_files(
     declared, model = given.cell, conditions.model or given.model
     start = scaled_to(declared, measurements, conditions.temperatures_degc)
     check_spectra(start, (*conditions.spectra, *asked.impedance))
-    found = calibrate(declared, measurements, replace(conditions, model=model), progress=progress)
+    found = calibrate(declared, measurements, replace(conditions, model=model), on_step=on_step)
     name = declared.name if asked.title is None else asked.title
     found = replace(found, cell=replace(found.cell, name=name, description=_made_from(found)))
     posterior = sampled(found, asked.posterior, asked.seed) if asked.posterior else None

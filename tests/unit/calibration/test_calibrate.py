@@ -364,7 +364,7 @@ def test_a_pulse_that_touched_the_lower_limit_half_way_was_taken_for_a_full_disc
 
 def test_a_long_fit_said_nothing_until_its_end(start, records):
     told = []
-    calibrate(start, records[:1], evaluations=3, progress=lambda steps, left: told.append((steps, left)))
+    calibrate(start, records[:1], evaluations=3, on_step=lambda steps, left: told.append((steps, left)))
     assert [steps for steps, _ in told] == list(range(len(told)))
     assert told[0][1] == 1.0
     assert told[-1][1] < told[0][1]
