@@ -194,7 +194,7 @@ def _on_grid(
         start = initial_state(
             cell, measurement, declared, data.hold, given.effects, shared=shared, model=given.model
         )
-        held = hold_sentence(measurement.name, data.hold, "hold" in data.model_fields_set, "data.hold: {}")
+        held = hold_sentence(measurement.name, data.hold, data.declared_hold is not None, "data.hold: {}")
         even = to_even(measurement, data.dt_s, data.hold)
         notes += [
             with_keys(start.sentence),

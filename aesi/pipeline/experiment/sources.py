@@ -134,11 +134,12 @@ def discovery_records(
         experiment = virtual_experiment(config, cell)
         return experiment.train, experiment.test, ()
     placed = _placed(_locator(config), (*wanted.fit, *wanted.test, *wanted.good))
+    hold = wanted.hold or config.data.declared_hold
 
     def until(names: Sequence[str], stop_s: Mapping[str, float | None]) -> tuple[Measurement, ...]:
         reading = config.data.reading
         return tuple(
-            _record(placed[name][0], reading.but(stop_s=stop_s.get(name)), placed[name][1]).held(wanted.hold)
+            _record(placed[name][0], reading.but(stop_s=stop_s.get(name)), placed[name][1]).held(hold)
             for name in names
         )
 
