@@ -327,8 +327,8 @@ def _cause(ratio: float, record: Measurement) -> str:
         )
     if ratio < 1.0 / 15.0:
         return (
-            "the time is in minutes or hours (give s, or declare it: --unit time_s=min or h), or the cell file is "
-            "another's"
+            "the time is in minutes or hours (give s, or declare it: --unit time_s=min or h), the current is a C-rate "
+            "(give A), or the cell file is another's"
         )
     if ratio > 15.0:
         return (

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from aesi.errors import InputError
 from aesi.pipeline.written import calibration_files, discovery_files
 from flows.commands import options, outputs
+
+if TYPE_CHECKING:
+    from flows.jobs.run_request import RunRequest
 
 BESIDE_AN_EXPERIMENT = ("experiment", "out", "overrides", "prefect")
 """What `aesi discover` takes beside an experiment file, which says all else itself."""
@@ -257,10 +260,13 @@ def discover(
     if experiment is not None:
         options.check_unsaid(context, BESIDE_AN_EXPERIMENT)
         options.say_reading([experiment])
-        _check_experiment(experiment, list(overrides or []), out)
+        from flows.jobs.run_request import RunRequest
+
+        request = RunRequest(str(experiment), tuple(overrides or ()))
+        _check_finding(request, out)
         from flows.jobs.start import discover_experiment
 
-        discover_experiment(str(experiment), list(overrides or []), out, prefect)
+        discover_experiment(request, out, prefect)
         return
     if cell is None or not data or out is None:
         raise InputError("give --cell, --data and --out, or an experiment file.")
@@ -293,15 +299,14 @@ def discover(
     flow(case, out, prefect)
 
 
-def _check_experiment(experiment: Path, overrides: list[str], out: Path | None) -> None:
+def _check_finding(request: RunRequest, out: Path | None) -> None:
     """Raises InputError where the finding of an experiment would be written over a file that it names."""
-    from aesi.pipeline.experiment.config import read_experiment
     from aesi.pipeline.experiment.sources import named_files
     from flows.jobs.discovery import finding_folder
 
-    config = read_experiment(experiment, overrides)
-    place = out or finding_folder(config)
-    outputs.check_folder(place, [experiment, *named_files(config).values()], discovery_files(place))
+    place = out or finding_folder(request.config)
+    read = [Path(request.path), *named_files(request.config).values()]
+    outputs.check_folder(place, read, discovery_files(place))
 
 
 def export(

@@ -249,7 +249,10 @@ def measurements(
     out = []
     for path, name in zip(paths, record_names(paths), strict=True):
         end = (until or {}).get(name)
-        out.append(read(path, reading if end is None else reading.but(stop_s=end), name=name).held(hold))
+        told = reading if end is None else reading.but(stop_s=end)
+        out.append(
+            read(path, told, None, name).held(hold)
+        )  # with all rows, as in Python: a fit thins them itself
     return tuple(out)
 
 

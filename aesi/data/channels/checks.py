@@ -56,6 +56,15 @@ class Context:
 
 Columns = dict[str, Array]
 
+OF_MEDIAN = 1.4826
+"""Deviations in the median size of what is normally distributed."""
+
+
+def scatter_v(voltage_v: Array) -> float:
+    """V, one deviation of what single rows of a voltage (n,) scatter by: of a smooth one, second differences are noise
+    alone, and of one that moves they are more."""
+    return float(np.median(np.abs(np.diff(voltage_v, 2)))) * OF_MEDIAN / np.sqrt(6.0)
+
 
 def check_finite(columns: Columns, context: Context) -> None:
     """No empty cell, NaN or infinity in any column in use; the first row at fault is named."""
@@ -124,6 +133,8 @@ def _disorder(time_s: Array, step: Array) -> str:
             "; it is a clock that was put back, or that starts anew at midnight: give the time since the start of the "
             "test, or split the file there."
         )
+    if len(first) == 1 and step[-1] < 0:
+        return "; it is the last row alone, as a line of sums or means below a table is: remove it."
     if len(first) == 1:
         again = ", and starts again there, as that of a second test does"
         return (

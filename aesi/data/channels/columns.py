@@ -40,7 +40,7 @@ BDF = {
 }
 STRANGE_UNITS = {
     "time_s": ("weeks",),
-    "current_a": ("c",),
+    "current_a": ("c", "c-rate", "1/h", "w", "mw", "kw", "ah", "mah", "wh"),
     "voltage_v": ("kv",),
     "temperature_degc": (),
 }
@@ -331,6 +331,11 @@ class _Finder:
             raise DataError(
                 f"{self._file}: column {name!r} is in {said} by its name, and {quantity} is needed in "
                 f"{units.SI[quantity]}; declare it: --unit {quantity}={said}."
+            )
+        if said is None and quantity == "current_a" and headers.is_rate_or_power(name):
+            raise DataError(
+                f"{self._file}: column {name!r} is a C-rate or a power by its name, and current_a is needed in A; "
+                "convert the column, or, if it is a current in A, declare it: --unit current_a=A."
             )
         if headers.unit_in(name).lower() in STRANGE_UNITS[quantity]:
             raise DataError(
