@@ -50,7 +50,8 @@ def read_measurement(
     """Read one continuous test: CSV (also gzip), Excel, Parquet, BDF, or a cycler's export or own file.
 
     columns : quantity -> the file's name for it, for those not named time_s, current_a, voltage_v,
-        temperature_degc (optional), as in BDF or as in a known cycler's export; None leaves the temperature out.
+        temperature_degc (optional), as in BDF or as in a known cycler's export; None leaves the temperature out,
+        and a number states it, degC in every row.
     sign : which direction of the file's current is positive; None: as the known export has it, else discharge.
         BDF's is charge positive.
     max_rows : more rows than this are decimated (interval averages); None keeps all.

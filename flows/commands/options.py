@@ -138,8 +138,8 @@ READING: dict[str, Any] = {
         _LIST,
         typer.Option(
             "--column",
-            help='quantity=name, for other headers: current_a="I[A]"; also cycle=, step=; '
-            "temperature_degc= leaves it out.",
+            help='quantity=name, for other headers: current_a="I[A]", or its number, #2, where there are none; also '
+            "cycle=, step=; temperature_degc=40 states it for every row, temperature_degc= leaves it out.",
         ),
     ],
     "unit": Annotated[
