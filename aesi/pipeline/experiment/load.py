@@ -32,7 +32,7 @@ from aesi.pipeline.experiment.sources import (
     sources_of,
     with_keys,
 )
-from aesi.pipeline.notes import of_day, on_temperatures, temperature_sentence
+from aesi.pipeline.notes import of_contradiction, of_day, on_temperatures, temperature_sentence
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import ErrorSeries, Hold, LeftOutDrives, Role, Split, hold_sentence
@@ -237,6 +237,7 @@ def _on_grid(
             with_keys(start.sentence),
             held,
             temperature_sentence(cell, measurement, given.effects),
+            *map(with_keys, of_contradiction(given, even, start.soc, data.hold)),
             *map(with_keys, even.notes),
         ]
         records[name] = no_rows(even, start.soc, start.read_sd)

@@ -195,7 +195,9 @@ def _record(path: Path, reading: Reading, called: str | None = None) -> Measurem
     called : None calls it as its file is.
     """
     try:
-        return read(path, reading, name=called)
+        return read(
+            path, reading, None, called
+        )  # with all rows, whose averages are taken once, on the step asked for
     except DataError as error:
         raise DataError(with_keys(str(error))) from None
 
