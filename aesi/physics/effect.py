@@ -221,6 +221,11 @@ class ActiveEffect:
         return out
 
 
+def instruments_first(effects: Iterable[ActiveEffect]) -> tuple[ActiveEffect, ...]:
+    """What was recorded has to be set right before the cell can answer to it."""
+    return tuple(sorted(effects, key=lambda e: e.effect.kind != "instrument"))
+
+
 def as_cell_saw(record: Record, effects: Iterable[ActiveEffect]) -> Record:
     """What the cell really saw where `record` was written, by the effects in their order."""
     for active in effects:

@@ -25,7 +25,7 @@ from aesi.physics import depletion
 from aesi.physics.arguments import check_cell, check_choice, check_soc, check_temperature, checked_effects
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
-from aesi.physics.effect import ActiveEffect, Record, Trace, as_cell_saw, check_states
+from aesi.physics.effect import ActiveEffect, Record, Trace, as_cell_saw, check_states, instruments_first
 from aesi.physics.espm.plain import run_plain
 from aesi.physics.model import EspmModel
 from aesi.physics.rest.open_circuit import OpenCircuit
@@ -93,7 +93,7 @@ def simulate(
     if on_depletion == "raise":  # a search may pass by states that no cell has
         check_soc(soc0)
     time, current = _checked_record(time_s, current_a)
-    active = _instruments_first(checked_effects(effects))
+    active = instruments_first(checked_effects(effects))
     across: dict[str, Array] | None = {} if profiles else None
     solve = solver(model, across)
     changed = model_with(cell, active)
@@ -140,11 +140,6 @@ def _changed(model: EspmModel, active: ActiveEffect) -> EspmModel:
     """One effect's change; the records of a case share all but the last of them."""
     assert active.effect.on_model is not None
     return active.act(active.effect.on_model, model)
-
-
-def _instruments_first(effects: Iterable[ActiveEffect]) -> tuple[ActiveEffect, ...]:
-    """What was recorded has to be set right before the cell can answer to it."""
-    return tuple(sorted(effects, key=lambda e: e.effect.kind != "instrument"))
 
 
 Solver = Callable[[EspmModel, Array, Array, Array | None, float, Hold], Solution]
