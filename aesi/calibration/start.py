@@ -137,9 +137,9 @@ def _full_discharge_ah(cell: Cell, data: Measurement) -> float | None:
     end = int(np.argmin(data.voltage_v))
     if data.voltage_v[end] > cell.lower_voltage_v + 2 * FULL_WINDOW_V:
         return None
-    taken_ah = data.discharged_ah("backward")
+    hold = data.hold or "backward"  # undeclared, rows are a logger's, or so close that either will do
+    taken_ah = data.discharged_ah(hold)
     if taken_ah[end] < ALL_OF_IT * taken_ah.max():
         return None
     # One sum, not the last of running ones: where a descent ends moves by millivolts with the last digit of this.
-    steps = data.current_a[1 : end + 1] * np.diff(data.time_s[: end + 1])
-    return float(steps.sum()) / SECONDS_PER_HOUR
+    return float(data.steps_as(hold)[:end].sum()) / SECONDS_PER_HOUR
