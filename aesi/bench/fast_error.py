@@ -14,7 +14,7 @@ prints a line a record, and a last one with means over the records.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -37,7 +37,8 @@ from aesi.tracer.search.grown import ended, growths_on
 
 RIGHT_TEMPERATURE = ("25degC", "drive_cycle")
 CONSTANT = ("cap_1c",)
-"""In the names of records: at the temperature that their file is of, and at a current that never changes."""
+"""Parts of the names of records that are left out, since their current never changes; RIGHT_TEMPERATURE, of those
+that are at the temperature that their file is of."""
 THERE = "clock_skew"
 """The voltage channel of one cycler does lag, by 0.12 s on three records: no chance."""
 
@@ -88,8 +89,13 @@ def main() -> None:
     for case in records():
         rows.append(fast_error(case))
         print(json.dumps(rows[-1]), flush=True)
-    ran = [row for row in rows if "sds" in row]
-    summary = {
+    print(json.dumps(_summary([row for row in rows if "sds" in row])))
+
+
+def _summary(ran: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Means over the records that could be fitted."""
+    return {
+        "summary": True,
         "records": len(ran),
         "rms_mv": round(float(np.exp(np.mean([np.log(row["rms_mv"]) for row in ran]))), 2),
         "lasts_s": round(float(np.exp(np.mean([np.log(row["lasts_s"]) for row in ran]))), 1),
@@ -103,7 +109,6 @@ def main() -> None:
             rms([sds for row in ran for name, sds in row["sds"].items() if name != THERE]), 2
         ),
     }
-    print(json.dumps({"summary": True, **summary}))
 
 
 if __name__ == "__main__":

@@ -32,21 +32,25 @@ from aesi.numerics.typing import Array, BoolArray
 from aesi.physics.cell.health import day_of
 
 SLOW_SD, LOADED_SD = 0.03, 0.002
-"""Of the logarithm of the capacity of a record's cell over the file's, without dates. Slow records are there for the
-potentials, and a cell ages between its tests: a convention, of the size of what is found, 3 % of the LG 18650HG2 within
-a week. Records with a load are what a file is simulated for, in the one state that it has. Theirs is what a charge is
-measured to, by the zero of a cycler that whole cycles tell to 0.2 %: more is believed where a record says it loudly.
-With 3 % for all, a calibrated LG 18650HG2 as it is misses its fitted 1C discharge and drive by 119 and 4.9 mV, and the
-1C discharge of two days later, fitted to nothing, by 10.3; with these by 17.6, 8.7 and 14.1."""
+"""Standard deviations, for records without dates, of the logarithm of the capacity of a record's cell over the file's.
+Slow records are there for the potentials, and a cell ages between its tests: a convention, of the size that is found, 3
+% of the LG 18650HG2 within a week. Records with a load are what a file is simulated for, in the one state that it has.
+Their deviation is the accuracy to which charge is measured, by the zero of a cycler that whole cycles tell to 0.2 %; a
+record that says more loudly is believed further.
+With 3 % for all, a calibrated LG 18650HG2, as it is simulated, misses its fitted 1C discharge and drive by 119 and 4.9
+mV, and the 1C discharge of two days later, fitted to nothing, by 10.3; with these by 17.6, 8.7 and 14.1."""
 MOST_AGE = 0.3
-"""Of the same: no record without a date is further from the file. A convention that nothing ends on. Descents scale
-their steps by bounds: with and without it they end elsewhere along what data at one temperature leave open."""
+"""Largest size of the same logarithm for a record without a date. A convention that no fit ends on; but descents
+scale their steps by bounds, so that with and without it they end in different places along what data at one
+temperature leave open."""
 LOSS_SD = 0.0075
-"""Of (1), a day's: 4 % in a month, 7 % in three. The eight steps between the fitted records of an LG 18650HG2 and a
-Panasonic NCR18650PF, 1 to 42 days apart, are of 0 to 1.5 % times the root of their days, 0.8 % root mean square (fitted
-with 0.5 %). With steps of either sign the HG2 had gained 5 % in a 1C discharge at -8 degC, six weeks after its drives:
-age took what the cold does, and as the file is simulated the discharge was missed by 264 mV, with losses by 9.3; by a
-fit without it, whose two C/20 at other temperatures then bend the energies less, by 92 mV instead of 1.6 V."""
+"""s of (1) for one day: 4 % in a month, 7 % in three. The eight losses between the fitted records of an LG 18650HG2 and
+a Panasonic NCR18650PF, 1 to 42 days apart, are 0 to 1.5 % times the root of their days, 0.8 % root mean square (fitted
+with 0.5 %).
+With steps of either sign the HG2 had gained 5 % in a 1C discharge at -8 degC, six weeks after its drives: the age took
+up what the cold does. As the file is simulated, it missed the discharge by 264 mV, and by 9.3 with losses alone. A fit
+without that discharge, whose two C/20 at other temperatures then bend the energies less, misses it by 92 mV instead of
+1.6 V."""
 MOST_DEVIATIONS = 4.0
 """The working coordinate of a loss lies within this many deviations."""
 
@@ -80,15 +84,7 @@ class Ageing:
         if as_of is not None and not dates:
             raise DataError(f"as of {as_of}: no record has a date; give theirs (--date FILE=YYYY-MM-DD).")
         days = [day_of(dates[r.name]) if r.name in dates else None for r in records]
-        as_of = None if as_of is None else day_of(as_of)
-        told = [d for d in days if d is not None]
-        if as_of is not None and not min(told) <= as_of <= max(told):
-            raise DataError(
-                f"as of {as_of}: the dated records are of {min(told)} to {max(told)}, and nothing shows what the "
-                "cell was on another day; give a day from the first to the last of them."
-            )
-        loaded = [d for r, d in zip(records, days, strict=True) if d is not None and not r.slow]
-        day = as_of or max(loaded or told, default=None)
+        day = _file_day(records, days, None if as_of is None else day_of(as_of))
         since = np.array([0 if d is None or day is None else (d - day).days for d in days])
         losses = np.array([d is not None for d in days], dtype=bool)
         chain, loss_sd = _chain_and_sd(since, losses)
@@ -97,7 +93,7 @@ class Ageing:
 
     @property
     def dated(self) -> bool:
-        """Are there records of a course?"""
+        """Whether any record has a date."""
         return self.day is not None
 
     @property
@@ -111,21 +107,36 @@ class Ageing:
         return np.where(self.losses, -np.inf, 0.0)
 
     def share(self, index: int, z: Array) -> float:
-        """Of its active material that the cell of a record has, at working coordinates z (records,)."""
+        """Share of its active material that the cell of a record has, at working coordinates z (records,)."""
         return float(np.exp(self.chain[index] @ (self.sd * np.where(self.losses, _size(z), z))))
 
     def slopes(self, index: int, z: Array) -> Array:
-        """(records,) of the logarithm of a record's share."""
+        """(records,) slopes of the logarithm of a record's share over the working coordinates z."""
         # of |e| = P^-1((1 + P(z))/2), by the densities on both sides
         bend = 0.5 * np.exp(0.5 * (_size(z) ** 2 - z**2))
         return self.chain[index] * self.sd * np.where(self.losses, bend, 1.0)
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """On the file's state, for a reader."""
+        """Sentences on the file's state."""
         if self.day is None:
             return ()
         return (f"the file is in the state of {self.day}.",)
+
+
+def _file_day(records: Sequence[Prepared], days: Sequence[date | None], as_of: date | None) -> date | None:
+    """Day of the file's state: the one asked for, else the last with a load, else the last; None without any date.
+
+    Raises DataError for one asked for that is not between the first and the last.
+    """
+    told = [d for d in days if d is not None]
+    if as_of is not None and not min(told) <= as_of <= max(told):
+        raise DataError(
+            f"as of {as_of}: the dated records are of {min(told)} to {max(told)}, and nothing shows what the cell was "
+            "on another day; give a day from the first to the last of them."
+        )
+    loaded = [d for r, d in zip(records, days, strict=True) if d is not None and not r.slow]
+    return as_of or max(loaded or told, default=None)
 
 
 def _chain_and_sd(since: Array, dated: BoolArray) -> tuple[Array, Array]:

@@ -7,7 +7,7 @@ on from there with that heat.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from datetime import date
 
@@ -34,12 +34,12 @@ from aesi.calibration.result import (
 )
 from aesi.calibration.rewind import capacities, rewound
 from aesi.calibration.shapes import Shapes
-from aesi.calibration.start import one_branch, size_assumed, sized, with_activation
+from aesi.calibration.start import one_branch, size_assumed, sized, tell_the_size, with_activation
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError, FitError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
-from aesi.physics.belongs import check_voltage
+from aesi.physics.belongs import check_voltage, unlike
 from aesi.physics.cell import Cell
 from aesi.physics.cell.energies import SPAN_K
 from aesi.physics.cell.health import day_of
@@ -47,18 +47,22 @@ from aesi.physics.depletion import ran_out
 from aesi.records import Measurement, Spectrum, measured_on_case
 
 EVALUATIONS = 100
-"""At most: the descents to the shipped files of the Panasonic NCR18650PF and of the LG 18650HG2 end before."""
+"""Most evaluations of a descent: those to the shipped files of the Panasonic NCR18650PF and of the LG 18650HG2 end
+before."""
 GAIN = 1e-5
-"""Of the cost: a step that gains less than this share of it is the last. With ten times as much the first descent to an
-LG 18650HG2 ends a deviation of the priors away, at 344.7 instead of 340.1."""
+"""Least gain of a step, as a share of the cost, before a descent ends. With ten times as much the first descent to
+an LG 18650HG2 ends a deviation of the priors away, at a cost of 344.7 instead of 340.1."""
 NOTED_ZERO = 0.02
-"""Of a record's typical current."""
+"""Share of a record's typical current above which a cycler's zero is noted."""
 NOTED_AGE = 0.01
-"""Of the active material: what a record's differs by and is told."""
+"""Share of its active material by which a record's cell has to differ from the file's to be noted."""
 NOTED_SILICON = 0.05
-"""The same of silicon, a sixth of what such a cell gives."""
+"""The same for the silicon, which gives a sixth of such a cell's charge."""
 NOTED_DEVIATIONS = 2.0
-"""Of a prior that was given: where a fit ends further from it, its records contradict it. A convention."""
+"""A fit that ends more than this many standard deviations from a prior that the user gave contradicts it. A
+convention."""
+OnStep = Callable[[int, float], None]
+"""Told at each step of a fit: their number so far, and the share of the misfit of the start that is left."""
 OF_ROWS_LEFT_OUT = (
     "the state of charge that was given is that of its first row, which is not fitted; it starts where its "
     "voltage says."
@@ -71,6 +75,7 @@ def calibrate(
     conditions: Conditions | None = None,
     *,
     evaluations: int = EVALUATIONS,
+    on_step: OnStep | None = None,
 ) -> Calibration:
     """Fit the parameters of a cell's file to records by maximum a posteriori: capacities, stoichiometry windows,
     potentials, diffusion, kinetics, electrolyte and contacts, with temperature. Gives the new cell, values with 95 %
@@ -84,7 +89,7 @@ def calibrate(
     began = time.perf_counter()
     conditions = conditions or Conditions()
     model, notes = problem(cell, records, conditions)
-    x, found, of_heat = _fitted_twice(model, evaluations)
+    x, found, of_heat = _fitted_twice(_Told(model, on_step), evaluations)
     states = model.states(cell, x)
     scaled = model.jacobian(x) * information_weights(model, x)[:, None]
     covariance: Array = np.asarray(np.linalg.inv(scaled.T @ scaled), dtype=float)
@@ -109,16 +114,39 @@ def calibrate(
     )
 
 
-def _fitted_twice(model: Model, evaluations: int) -> tuple[Array, Cell, tuple[str, ...]]:
+class _Told:
+    """A model whose descents pass on where they stand.  on_step : or nobody is told."""
+
+    def __init__(self, model: Model, on_step: OnStep | None) -> None:
+        self.model, self._on_step = model, on_step
+        self._steps, self._first, self._last = 0, 0.0, 0.0
+
+    def residual(self, x: Array) -> Array:
+        """The model's, remembered by its size."""
+        residual = self.model.residual(x)
+        self._last = float(residual @ residual)
+        return residual
+
+    def jacobian(self, x: Array) -> Array:
+        """The model's, which a descent asks for once a step, where it has taken it."""
+        self._first = self._first or self._last
+        if self._on_step is not None:
+            self._on_step(self._steps, self._last / self._first if self._first else 1.0)
+        self._steps += 1
+        return self.model.jacobian(x)
+
+
+def _fitted_twice(told: _Told, evaluations: int) -> tuple[Array, Cell, tuple[str, ...]]:
     """Where the descents end, the cell there with what its temperatures tell of heat, and a sentence on that.
 
     Where no record tells of heat, a second descent would begin with what the first one had, and there is none.
     """
-    x = descended(model, evaluations)
+    model = told.model
+    x = _descended(told, evaluations, np.zeros(model.layout.size))
     found, of_heat = with_heat(rewound(model, x), model.records)
     if of_heat:  # how fast a winding follows its case is of the file, which is fitted as it is simulated
         model.take_heat_of(found)
-        x = descended(model, evaluations, x)
+        x = _descended(told, evaluations, x)
         found = rewound(model, x)
     return x, found, of_heat
 
@@ -126,9 +154,10 @@ def _fitted_twice(model: Model, evaluations: int) -> tuple[Array, Cell, tuple[st
 def _with_what_it_is_of(
     found: Cell, declared: Cell, model: Model, shares: Mapping[str, float], days: Mapping[str, date]
 ) -> Cell:
-    """The fitted cell as it is written: with which model and which records it was fitted.
+    """The fitted cell as it is written, with the model and the records that it was fitted with.
 
-    declared : at whose temperature records without one were taken.  shares : record -> of the capacity that is written.
+    declared : at whose temperature records without one were taken.  shares : record -> share of the capacity that is
+    written.
     days : by record name, of those that have one.
     """
     return replace(
@@ -141,7 +170,7 @@ def _with_what_it_is_of(
 
 
 def _errors(model: Model, states: Mapping[FitState, tuple[Cell, Array]]) -> tuple[RecordError, ...]:
-    """Of each record, what each state of the cell leaves of it."""
+    """The RMSE of each record under each state of the cell."""
     left_v = {name: [rms(error) for error in model.errors_of(*state)] for name, state in states.items()}
     return tuple(
         RecordError(r.name, _degc(r), left_v["declared"][i], left_v["fitted"][i], left_v["simulated"][i])
@@ -152,7 +181,7 @@ def _errors(model: Model, states: Mapping[FitState, tuple[Cell, Array]]) -> tupl
 def problem(
     cell: Cell, records: Sequence[Measurement], conditions: Conditions
 ) -> tuple[Model, tuple[str, ...]]:
-    """What is fitted, and sentences on how it was set up.
+    """The model that is fitted, and sentences on how it was set up.
 
     Raises DataError for records that do not fit the cell.
     """
@@ -163,6 +192,8 @@ def problem(
         start, [data for data, _ in kept], conditions.temperatures_degc
     )
     start, of_activation = with_activation(start)
+    telling = () if conditions.same_cell else tell_the_size(cell, records)
+    of_potentials = filter(None, (unlike(start, records[i]) for i in telling))
     cut = [r.name for r, whole in zip(placed, records, strict=True) if r.time_s[0] > whole.time_s[0]]
     model_name = conditions.model or "espm"
     ready = prepared(start, placed, conditions.soc0, model_name, conditions.same_cell, cut)
@@ -185,6 +216,7 @@ def problem(
     )
     return model, (
         *of_size,
+        *of_potentials,
         *zero.sentences,
         *(sentence for _, of_branch in kept for sentence in of_branch),
         *of_temperature,
@@ -231,8 +263,8 @@ def _sized(cell: Cell, records: Sequence[Measurement], same_cell: bool) -> tuple
 
 
 def _of_size(cell: Cell, sized_cell: Cell) -> Cell:
-    """The start file of the size that the records tell, with no typical value that is filled in: the limits of what
-    contradicts a temperature were set with files as they are."""
+    """The start file at the size that the records tell, without the typical values that a fit fills in: the limits
+    beyond which a record contradicts its temperature were set with files as they are."""
     return replace(
         cell,
         electrode_area_m2=sized_cell.electrode_area_m2,
@@ -252,16 +284,16 @@ def _of_small_span(span_k: float, n_records: int) -> tuple[str, ...]:
     return (f"{apart}: activation energies and entropy stay as they are.",)
 
 
-def descended(model: Model, evaluations: int, x0: Array | None = None) -> Array:
-    """Where bounded least squares ends."""
-    x = np.zeros(model.layout.size) if x0 is None else x0
-    if not np.isfinite(model.residual(x)).all():
+def _descended(told: _Told, evaluations: int, x0: Array) -> Array:
+    """Working vector at which bounded least squares ends."""
+    model = told.model
+    if not np.isfinite(model.residual(x0)).all():
         raise FitError(
             f"{model.cell.name}: the start file cannot be simulated on these records; start from a cell of the same "
             "chemistry."
         )
     found = least_squares(
-        model.residual, x, model.jacobian, (model.low, model.high), ftol=GAIN, xtol=1e-5, gtol=1e-8,
+        told.residual, x0, told.jacobian, (model.low, model.high), ftol=GAIN, xtol=1e-5, gtol=1e-8,
         max_nfev=evaluations,
     )  # fmt: skip
     return np.asarray(found.x, dtype=float)
@@ -272,7 +304,7 @@ STATE_WORDS: dict[FitState, str] = {
     "fitted": "the fitted cell",
     "simulated": "the file as simulated",
 }
-"""In words, as a note names them."""
+"""State of the cell -> what notes call it."""
 
 
 def _ran_out(model: Model, states: Mapping[FitState, tuple[Cell, Array]]) -> tuple[str, ...]:
@@ -332,5 +364,5 @@ def _span_k(cell: Cell, records: Sequence[Prepared], spectra: Sequence[Spectrum]
 
 
 def _mean_kelvin(cell: Cell, record: Prepared) -> float:
-    """Of what a record is taken at: the file's temperature where it tells none."""
+    """Mean temperature of a record, K; the file's where the record tells none."""
     return cell.initial_temperature_k if record.mean_kelvin is None else record.mean_kelvin

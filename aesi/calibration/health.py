@@ -13,7 +13,7 @@ from aesi.constants import MILLI
 from aesi.physics.cell import Cell
 
 STEP = 1e-2
-"""In standard deviations of the priors, for slopes."""
+"""Step of the slopes, in standard deviations of the priors."""
 HEALTH_WORDS = {
     "resistance_mohm": "resistance of contacts and films, mohm",
     "inventory_ah": "cyclable lithium, Ah",
@@ -53,7 +53,7 @@ def health_of(cell: Cell) -> Health:
 
 
 def _films_ohm(cell: Cell) -> float:
-    """Of both electrodes' films over the whole cell, half charged, at the reference temperature."""
+    """Resistance of both electrodes' films over the whole cell, ohm, half charged and at the reference temperature."""
     half = cell.stoichiometries(0.5)
     ohm = 0.0
     for electrode, theta in zip((cell.negative, cell.positive), half, strict=True):

@@ -27,12 +27,13 @@ from aesi.physics.simulation import simulate
 LEAST_RISE_K = 2.0
 """A record that warms by less tells nothing of heat."""
 AMBIENT_SD_K = 5.0
-"""Of the surroundings about where a cell starts, beside records that count as one reading each. Loose: with a tenth of
-it what is left of the measured temperatures is 0.15 and 0.32 K (LG HG2, Panasonic) instead of 0.12 and 0.31."""
+"""Standard deviation of the surroundings' temperature about the one that a cell starts at; each record counts as one
+reading. Loose: with a tenth of it 0.15 and 0.32 K are left of the measured temperatures (LG HG2, Panasonic) instead
+of 0.12 and 0.31."""
 SURROUNDINGS_UNIT = 0.1
-"""Of their deviation, that a step of the surroundings is worth in the descent: half a kelvin."""
+"""Unit of the surroundings in the descent, as a share of their deviation: half a kelvin."""
 READING_K = 0.3
-"""Of a thermocouple."""
+"""Standard deviation of a thermocouple, K."""
 TYPICAL_W_K = 0.1
 """Start of the fit: a small cylindrical cell in still air."""
 
@@ -48,7 +49,7 @@ class HeatFit:
 
     @property
     def sentence(self) -> str:
-        """For a reader."""
+        """The fit as a sentence."""
         return (
             f"heat: {self.heat_capacity_j_k:.3g} J/K and {self.conductance_w_k:.3g} W/K from the case follow the "
             f"measured temperature of {', '.join(self.records)} within {self.rmse_k:.2f} K; they are in the file."

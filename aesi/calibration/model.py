@@ -26,7 +26,8 @@ SOLID_ORDER = 8
 ELECTRODE_POINTS = 4
 """Points across a porous electrode: four err by 0.14 mV at most on discharges of the shipped cells to 1C."""
 FitState = Literal["declared", "simulated", "fitted"]
-"""Of a calibration: the start file, the new file by itself, and with what each record has of its own."""
+"""State of a calibrated cell: as the start file declares it, by the new file alone, or with what each record has of
+its own."""
 MOST_STEPS = 16
 """Steps of the model between two rows, each of a second where fewer do. A file is simulated in steps of a second, and a
 fit in longer ones makes use of what they err by: a 1C discharge of an LG 18650HG2, rows 10 s apart, that was fitted in
@@ -47,17 +48,18 @@ ERROR_V, so that what a model usually misses counts by its square, and the end o
 hundreds of millivolts, does not decide the rest. With half of it the same command leaves 1.10 mV of the fitted and 10.8
 of the unseen drive, with twice 1.10 and 11.5."""
 TELL_SILICON = 2
-"""Slow discharges at the least that tell lost silicon from lost material: of one, the potentials take either."""
+"""Least number of slow discharges that tell lost silicon from lost material: with one, the potentials can take up
+either."""
 STEP = 1e-3
-"""Of finite differences, in deviations of the prior. Where a discharge ends, the voltage bends within less: with 0.02
-for what is global and 0.2 for what a record has of its own, slopes erred by up to 16 and 34 % there, descents to an LG
-18650HG2 stopped at 353.5 and 354.7 of what they are to minimise instead of 340.1, and a change of the heat that moves a
-voltage by 0.05 mV moved its file by 5 mV at 0 degC."""
+"""Step of finite differences, in deviations of the prior. At the end of a discharge the voltage bends within less
+than larger steps: with 0.02 for global parameters and 0.2 for those of a record, slopes erred by up to 16 and 34 %
+there, descents to an LG 18650HG2 stopped at a cost of 353.5 and 354.7 instead of 340.1, and a change of the heat
+that moves a voltage by 0.05 mV moved its file by 5 mV at 0 degC."""
 
 
 @dataclass(frozen=True)
 class WorkingVector:
-    """Where the parts of a working vector stand.  silicon : has each record its own?"""
+    """Places of the parts of a working vector.  silicon : whether each record has a silicon of its own."""
 
     globals: int
     knots: int
@@ -66,40 +68,40 @@ class WorkingVector:
 
     @property
     def zero(self) -> int:
-        """Of the cycler's zero, after the global parameters."""
+        """Place of the cycler's zero, after the global parameters."""
         return self.globals
 
     @property
     def shapes(self) -> slice:
-        """Of the knots."""
+        """Places of the knots."""
         return slice(self.globals + 1, self.globals + 1 + self.knots)
 
     @property
     def size(self) -> int:
-        """Of the whole vector."""
+        """Length of the vector."""
         return self.shapes.stop + len(self.own(0)) * self.records
 
     def own(self, record: int) -> range:
-        """Of all that a record has of its own."""
+        """Places of all that a record has of its own."""
         each = 3 if self.silicon else 2
         return range(self.shapes.stop + each * record, self.shapes.stop + each * (record + 1))
 
     def soc(self, record: int) -> int:
-        """Of a record's state of charge."""
+        """Place of a record's state of charge."""
         return self.own(record)[0]
 
     def age(self, record: int) -> int:
-        """Of a record's active material."""
+        """Place of a record's active material."""
         return self.own(record)[1]
 
     @property
     def silicons(self) -> list[int]:
-        """Of all records' silicon."""
+        """Places of the records' silicon."""
         return [self.own(i)[2] for i in range(self.records)] if self.silicon else []
 
     @property
     def ages(self) -> list[int]:
-        """Of all records' active material."""
+        """Places of the records' active material."""
         return [self.age(i) for i in range(self.records)]
 
 
@@ -132,7 +134,7 @@ class Model:
         self.simulations = 0
 
     def take_heat_of(self, found: Cell) -> None:
-        """From here on the start has this cell's heat capacity and its conductance to the surroundings."""
+        """Give the start cell the heat capacity and the conductance to the surroundings of this cell, from here on."""
         self.cell = replace(
             self.cell,
             specific_heat_j_kg_k=found.specific_heat_j_kg_k,
@@ -203,9 +205,10 @@ class Model:
         return out
 
     def states(self, declared: Cell, x: Array) -> dict[FitState, tuple[Cell, Array]]:
-        """Of a fit that ended at `x`, by name: the cell, and the working vector that its records are simulated with.
+        """The states of a fit that ended at `x`, by name: the cell, and the working vector that its records are
+        simulated with.
 
-        The start file is that of a cell that has lost nothing, on currents as measured, like the file as simulated.
+        The declared cell has lost nothing, and takes currents as measured, as the file does when it is simulated.
         """
         nothing, simulated = self.as_simulated(np.zeros(self.layout.size)), self.as_simulated(x)
         return {
@@ -234,10 +237,33 @@ class Model:
         those over the knots of potentials."""
         cell = self.cell_at(x)
         runs = [self.run(i, cell, x) for i in range(len(self.records))]
+        blocks, of_spectra = self._differences(cell, x, [run[0] for run in runs])
+        for i, (block, run) in enumerate(zip(blocks, runs, strict=True)):
+            surface_n = stretched(run[1], self.edge, self.silicon(i, x))
+            block[:, self._closed] = self.shapes.columns(x[self.layout.shapes], surface_n, run[2])
+            self._set_own_slopes(i, cell, x, run[0], block)
+        parts = []
+        for block, run, record, w in zip(blocks, runs, self.records, self.weights, strict=True):
+            lenient = w * leniency(record.rows.voltage_v - run[0])
+            parts.append(-lenient[:, None] * block)
+        return np.vstack([*parts, of_spectra, np.eye(self.layout.size)])
+
+    @property
+    def _closed(self) -> slice:
+        """Places of the knots of the potentials, whose slopes have a closed form."""
+        first = self.layout.shapes.start
+        return slice(first, first + self.shapes.closed)
+
+    def _differences(self, cell: Cell, x: Array, voltages_v: Sequence[Array]) -> tuple[list[Array], Array]:
+        """One-sided differences over what the records share: of each record's voltage, (rows, n), except over the knots
+        of potentials, and of the misfits of the spectra, (2 frequencies, n).
+
+        voltages_v : (rows,) of each record at x.
+        """
         blocks = [np.zeros((len(r.rows), self.layout.size)) for r in self.records]
-        closed = slice(self.layout.shapes.start, self.layout.shapes.start + self.shapes.closed)
         off = self.spectra.misfits(cell)
         of_spectra = np.zeros((len(off), self.layout.size))
+        closed = self._closed
         for j in range(self.layout.shapes.stop):
             h = STEP if x[j] + STEP <= self.high[j] else -STEP
             there = x.copy()
@@ -249,16 +275,8 @@ class Model:
                 continue
             for i, record in enumerate(self.records):
                 if j != self.layout.zero or record.slow:
-                    blocks[i][:, j] = (self.run(i, changed, there)[0] - runs[i][0]) / h
-        for i, (block, run) in enumerate(zip(blocks, runs, strict=True)):
-            surface_n = stretched(run[1], self.edge, self.silicon(i, x))
-            block[:, closed] = self.shapes.columns(x[self.layout.shapes], surface_n, run[2])
-            self._set_own_slopes(i, cell, x, run[0], block)
-        parts = []
-        for block, run, record, w in zip(blocks, runs, self.records, self.weights, strict=True):
-            lenient = w * leniency(record.rows.voltage_v - run[0])
-            parts.append(-lenient[:, None] * block)
-        return np.vstack([*parts, of_spectra, np.eye(self.layout.size)])
+                    blocks[i][:, j] = (self.run(i, changed, there)[0] - voltages_v[i]) / h
+        return blocks, of_spectra
 
     def _set_own_slopes(self, index: int, cell: Cell, x: Array, voltage_v: Array, block: Array) -> None:
         """Set the slopes of a record's voltage over what records have of their own: records of one course of ageing
@@ -290,7 +308,7 @@ def saturated(error_v: Array) -> Array:
 
 
 def leniency(error_v: Array) -> Array:
-    """Slope of `saturated`: one for small errors."""
+    """Slope of `saturated`; 1 for small errors."""
     scale = error_v / OUTLIER_V
     root = np.sqrt(1.0 + scale**2)
     return 1.0 / (root * np.sqrt(2.0 / (root + 1.0)))

@@ -7,7 +7,7 @@ is a standard normal deviate.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,7 +27,7 @@ PLACES = tuple(0.5 - 0.5 * np.cos(np.pi * np.linspace(0.0, 1.0, 7)))
 """Knots of a diffusivity's and of a rate's course, shares of an electrode's window: dense at both ends, where either
 falls off. Pulse tests come at ten states of charge or more."""
 COURSE_POINTS = 65
-"""Of the table that a course becomes: a hundredth of the window and a half."""
+"""Points of the table that a course becomes, one every 1.6 % of the window."""
 
 
 @dataclass(frozen=True)
@@ -48,14 +48,14 @@ class Free:
     given: bool = False
 
     def value(self, z: float) -> float:
-        """The value at a working coordinate; beyond a bound of the range that of the bound."""
+        """The value at a working coordinate; that of the bound beyond it."""
         if self.factor:
             return self.start * float(np.exp(self.sd * z))
         return min(max(self.start + self.sd * z, self.low), self.high)
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Of the working coordinate."""
+        """(lower, upper) of the working coordinate."""
         low = -LIMIT_SD if self.factor else max(-LIMIT_SD, (self.low - self.start) / self.sd)
         high = LIMIT_SD if self.factor else min(LIMIT_SD, (self.high - self.start) / self.sd)
         # Where the start is on a bound, as at nought of a resistance: `least_squares` wants it strictly inside.
@@ -91,11 +91,11 @@ FILM_COURSES = "convention: a factor of seven either way; no source"
 COURSES = "factors of 59 and 11 over the windows of graphite and NCO, Ecker et al. 2015, as PyBaMM has them"
 RATE_COURSES = "convention: exchange currents leave the square root by factors; no source"
 COURSE_SD = 1.2
-"""Of a logarithm: a decade over the window is two of them. With 0.8 the rates of a Panasonic NCR18650PF, fitted to its
-pulses, ended at three deviations."""
+"""Standard deviation of the logarithm of a course at a knot: a decade over the window is two of them. With 0.8 the
+rates of a Panasonic NCR18650PF, fitted to its pulses, ended at three deviations."""
 FILM_COURSE_SD = 2.0
-"""Of the logarithm. With 1.2 the negative film of the Panasonic NCR18650PF ended at four deviations where it is empty,
-a hundred times that of the window; its pulses at -10 degC left out."""
+"""The same of a film. With 1.2 the negative film of the Panasonic NCR18650PF, fitted without its pulses at -10 degC,
+ended at four deviations at the empty end, a hundred times its value over the window."""
 DOUBLE_LAYER_F_M2, LAYER_SD = 1.0, 1.2
 """A convention. With 0.2 and 0.7 the same pulses ended at four deviations, 3.2 F/m2."""
 LAYERS = "0.2 F/m2 in PyBaMM's parameter sets; convention: five times that, of a rough surface"
@@ -107,19 +107,21 @@ CONDUCTIVITIES = (
     "doi:10.1016/j.jpowsour.2013.11.107"
 )
 FULL_SD = {"negative": 0.015, "positive": 0.03}
-"""Of the stoichiometries of full charge, where the file may be of a cell that was made a little differently."""
+"""Standard deviations of the stoichiometries of full charge, where the file may be of a cell that was made a little
+differently."""
 AGED_FULL_SD = {"negative": 0.15, "positive": 0.15}
-"""The same in a check-up of the cell of the file: a tenth of its lithium lost moves the negative electrode's by 0.09.
-Measured on three made check-ups of an LG M50 with up to that: with FULL_SD a tenth of the material counts as lost."""
+"""The same in a check-up of the file's own cell: a tenth of its lithium lost moves the negative electrode's by 0.09.
+Measured on three made check-ups of an LG M50 with up to that loss: with FULL_SD a tenth of the material counts as
+lost instead."""
 HALF_CELLS = "convention: cells of one chemistry are balanced alike within a tenth; no source"
 
 
 def free_parameters(
     cell: Cell, span_k: float, same_cell: bool = False, on_case: bool = False
 ) -> tuple[Free, ...]:
-    """What moves, for records whose temperatures span `span_k` (K).
+    """The parameters that a fit moves, for records whose temperatures span `span_k` (K).
 
-    Energies are free where the records tell them; at one temperature nothing does, and they stay.
+    Activation energies are free where the records tell them; records at one temperature do not, and they stay.
     same_cell : the records are of the cell of the file, which may have lost lithium.  on_case : see `with_interfaces`.
     """
     ohm = CONTACT_V / cell.nominal_capacity_ah
@@ -139,21 +141,9 @@ def free_parameters(
         Free("electrolyte.conductivity", 1.0, SALT_SD, "factor", TORTUOSITY, True),
         Free("electrolyte.diffusivity", 1.0, SALT_SD, "factor", TORTUOSITY, True),
         Free("contact.resistance", cell.contact_resistance_ohm, ohm, "ohm", CONTACTS, low=0.0, high=most_ohm),
-        *(
-            Free(course(side, what, k), 1.0, sd, "factor", source, True)
-            for side in ("negative", "positive")
-            for what, sd, source in (
-                ("diffusivity", COURSE_SD, COURSES),
-                ("rate", COURSE_SD, RATE_COURSES),
-                ("film", FILM_COURSE_SD, FILM_COURSES),
-            )
-            for k in range(len(PLACES))
-        ),
+        *_courses(),
+        *_interfaces(cell),
     ]  # fmt: skip
-    for side, electrode in (("negative", cell.negative), ("positive", cell.positive)):
-        typical = electrode.double_layer_f_m2 or DOUBLE_LAYER_F_M2
-        out.append(Free(f"{side}.double_layer", typical, LAYER_SD, "F/m2", LAYERS, True))
-        out.append(Free(f"{side}.film", 1.0, FILM_SD, "factor", FILMS, True))
     k = cell.thermal_conductivity_w_m_k
     if on_case and k is not None and cell.winding_resistance_k_w:
         out.append(Free("thermal.conductivity", k, CONDUCTIVITY_SD, "W/(m K)", CONDUCTIVITIES, True))
@@ -163,6 +153,26 @@ def free_parameters(
             for (part, rate), one in energy_priors(cell).items()
         ]
     return tuple(out)
+
+
+def _courses() -> Iterator[Free]:
+    """Factors at places over the stoichiometry of each electrode."""
+    for side in ("negative", "positive"):
+        for what, sd, source in (
+            ("diffusivity", COURSE_SD, COURSES),
+            ("rate", COURSE_SD, RATE_COURSES),
+            ("film", FILM_COURSE_SD, FILM_COURSES),
+        ):
+            for place in range(len(PLACES)):
+                yield Free(course(side, what, place), 1.0, sd, "factor", source, True)
+
+
+def _interfaces(cell: Cell) -> Iterator[Free]:
+    """Double layer and film of each electrode."""
+    for side, electrode in (("negative", cell.negative), ("positive", cell.positive)):
+        typical = electrode.double_layer_f_m2 or DOUBLE_LAYER_F_M2
+        yield Free(f"{side}.double_layer", typical, LAYER_SD, "F/m2", LAYERS, True)
+        yield Free(f"{side}.film", 1.0, FILM_SD, "factor", FILMS, True)
 
 
 def with_priors(free: Sequence[Free], priors: Mapping[str, tuple[float, float]]) -> tuple[Free, ...]:

@@ -14,6 +14,7 @@ Foreman-Mackey et al., PASP 125 (2013) 306, doi:10.1086/670067.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.util import find_spec
 
@@ -26,7 +27,7 @@ from aesi.numerics.typing import Array
 BURNT = 0.5
 """Share of the steps, at the start, that is thrown away."""
 FEWEST_STEPS = 4
-"""Of which half are burnt."""
+"""Fewest steps of each walker; half of them are burnt."""
 SPREAD = 0.5
 """Walkers start this many deviations of the linearised fit about it."""
 
@@ -85,6 +86,26 @@ def sampled(found: Calibration, steps: int, seed: int = 0) -> PosteriorSamples:
     import emcee
 
     model, n = found.model, len(found.model.free)
+    rng = np.random.default_rng(seed)
+    walkers = 2 * n + 2
+    root = np.linalg.cholesky(found.covariance[:n, :n])
+    start = found.x[:n] + SPREAD * rng.standard_normal((walkers, n)) @ root.T
+    start = np.clip(start, model.low[:n] + 1e-6, model.high[:n] - 1e-6)
+    sampler = emcee.EnsembleSampler(walkers, n, _log_probability(found))
+    sampler.random_state = np.random.RandomState(seed).get_state()
+    sampler.run_mcmc(start, steps)
+    kept = sampler.get_chain(discard=int(BURNT * steps), flat=True)
+    with np.errstate(invalid="ignore"):  # of walkers that never moved, whose time is NaN
+        autocorrelation = float(np.mean(emcee.autocorr.integrated_time(sampler.get_chain(), quiet=True)))
+    if steps < 50.0 * autocorrelation:
+        autocorrelation = np.nan
+    return _summary(found, kept, float(np.mean(sampler.acceptance_fraction)), autocorrelation)
+
+
+def _log_probability(found: Calibration) -> Callable[[Array], float]:
+    """Logarithm of the posterior over the global parameters, (n,). All others are integrated out, linearised at the
+    fit."""
+    model, n = found.model, len(found.model.free)
     weights = information_weights(model, found.x)
     linear = weights[:, None] * model.jacobian(found.x)[:, n:]
     hessian = linear.T @ linear
@@ -100,20 +121,7 @@ def sampled(found: Calibration, steps: int, seed: int = 0) -> PosteriorSamples:
         value = -0.5 * float(r @ r - b @ inverse @ b) - 0.5 * float(log_det)
         return value if np.isfinite(value) else -np.inf
 
-    rng = np.random.default_rng(seed)
-    walkers = 2 * n + 2
-    root = np.linalg.cholesky(found.covariance[:n, :n])
-    start = found.x[:n] + SPREAD * rng.standard_normal((walkers, n)) @ root.T
-    start = np.clip(start, model.low[:n] + 1e-6, model.high[:n] - 1e-6)
-    sampler = emcee.EnsembleSampler(walkers, n, log_probability)
-    sampler.random_state = np.random.RandomState(seed).get_state()
-    sampler.run_mcmc(start, steps)
-    kept = sampler.get_chain(discard=int(BURNT * steps), flat=True)
-    with np.errstate(invalid="ignore"):  # of walkers that never moved, whose time is NaN
-        autocorrelation = float(np.mean(emcee.autocorr.integrated_time(sampler.get_chain(), quiet=True)))
-    if steps < 50.0 * autocorrelation:
-        autocorrelation = np.nan
-    return _summary(found, kept, float(np.mean(sampler.acceptance_fraction)), autocorrelation)
+    return log_probability
 
 
 def _summary(found: Calibration, samples: Array, accepted: float, autocorrelation: float) -> PosteriorSamples:

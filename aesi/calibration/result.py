@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 NINETY_FIVE = 1.96
 """Standard deviations either side of a 95 % interval."""
 ROUND_OFF = 1e-9
-"""Of its interval: a value nearer to nought is nought. A convention."""
+"""Share of a parameter's interval: a value nearer to nought is nought. A convention."""
 BOUND_SHARE = 0.02
 """A parameter closer to a bound than this share of its range is reported to have ended there."""
 
@@ -45,8 +45,11 @@ class Interval:
 
 @dataclass(frozen=True)
 class RecordError:
-    """RMSE of one record's rows, V: as the start file declares the cell, calibrated with what the record has of its
-    own, and without it, as the file is simulated on the currents as measured."""
+    """RMSE of one record's rows, V.
+
+    before_v : by the start file.  after_v : by the fit, with what the record has of its own.  simulated_v : without
+    that, as the written file is simulated on the currents as measured.
+    """
 
     name: str
     temperature_degc: float | None
@@ -68,7 +71,7 @@ class Open:
 
     @property
     def sentence(self) -> str:
-        """For a reader."""
+        """The combination as a sentence."""
         names = " with ".join(f"{name} ({weight:+.2f})" for name, weight in self.weights)
         return f"the data do not determine {names}: {100 * self.narrowed:.0f} % of the prior's width is left"
 
@@ -101,9 +104,9 @@ class Calibration:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Why the cell may be bent to what is not its own, a sentence each: a temperature, or a state of charge that
-        was given, against the voltage, records on which the fit errs by more than the start file, which one cell's
-        seldom do, or the file that is written, and parameters that stand in for what the model lacks."""
+        """Reasons why the cell may have been bent to what is not its own, a sentence each: a temperature or a given
+        state of charge that the voltage contradicts; records on which the fit, or the file that is written, errs by
+        more than the start file, which is rare with one cell; and parameters that stand in for what the model lacks."""
         against = (r.start for r in self.model.records if r.start.against_voltage)
         return (
             *self.against_temperature,

@@ -23,21 +23,24 @@ from aesi.physics.cell.energies import SPAN_K
 from aesi.physics.cell.relations import Constant, LookupTable, Relation, Sum
 
 POSITIVE_KNOTS, NEGATIVE_KNOTS = 23, 15
-"""Of the corrections of both potentials, dense where they are steep."""
+"""Knots of the corrections of both potentials, dense where these are steep."""
 ENTROPY_KNOTS = 5
-"""Of the correction of an entropy, which is smoother."""
+"""Knots of the correction of an entropy, which is smoother."""
 GRID = 2049
-"""Stoichiometries at which a potential is laid down anew, from 0 to 1."""
+"""Points from 0 to 1 at which a corrected potential is tabulated."""
 LEAST_SLOPE = 5e-3
-"""V per unit of stoichiometry: plateaus of graphite fall by some hundredths of a volt, formulas of them by less."""
+"""Least slope of a potential, V per unit of stoichiometry: plateaus of graphite fall by some hundredths of a volt,
+formulas of them by less."""
 LOG_SLOPE_SD = 0.7
-"""Of the logarithm of a slope: half-cell measurements of one material differ by a factor of two in it."""
+"""Standard deviation of the logarithm of a slope: half-cell measurements of one material differ by a factor of two
+in it."""
 LEVEL_SD_V = 0.04
-"""Of the difference of both potentials: what half-cell measurements of one material differ by."""
+"""Standard deviation of the difference of both potentials, V: half-cell measurements of one material differ by as
+much."""
 ENTROPY_SD_V_K = 1.5e-4
-"""Of an entropic coefficient at each knot: its own size."""
+"""Standard deviation of an entropic coefficient at each knot, V/K: its own size."""
 BEYOND = 0.06
-"""Of the stoichiometry window, that an entropy's table reaches further: surfaces leave it under load."""
+"""Share of the stoichiometry window by which an entropy's table reaches beyond it: surfaces leave it under load."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +59,7 @@ class Potential:
 
     @classmethod
     def of(cls, electrode: Electrode, places: Array) -> Potential:
-        """places : (knots,) stoichiometries of the knots, from 0 to 1."""
+        """The electrode's potential, with knots at these places: (knots,) stoichiometries from 0 to 1."""
         grid = np.linspace(0.0, 1.0, GRID)
         inner = np.clip(grid, 1e-6, 1.0 - 1e-6)
         slope = np.maximum(-np.diff(electrode.ocp(inner)) / np.diff(grid), LEAST_SLOPE)
@@ -67,7 +70,7 @@ class Potential:
 
     @property
     def knots(self) -> int:
-        """How many."""
+        """Number of knots."""
         return self.basis.shape[1]
 
     def falls(self, z: Array) -> Array:
@@ -75,7 +78,7 @@ class Potential:
         return self.slope * np.exp(self.basis @ z) * np.diff(self.grid)
 
     def at(self, z: Array) -> LookupTable:
-        """The potential of working coordinates z (knots,)."""
+        """The potential at working coordinates z (knots,)."""
         fallen = np.concatenate([[0.0], np.cumsum(self.falls(z))])
         volts = self.level - (fallen - fallen[self.anchor])
         return LookupTable(tuple(map(float, self.grid)), tuple(map(float, volts)))
@@ -101,7 +104,7 @@ class Entropy:
 
     @classmethod
     def over(cls, electrode: Electrode) -> Entropy:
-        """Of the electrode's window."""
+        """Splines over the electrode's window."""
         low, high = electrode.theta_min, electrode.theta_max
         places = np.linspace(low, high, ENTROPY_KNOTS)
         return cls(low, high, CubicSpline(places, np.eye(ENTROPY_KNOTS), bc_type="natural"))
@@ -130,7 +133,7 @@ class Shapes:
 
     @classmethod
     def over(cls, cell: Cell, span_k: float) -> Shapes:
-        """For the cell's electrodes."""
+        """Corrections of the cell's electrodes."""
         p, n = cell.positive, cell.negative
         least = max(p.theta_min - 0.08, 0.0)
         places = np.linspace(0.0, 1.0, POSITIVE_KNOTS)

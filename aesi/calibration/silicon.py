@@ -24,9 +24,10 @@ from aesi.physics.cell import Electrode
 from aesi.physics.cell.relations import LookupTable
 
 SILICON_V = 0.22
-"""Against Li/Li+: graphite gives up its plateaus below it. A convention: the foot of the edge above."""
+"""V against Li/Li+, below which graphite has its plateaus. A convention: the foot of the edge above."""
 SILICON_SD = 0.3
-"""Of the logarithm of the share that is left. A convention, of the size of what is seen above: 0.81 and 0.63 of it."""
+"""Standard deviation of the logarithm of the share that is left. A convention, of the size of the shares seen above,
+0.81 and 0.63."""
 
 
 def silicon_edge(electrode: Electrode) -> float:

@@ -141,21 +141,8 @@ def calibrated_band(
     extrapolated = len(pieces) < MIN_PIECES
     if extrapolated:
         pieces = _pieces(errors, columns, [np.ones(len(e), dtype=bool) for e in errors], names)
-    if len(pieces) < MIN_PIECES:
-        raise FitError(
-            f"{len(pieces)} pieces of {MIN_ROWS} or more predictions {horizon:g} s ahead cannot calibrate a band: "
-            f"at least {MIN_PIECES} are needed; give longer records."
-        )
-    if not any(piece.sizes.any() for piece in pieces):
-        raise FitError(f"the errors at {horizon:g} s are zero; calibrate on predictions of measured voltage.")
-    others = [[other for other in pieces if not other.shares_rows_with(piece)] for piece in pieces]
-    for piece, rest in zip(pieces, others, strict=True):
-        if not rest:
-            raise FitError(
-                f"no piece is left that shares no row with one of {piece.record}, so that nothing can scale its errors "
-                f"at {horizon:g} s; give errors of another record, or of other rows."
-            )
-    scales = [_scale(rest, alpha) for rest in others]
+    _check_pieces(pieces, horizon)
+    scales = [_scale(_apart_from(piece, pieces, horizon), alpha) for piece in pieces]
     scores = [piece.sizes / scale(piece.columns) for piece, scale in zip(pieces, scales, strict=True)]
     counts = np.array([float(score.size) for score in scores])
     independent = float(np.maximum(1, counts * dt_s // (FORGOTTEN * horizon)).sum())
@@ -172,6 +159,28 @@ def calibrated_band(
         tuple(float(np.mean(score <= everywhere)) for score in scores),
         extrapolated,
     )
+
+
+def _check_pieces(pieces: Sequence[_Piece], horizon: float) -> None:
+    """Raises FitError where these are too few, or their errors are all zero."""
+    if len(pieces) < MIN_PIECES:
+        raise FitError(
+            f"{len(pieces)} pieces of {MIN_ROWS} or more predictions {horizon:g} s ahead cannot calibrate a band: "
+            f"at least {MIN_PIECES} are needed; give longer records."
+        )
+    if not any(piece.sizes.any() for piece in pieces):
+        raise FitError(f"the errors at {horizon:g} s are zero; calibrate on predictions of measured voltage.")
+
+
+def _apart_from(piece: _Piece, pieces: Sequence[_Piece], horizon: float) -> list[_Piece]:
+    """The pieces that share no row with this one.  Raises FitError where there is none."""
+    others = [other for other in pieces if not other.shares_rows_with(piece)]
+    if not others:
+        raise FitError(
+            f"no piece is left that shares no row with one of {piece.record}, so that nothing can scale its errors "
+            f"at {horizon:g} s; give errors of another record, or of other rows."
+        )
+    return others
 
 
 def _widening(independent: float, alpha: float) -> float:

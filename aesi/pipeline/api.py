@@ -35,12 +35,12 @@ from aesi.tracer.discovery import Progress
 
 FileOrRecord = str | PathLike[str] | Measurement
 Data = FileOrRecord | Sequence[FileOrRecord]
-"""Files, or what `aesi.read_measurement` gave; one, or several."""
+"""One or several files, or measurements that `aesi.read_measurement` gave."""
 FileOrSpectrum = str | PathLike[str] | Spectrum
 Spectra = FileOrSpectrum | Sequence[FileOrSpectrum]
-"""Files of impedance spectra, or these; one, or several."""
+"""One or several spectra, or files of impedance spectra."""
 MOST_HOLDOUT, MOST_EFFECTS = 0.9, 10
-"""As `--holdout` and `--max-effects` have them."""
+"""Upper limits, those of `--holdout` and `--max-effects`."""
 
 
 def discover(
@@ -101,7 +101,7 @@ def discover(
         model,
         good=known,
     )
-    case = with_cold_admitted(within_budget(case))  # refused before anything is searched
+    case = with_cold_admitted(within_budget(case.checked()))  # refused before anything is searched
     finding = Finding(case, run_case(case, folder, progress))
     if folder is not None:
         finding.save(folder)
@@ -222,7 +222,7 @@ def _check_days(dates: Mapping[str, date], as_of: date | None) -> None:
 
 
 def _folder(out: str | PathLike[str]) -> Path:
-    """The folder that is written to, made where it is missing: what takes minutes can be kept then."""
+    """The folder for the results, made before the work where it is missing, so that what takes minutes can be kept."""
     folder = Path(out)
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -11,13 +11,15 @@ from typing import Any
 import numpy as np
 
 from aesi.calibration import Calibration, Conditions, calibrate
+from aesi.calibration.fit import OnStep
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.parameters import check_names
 from aesi.calibration.posterior import PosteriorSamples, check_posterior, sampled
 from aesi.calibration.records.prepared import with_temperatures
 from aesi.calibration.records.spectra import BAND_HZ, check_spectra
+from aesi.calibration.result import RecordError
 from aesi.calibration.rewind import start_soc
-from aesi.calibration.start import sized
+from aesi.calibration.start import sized, tell_the_size
 from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError
 from aesi.numerics.files.whole import write_whole
@@ -44,11 +46,11 @@ ROUND_OFF = 1e-9
 
 @dataclass(frozen=True)
 class Request:
-    """What a calibration is asked for beside its records.
+    """A request for a calibration, beside its records.
 
-    conditions : of the records; where they name no model, that of a saved model is fitted, or that the file was fitted
-    with, else "espm".
-    impedance : spectra to hold the result against, beside those that the conditions have to be fitted.
+    conditions : of the records. Where they name no model, the model of a saved model is fitted, or the one that the
+    file was fitted with, else "espm".
+    impedance : spectra to hold the result against, beside those among the conditions, which are fitted.
     posterior : steps of each walker, 0 for none; seed : of these.
     title : name of the cell that is written.
     """
@@ -61,17 +63,22 @@ class Request:
 
 
 def check_request(cell: Path, request: Request) -> None:
-    """Raises CellError, DataError or InputError, one sentence, for what is asked of a fit and needs no record to be
-    refused."""
+    """Raises CellError, DataError or InputError, one sentence, for a request that can be refused without a record."""
     check_posterior(request.posterior)
     check_distinct_spectra(request.conditions.spectra, request.impedance)
     check_names(declared_model(cell).cell, request.conditions.priors)
 
 
 def calibrate_files(
-    cell: Path, measurements: Sequence[Measurement], out: Path, request: Request | None = None
+    cell: Path,
+    measurements: Sequence[Measurement],
+    out: Path,
+    request: Request | None = None,
+    on_step: OnStep | None = None,
 ) -> dict[str, Any]:
     """Calibrate the cell of a BPX file; writes `out` (BPX) and the report beside it, and returns the report.
+
+    on_step : told at each step of the fit.
 
     Raises CellError or DataError, one sentence, for what cannot be used.
     """
@@ -84,7 +91,7 @@ def calibrate_files(
     declared, model = given.cell, conditions.model or given.model
     start = scaled_to(declared, measurements, conditions.temperatures_degc)
     check_spectra(start, (*conditions.spectra, *asked.impedance))
-    found = calibrate(declared, measurements, replace(conditions, model=model))
+    found = calibrate(declared, measurements, replace(conditions, model=model), on_step=on_step)
     name = declared.name if asked.title is None else asked.title
     found = replace(found, cell=replace(found.cell, name=name, description=_made_from(found)))
     posterior = sampled(found, asked.posterior, asked.seed) if asked.posterior else None
@@ -136,8 +143,8 @@ def fit_traces(found: Calibration) -> tuple[DiscoveryTrace, ...]:
 
 
 def effects_left(given: HybridModel) -> tuple[str, ...]:
-    """What of a cell or a saved model is not fitted, in sentences: what its file declares and no simulation takes, and
-    the model's effects."""
+    """Sentences on what a fit leaves out of a cell or a saved model: what its file declares and no simulation takes,
+    and the model's effects."""
     if not given.effects:
         return given.cell.unread
     names = ", ".join(effect.id for effect in given.effects)
@@ -181,7 +188,8 @@ def scaled_to(
     its temperature.
     """
     start = sized(declared, measurements)[0]
-    check_measured(start, with_temperatures(start, measurements, temperatures_degc or {})[0])
+    placed = with_temperatures(start, measurements, temperatures_degc or {})[0]
+    check_measured(start, placed, tell_the_size(declared, measurements))
     return start
 
 
@@ -202,31 +210,12 @@ def calibration_content(
     read : what a reader dropped, mapped or averaged in the files.
     """
     sampled_notes = () if posterior is None else (posterior.sentence,)
-    deviations = np.sqrt(np.diag(found.covariance))  # the working vector is in deviations of the priors
-    left = dict(zip((free.name for free in found.model.free), deviations.tolist(), strict=False))
     return {
         "schema": SCHEMA,
         "cell": found.cell.name,
         "model": found.model.model_name,
-        "files": [
-            {
-                "name": e.name,
-                "temperature_degc": e.temperature_degc,
-                "before_rmse_mv": MV_PER_V * e.before_v,
-                "after_rmse_mv": MV_PER_V * e.after_v,
-                "as_simulated_rmse_mv": MV_PER_V * e.simulated_v,
-                "capacity_share": found.capacities[e.name],
-            }
-            for e in found.errors
-        ],
-        "parameters": {
-            name: {
-                "value": p.value, "low": p.low, "high": p.high, "unit": p.unit, "prior_from": p.source,
-                "of_prior": left.get(name),
-                **_of_posterior(posterior, name),
-            }
-            for name, p in found.parameters.items()
-        },
+        "files": [_file_row(e, found.capacities[e.name]) for e in found.errors],
+        "parameters": _parameter_rows(found, posterior),
         "capacity_ah": found.cell.capacity_ah,
         "declared_capacity_ah": found.declared.capacity_ah,
         "declared_degc": found.declared.initial_temperature_k - ZERO_CELSIUS_K,
@@ -236,22 +225,51 @@ def calibration_content(
             {"weights": dict(o.weights), "narrowed": o.narrowed, "sentence": o.sentence}
             for o in found.undetermined
         ],
-        "impedance": [
-            {
-                "name": s.measured.name,
-                "soc": s.soc,
-                "temperature_degc": s.measured.temperature_degc,
-                "rms_pct": None if s.off is None else 100.0 * s.off,
-                "band_hz": list(BAND_HZ),
-                "fitted": s.fitted,
-            }
-            for s in spectra
-        ],
+        "impedance": [_spectrum_row(s) for s in spectra],
         "at_bounds": list(found.at_bounds),
         "warnings": list(found.warnings),
         "notes": list(together((*read, *found.notes, *sampled_notes))),
         "seconds": round(found.seconds, 2),
-    }  # fmt: skip
+    }
+
+
+def _file_row(error: RecordError, capacity_share: float) -> dict[str, Any]:
+    return {
+        "name": error.name,
+        "temperature_degc": error.temperature_degc,
+        "before_rmse_mv": MV_PER_V * error.before_v,
+        "after_rmse_mv": MV_PER_V * error.after_v,
+        "as_simulated_rmse_mv": MV_PER_V * error.simulated_v,
+        "capacity_share": capacity_share,
+    }
+
+
+def _parameter_rows(found: Calibration, posterior: PosteriorSamples | None) -> dict[str, dict[str, Any]]:
+    deviations = np.sqrt(np.diag(found.covariance))  # the working vector is in deviations of the priors
+    left = dict(zip((free.name for free in found.model.free), deviations.tolist(), strict=False))
+    return {
+        name: {
+            "value": p.value,
+            "low": p.low,
+            "high": p.high,
+            "unit": p.unit,
+            "prior_from": p.source,
+            "of_prior": left.get(name),
+            **_of_posterior(posterior, name),
+        }
+        for name, p in found.parameters.items()
+    }
+
+
+def _spectrum_row(held: SpectrumError) -> dict[str, Any]:
+    return {
+        "name": held.measured.name,
+        "soc": held.soc,
+        "temperature_degc": held.measured.temperature_degc,
+        "rms_pct": None if held.off is None else 100.0 * held.off,
+        "band_hz": list(BAND_HZ),
+        "fitted": held.fitted,
+    }
 
 
 def _health_rows(found: Calibration) -> dict[str, dict[str, float | None]]:

@@ -35,14 +35,14 @@ PybammModel = Literal["SPMe", "DFN"]
 OURS: Mapping[PybammModel, ModelName] = {"SPMe": "espm", "DFN": "dfn"}
 DEFAULT_MESH = {"x_n": 20, "x_s": 20, "x_p": 20, "r_n": 20, "r_p": 20}
 FINE_MESH = {"x_n": 30, "x_s": 20, "x_p": 30, "r_n": 60, "r_p": 60}
-"""PyBaMM's own default of 20 radial points moves the voltage of a drive by millivolts."""
+"""Points of PyBaMM's mesh: its default of 20 radial points moves the voltage of a drive by millivolts."""
 STRETCH = 2.0
-"""Of a graded mesh: the points of a particle stand e^2 times closer at its surface than at its centre."""
+"""Stretch of a graded mesh: the points of a particle stand e^2 times closer at its surface than at its centre."""
 TOLERANCE = 1e-6
 CHARGE_SHARE = 1e-5
-"""Of the nominal capacity: how much the charge may differ."""
+"""Share of the nominal capacity by which PyBaMM's charge may differ from the current's integral."""
 BEND = 1e-9
-"""Of the largest current: by how much a row may leave the line through its neighbours."""
+"""Share of the largest current by which a row may leave the line through its neighbours."""
 
 
 @dataclass(frozen=True, eq=False)

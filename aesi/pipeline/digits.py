@@ -1,4 +1,4 @@
-"""How many digits of a number say something."""
+"""How many digits of a number are significant."""
 
 from __future__ import annotations
 

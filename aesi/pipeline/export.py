@@ -40,14 +40,14 @@ class Exported:
 
 @dataclass(frozen=True)
 class _Pybamm:
-    """What PyBaMM needs beside the BPX file."""
+    """Content for PyBaMM beside the BPX file."""
 
     options: dict[str, Any] = field(default_factory=dict)
     values: dict[str, float] = field(default_factory=dict)
 
 
 def files_written(out: Path, to: Target) -> tuple[Path, ...]:
-    """What `export` writes: `out`, and for PyBaMM the BPX file that its script reads.
+    """The files that `export` writes: `out`, and for PyBaMM the BPX file that its script reads.
 
     Raises InputError where `out` has the wrong suffix.
     """
@@ -103,6 +103,7 @@ def _keep_unnamed(script: Path, bpx: Path, text: str) -> None:
 
 
 def _beyond_bpx(cell: Cell) -> list[str]:
+    """Sentences on what a calibrated cell holds in its section User-defined that neither target takes over."""
     return [f"{name}: in the section User-defined, which they do not read." for name in own_to_us(cell)]
 
 

@@ -35,8 +35,8 @@ NO_DOUBLE_LAYER = (
 )
 
 MOST_FREQUENCIES, HIGHEST_HZ = 100_000, 1e9
-"""Of `--frequencies`: sweeps have some tens to hundreds and end at some megahertz, beyond which leads are seen and no
-cell. Conventions: far more rows than these fill the memory, and take hours."""
+"""Limits of `--frequencies`. Sweeps have some tens to hundreds and end at some megahertz, beyond which they see
+leads and no cell. Conventions: far more frequencies than these fill the memory and take hours."""
 
 
 def impedance_file(
@@ -95,8 +95,9 @@ def _of_them(count: int) -> str:
 
 
 def _left_out(effects: Sequence[ActiveEffect]) -> list[str]:
-    """Sentences on the effects that act on a record or a reading alone, or on a temperature that is given, and on those
-    on the voltage: but for what is `ohmic` by its own word they may go on to answer after the current is there."""
+    """Sentences on the effects that an impedance lacks, in whole or in part: those that act on a record, a reading
+    or a given temperature alone, and those on the voltage, which may go on to answer after the current is there, as
+    `ohmic` ones do not."""
     warm = [one.id for one in effects if one.effect.infers == "temperature"]
     acting = (one for one in effects if one.id not in warm)
     names = [one.id for one in acting if one.effect.on_model is None and one.effect.on_voltage is None]

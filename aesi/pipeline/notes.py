@@ -7,18 +7,20 @@ from datetime import date
 
 import numpy as np
 
+from aesi.calibration.records.thinning import thinned
 from aesi.calibration.records.zero import zero_of
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.numerics.typing import Array
 from aesi.physics import ActiveEffect, Cell, ModelName
 from aesi.physics.cell import Soh
 from aesi.physics.simulation import MODEL_WORDS, model_with
+from aesi.physics.start.temperature import contradicted_temperature
 from aesi.pipeline.product.hybrid import HybridModel
-from aesi.records import Measurement, at_its_temperature
+from aesi.records import Hold, Measurement, at_its_temperature
 
 SEPARATOR = ": "
 TELLING_K = 5.0
-"""Further than this from a cell's reference temperature, activation energies tell: with 20 kJ/mol rates differ by a
+"""K from a cell's reference temperature beyond which activation energies tell: with 20 kJ/mol rates differ by a
 sixth. A convention."""
 
 
@@ -36,7 +38,7 @@ def together(notes: Iterable[str]) -> tuple[str, ...]:
 
 
 def temperature_sentence(cell: Cell, record: Measurement, effects: Sequence[ActiveEffect]) -> str:
-    """At what temperature a record is simulated, and on what that rests."""
+    """A sentence on the temperature at which a record is simulated, and on what that rests."""
     inferring = [active.id for active in effects if active.effect.infers == "temperature"]
     inferred, several = " and ".join(inferring), len(inferring) > 1
     if record.temperature_degc is not None:
@@ -93,13 +95,28 @@ def beyond_fitted(cell: Cell, temperatures_degc: Iterable[Array | float | None])
 def on_temperatures(
     cell: Cell, temperatures_degc: Iterable[Array | float | None], effects: Iterable[ActiveEffect] = ()
 ) -> tuple[str, ...]:
-    """All that is to be said of the temperatures that a cell is taken at: `without_energies` and `beyond_fitted`.
+    """Sentences on the temperatures that a cell is taken at: `without_energies` and `beyond_fitted`.
 
     temperatures_degc : of each record, None where it holds none and is taken as the cell's file declares, or as
     `effects` change that.
     """
     given, acting = list(temperatures_degc), model_with(cell, effects).cell
     return (*without_energies(acting, given), *beyond_fitted(acting, given))
+
+
+def of_contradiction(model: HybridModel, record: Measurement, soc0: float, hold: Hold) -> tuple[str, ...]:
+    """A sentence where the voltage of a record contradicts the temperature that it is simulated at, told on the rows
+    that a fit would see of it.
+
+    model : what is simulated, without its correction.  soc0 : at the first row.  hold : how the current runs between
+    the rows.
+    """
+    if record.temperature_degc is None or not np.all(np.isfinite(record.voltage_v)):
+        return ()
+    thin = thinned(record, model.cell.capacity_ah)
+    between = hold if thin.data is record else thin.hold
+    found = contradicted_temperature(model.cell, thin.data, soc0, between, model.effects, model.model)
+    return () if found is None else (found.sentence(record.name),)
 
 
 def of_day(cell: Cell, soh: Soh | None) -> tuple[str, ...]:

@@ -26,7 +26,14 @@ from aesi.physics.cell import Soh
 from aesi.physics.depletion import ran_out
 from aesi.physics.effects.self_heating import of_file
 from aesi.physics.rest.open_circuit import GIVEN_SD
-from aesi.pipeline.notes import of_another_model, of_day, of_fitted, on_temperatures, temperature_sentence
+from aesi.pipeline.notes import (
+    of_another_model,
+    of_contradiction,
+    of_day,
+    of_fitted,
+    on_temperatures,
+    temperature_sentence,
+)
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.product.prediction import Prediction
@@ -37,22 +44,22 @@ if TYPE_CHECKING:
     import pandas as pd
 
 DIGITS = 9
-"""Of what is written, besides the time (or the frequency)."""
+"""Significant digits of what is written, except for the time (or the frequency)."""
 SayNotes = Callable[[Iterable[str]], None]
 
 
 @dataclass(frozen=True)
 class ProfileRequest:
-    """What is said of a profile beside its file.
+    """What a user says of a profile beside its file.
 
     soc0 : state of charge at the first row; None takes it from the file's voltage, where it has one (see
     `initial_state`), else from the saved model.
-    hold : how the current runs between rows; None takes that of a saved model, and of a cell's file straight lines for
-    a profile alone and what `assumed_hold` says for a measurement.
+    hold : how the current runs between rows. None takes that of a saved model; for a cell's file, straight lines for a
+    profile without a voltage, and what `assumed_hold` says for a measurement.
     reading : how the file is read.
     self_heating : the cell warms itself, by the thermal data of its file.
     soh : share of the file's capacity that the cell had then, or the day of the test; None takes all of it.
-    run_on : of `simulate_file` alone: go on where a surface or the electrolyte runs empty or full, as `simulate` does
+    run_on : for `simulate_file` alone: go on where a surface or the electrolyte runs empty or full, as `simulate` does
     with on_depletion="clip".
     """
 
@@ -186,7 +193,7 @@ def _placed(
     *,
     saved: bool,
 ) -> _Placed:
-    """The model as it is asked for on a profile that can be of its cell, and what is assumed, said.
+    """The model asked for, on a profile that can be of its cell; says what is assumed.
 
     saved : it is one of a folder, whose hold it has where none is asked for.
     """
@@ -203,6 +210,7 @@ def _placed(
             hold_sentence(record.name, model.hold, asked.hold is not None, saved=saved),
             temperature_sentence(model.cell, record, model.effects),
             *on_temperatures(model.cell, [record.temperature_degc], model.effects),
+            *of_contradiction(model, record, start.soc, model.hold),
             *_with_effects(record, model),
             *([f"when this model was made: {model.finding}"] if model.finding else []),
         ]
@@ -254,7 +262,7 @@ def reached(cell: Cell, record: Measurement, voltage_v: Array, soc: Array) -> li
 
 
 def _too_much(soc: Array) -> str:
-    """By how much a record empties, or fills, a cell beyond what it has; from ': ' on.  soc : (n,) simulated."""
+    """Words, from ': ' on, on how far a record empties, or fills, a cell beyond what it has.  soc : (n,) simulated."""
     said = []
     if (low := -float(np.min(soc))) > GIVEN_SD:
         said.append(f"asks for more charge than the cell has, by {100 * low:.1f} % of its capacity")
@@ -265,7 +273,8 @@ def _too_much(soc: Array) -> str:
 
 
 def voltage_words(run: Run) -> str:
-    """'2.5 to 4.1 V' of a run; of one that went on where it ran out, until then, and beyond."""
+    """Range of a run's voltage, '2.5 to 4.1 V'; of one that went on where it ran out, the range until then, and
+    beyond."""
     voltage, depleted = run.voltage_v, run.series.get("depleted")
     if depleted is None or not np.any(depleted):
         return _range_v(voltage)
@@ -373,8 +382,8 @@ def _start(model: HybridModel, record: Measurement, soc0: float | None) -> Initi
 
 @contextmanager
 def _doubting(start: InitialState, say: SayNotes) -> Iterator[None]:
-    """Where a simulation fails that began at a state of charge read from a voltage, say that this is the first to
-    check."""
+    """Where a simulation fails that began at a state of charge read from a voltage, the error says to check that
+    first."""
     try:
         yield
     except SimulationError:

@@ -12,43 +12,44 @@ from typing import Literal
 MODEL = "model"
 """The folder of the model within a folder of results."""
 OF_MODEL = (".json", ".npz")
-"""Endings of the files in it."""
+"""Endings of the files in the model's folder."""
 HEAD, ARRAYS, EFFECTS = "model.json", "arrays.npz", "effects"
-"""Of a saved model: its head, its arrays, and the part (a JSON file of that name) that tells its effects."""
+"""Files of a saved model: its head, its arrays, and the part (a JSON file of that name) that tells its effects."""
 REPORT = "report.html"
 """The page of a run or of a discovery."""
 SUMMARY = "summary.json"
-"""What a run or a batch came to."""
+"""The results of a run or a batch."""
 TABLES: Mapping[Literal["md", "tex"], str] = {"md": "tables.md", "tex": "tables.tex"}
-"""Of a run, by their format."""
+"""Format -> the file of a run's tables."""
 FIGURES, PAPER_FIGURES = "figures", "paper.html"
-"""Of a run: the folder of its figures, and the page of them in it."""
+"""Folder of a run's figures, and the page of them in it."""
 FINDING, ARCHIVE = "discovery.json", "hypotheses.jsonl"
-"""Of a discovery: the finding, and the fits that it is taken up again from."""
+"""Files of a discovery: the finding, and the fits that an interrupted search goes on from."""
 ROW, CALIBRATED = "row.json", "calibrated.bpx.json"
-"""Of a cell of a batch beside that: its row of the summary, and the cell of a check-up."""
+"""Further files for a cell of a batch: its row of the summary, and the cell of a check-up."""
 SUMMARY_TABLE, SUMMARY_PAGE = "summary.csv", "index.html"
-"""Of a batch."""
+"""Files of a batch."""
 CANDIDATE = "candidate.json"
-"""Of a candidate that was rebuilt, beside its model: its genome and its figures, then and now."""
+"""File of a rebuilt candidate, beside its model: its genome and its figures, then and now."""
 EXPERIMENT, COMPARISON, COEFFICIENTS = "experiment.json", "comparison.json", "coefficients.json"
-"""In the tracking store alone: the settings of a run, what `aesi compare` draws of it, the terms of a candidate."""
+"""Files in the tracking store alone: the settings of a run, what `aesi compare` draws of it, the terms of a
+candidate."""
 
 
 def calibration_files(out: Path) -> tuple[Path, Path, Path, Path]:
-    """What a calibration writes: the cell's file, and the report beside it as data, as text and as a page."""
+    """The files that a calibration writes: the cell's, and the report beside it as data, as text and as a page."""
     data, text, page = (out.with_suffix(f".report{ending}") for ending in (".json", ".md", ".html"))
     return out, data, text, page
 
 
 def discovery_files(out: Path) -> tuple[Path, ...]:
-    """What a discovery writes below `out`, of the model's files those that are there."""
+    """The files that a discovery writes below `out`; of the model's files those that are there."""
     there = sorted(path for path in (out / MODEL).glob("*") if path.suffix in OF_MODEL)
     return out / FINDING, out / REPORT, out / ARCHIVE, *there
 
 
 def batch_files(out: Path, names: Iterable[str]) -> tuple[Path, ...]:
-    """What a batch of cells of these names writes below `out`."""
+    """The files that a batch of cells of these names writes below `out`."""
     of_cells = (
         file
         for folder in (out / name for name in names)

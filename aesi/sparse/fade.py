@@ -3,25 +3,25 @@
     c'(x) = a w(x) c(x),     w = n(x) / (1 + KAPPA max(h(x) / h_u - 1, 0)**2)                               (1)
     a = b - t s_b,     b = sum_d <e_d, n c_d> / sum_d (|n c_d|**2 + DOUBT |e_d|**2)    within [0, 1]                (2)
 
-c is what the terms say, h the leverage of x in their fit (leverage.py), n its nearness to what they were fitted to
+c is the sum of the terms, h the leverage of x in their fit (leverage.py), n its nearness to what they were fitted to
 (trained_region.py). The amplitude a is the slope of the error e on the correction over drives d that the terms of c_d
-had not seen, less its standard error s_b by the jackknife over drives, whose parts err alike and count as one; t is the
-quantile of Student's distribution for so many drives where a normal error would have one standard error: two drives
-that agree do so by chance more often than six. DOUBT is a ridge on that slope: where each drive
-lies outside of what the others visit, n c is all but zero on every one of them, and the slope would rest on nothing.
+had not seen, less t times its standard error s_b. That error is a jackknife over drives, whose parts err alike and
+count as one. t is the quantile of Student's distribution for so many drives where a normal error would have one
+standard error (the rule of one standard error, SE below): two drives agree by chance more often than six. DOUBT is a
+ridge on the slope: where each drive lies outside of what the others visit, n c is all but zero on every one of them,
+and the slope would rest on nothing.
 The leverage is not in (2), nor in what a search judges: only the chosen ensembles get it, and w = n without it.
 The ridge on the coefficients shrinks them for the noise within drives, (2) shrinks their sum for what differs between
 drives. Efron & Morris, J. Am. Stat. Assoc. 68 (1973) 117.
 
-It is for models whose terms are free of the error: in one that feeds back, an amplitude would change its dynamics.
+Only models whose terms are free of the error fade: in one that feeds back, an amplitude would change its dynamics.
 
-SE, that one, is the rule of one standard error. What follows are points that an alternative adds to the per cent taken
-off the squared error, each measured beside what it is an alternative to, over the development splits of the NMC drive
-in `aesi bench splits` (16 candidates; off the declared model's, mean; off the recalibrated one's, mean and worst). Half
-of SE -1.1; -2.5, -3.4, none of it -2.3; -5.2, -7.1. DOUBT of 0.003 -0.4; -1.0, -1.5 and of 0.1 0.0; -0.1, 0.5. KAPPA of
-0.1 in place of none, as it was in all of these, -0.2; -1.0, 4.7, and of 1 -4.2; -12.3, 8.3: it is what keeps a
-correction from harm, and takes from it where it helps. Drives and t, in place of halves of drives and 1 as in all of
-these, -0.1; -0.5, 1.0.
+What alternatives cost was measured over the development splits of the NMC drive in `aesi bench splits` (16 candidates),
+in points of the per cent taken off the squared error: off the declared model's in the mean; off the recalibrated one's
+in the mean and at worst. Half of SE: -1.1; -2.5, -3.4; none of it: -2.3; -5.2, -7.1. DOUBT of 0.003: -0.4; -1.0, -1.5;
+of 0.1: 0.0; -0.1, 0.5. KAPPA of 0.1 in place of none, as it was in all of these: -0.2; -1.0, 4.7; of 1: -4.2; -12.3,
+8.3: it keeps a correction from harm, and takes from it where it helps. Drives and t, in place of halves of drives
+and a t of 1 as in all of these: -0.1; -0.5, 1.0.
 """
 
 from __future__ import annotations

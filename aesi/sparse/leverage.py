@@ -21,9 +21,10 @@ from aesi.numerics.typing import Array
 from aesi.sparse.stridge import triangle
 
 UPPER_QUARTILE = 0.75
-"""Of h at the fitted rows: above it a row lies at their edge."""
+"""Quantile of h over the fitted rows; above it a row lies at their edge."""
 LEAST_RIDGE = 1e-12
-"""Of the largest squared diagonal: collinear terms and no ridge leave directions without any information."""
+"""Least ridge, as a share of the largest squared diagonal: collinear terms without a ridge leave directions without
+any information."""
 
 
 @dataclass(frozen=True, eq=False)

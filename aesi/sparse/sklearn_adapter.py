@@ -2,7 +2,7 @@
 
     GridSearchCV(STRidgeRegressor(), {"lambda1": np.logspace(-6, 0, 7), "lambda2": [0.01, 0.1]})
 
-Imported by nobody here: scikit-learn takes a second to load.
+No other module imports it: scikit-learn takes a second to load.
 """
 
 from __future__ import annotations

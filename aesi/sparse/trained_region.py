@@ -21,10 +21,10 @@ from aesi.numerics.typing import Array
 from aesi.numerics.visited import Visited
 
 DISTANCE = 0.3
-"""Of a scaled input, half a range being 1. Over the development splits of the NMC drive in `aesi bench splits` (16
-candidates) a distance of 0.1 loses 3.2 points of the per cent taken off the declared model's squared error in the mean
-and 5.3 at worst, 7.4 and 4.2 of those off the recalibrated one's; 0.2 loses 0.6, 1.4; 1.2, 0.9 and 0.5 loses 0.5, 8.5;
-0.5, 4.2."""
+"""Distance of (1) in units of a scaled input, half a range being 1.
+Over the development splits of the NMC drive in `aesi bench splits` (16 candidates), a distance of 0.1 takes 3.2 points
+less off the declared model's squared error in the mean and 5.3 less at worst, and 7.4 and 4.2 less off the recalibrated
+one's. A distance of 0.2 loses 0.6 and 1.4, and 1.2 and 0.9; one of 0.5 loses 0.5 and 8.5, and 0.5 and 4.2."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,8 @@ class TrainedRegion:
 
     @classmethod
     def of(cls, scaled: Array, soc: Array, temperature_degc: Array) -> Self:
-        """Of rows with scaled inputs (n, n_inputs), states of charge and temperatures (n,), NaN where not measured."""
+        """The region of rows with scaled inputs (n, n_inputs), states of charge and temperatures (n,), NaN where not
+        measured."""
         return cls(scaled.min(axis=0), scaled.max(axis=0), Visited.of(soc, temperature_degc))
 
     def nearness(self, scaled: Array, soc: Array, temperature_degc: Array | None) -> Array:

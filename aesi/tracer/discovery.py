@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -17,6 +18,7 @@ from aesi.physics.effect import ActiveEffect, Effect
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.initial_state import REST_C_RATE
 from aesi.physics.simulation import ModelName
+from aesi.physics.start.temperature import OtherTemperature
 from aesi.records import Hold, Measurement, Run
 from aesi.tracer.case.checks import check_compared, check_record, check_same_cell
 from aesi.tracer.case.energies import ACTIVATION_ENERGIES
@@ -26,7 +28,7 @@ from aesi.tracer.case.records import PreparedRecord, prepare_all, prepare_test
 from aesi.tracer.decide.beside import gathered_beside
 from aesi.tracer.decide.evidence import Answer, Evidence, gathered
 from aesi.tracer.decide.model_choice import ModelChoice, with_model
-from aesi.tracer.decide.temperatures import fitted_at_fault, left_by_fit, other_temperatures
+from aesi.tracer.decide.temperatures import fitted_at_fault, left_by_fit, of_unseen, other_temperatures
 from aesi.tracer.decide.verdict import Thresholds, Verdict
 from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_state import ModelState
@@ -100,7 +102,8 @@ class Discovery:
     contradicted : whether what explains the data leaves more of the test part than a right explanation may.
     warnings : that, records that contradict their own temperature, where the written model does worse than another one
     on the test part or on what was fitted, and where the test part has no load.
-    other_temperature : names of the records that contradict their own, and that nothing fitted at it explains.
+    other_temperature : names of the records, those that judge among them, that contradict their own, and that nothing
+    fitted at it explains.
     seconds : spent.  simulations : of the hypotheses that were tried, without what judges them.
     """
 
@@ -187,7 +190,7 @@ def discover(
         return Archive(archive, context_of(one), other_model)
 
     evidence, choice = with_model(problem, model, search, archive_of, max_effects)
-    found = _told(
+    found = _discovery_of(
         evidence, choice, tested, spent.simulations, np.random.default_rng(seed), time.perf_counter() - began
     )
     return found if max_effects else replace(found, tried=())
@@ -243,7 +246,7 @@ class _Spent:
         self.progress(tried)
 
 
-def _told(
+def _discovery_of(
     evidence: Evidence,
     choice: ModelChoice,
     tested: Sequence[PreparedRecord],
@@ -251,29 +254,21 @@ def _told(
     rng: np.random.Generator,
     seconds: float,
 ) -> Discovery:
+    """The finding.  rng : of the intervals.  simulations, seconds : spent on the search."""
     problem, verdict = evidence.path.problem, evidence.verdict
-    # What explains the data is not always what is written: it may not run over the declared range.
-    fitted = evidence.after if verdict.word == "unknown" else ModelState.of(problem, evidence.path.chosen)
-    records, others = problem.records, left_by_fit(fitted, other_temperatures(problem))
-    at_fault = fitted_at_fault(evidence.after, others)
-    if at_fault is not None:
-        evidence = replace(evidence, after=ModelState(problem), fault=at_fault, limits=())
-    declared = ModelState(problem)
+    records, declared = problem.records, ModelState(problem)
+    fitted = _fitted(evidence)
+    others = left_by_fit(fitted, other_temperatures(problem))
+    at_other = {records[k].name: other for k, other in others.items()} | of_unseen(fitted, tested)
+    evidence = _without_fault(evidence, others)
     states: States = {"before": declared, "recalibrated": evidence.recalibrated, "after": evidence.after}
     files = outcomes(records, states, tested, rng)
     inside, soc0 = evidence.after.settled()
     left = _structure_of(records, evidence.after)
-
-    def test_error(one: Explanation) -> float | None:
-        try:
-            return test_rmse_v(ModelState.of(problem, one), records, tested)
-        except AesiError:  # it was simulated on the fit part alone
-            return None
-
     return Discovery(
         cell=inside.cell,
         verdict=verdict,
-        candidates=ranking(evidence.path, verdict, test_error),
+        candidates=ranking(evidence.path, verdict, partial(_test_error_v, problem, tested)),
         files=files,
         noise_floor_v=float(np.sqrt(np.mean([r.noise_full_v**2 for r in records]))),
         before=_structure_of(records, declared),
@@ -289,16 +284,40 @@ def _told(
         notes=(choice.sentence, *_notes(evidence, tested, left), *emptied(files)),
         contradicted=contradicted_by_v(files, verdict) is not None,
         warnings=(
-            *(other.sentence(records[k].name) for k, other in others.items()),
+            *(other.sentence(name) for name, other in at_other.items()),
             *warnings(files, verdict, REST_C_RATE * problem.cell.capacity_ah),
         ),
-        other_temperature=tuple(records[k].name for k in others),
+        other_temperature=tuple(at_other),
         written={name: (evidence.after.values or {})[name] for name in evidence.after.hypothesis},
         own={state: own_parameters(states[state]) for state in ("recalibrated", "after")},
         tried=problem.competing(),
         seconds=seconds,
         simulations=simulations,
     )
+
+
+def _fitted(evidence: Evidence) -> ModelState:
+    """What explains the data; it is not always what is written, which has to run over the declared range."""
+    unknown = evidence.verdict.word == "unknown"
+    return evidence.after if unknown else ModelState.of(evidence.path.problem, evidence.path.chosen)
+
+
+def _without_fault(evidence: Evidence, others: Mapping[int, OtherTemperature]) -> Evidence:
+    """The evidence; the declared model is written where the fitted one makes up for a wrong temperature."""
+    fault = fitted_at_fault(evidence.after, others)
+    if fault is None:
+        return evidence
+    return replace(evidence, after=ModelState(evidence.path.problem), fault=fault, limits=())
+
+
+def _test_error_v(
+    problem: InverseProblem, tested: Sequence[PreparedRecord], one: Explanation
+) -> float | None:
+    """RMSE on data that no fit has seen, V; None where the model cannot be simulated there."""
+    try:
+        return test_rmse_v(ModelState.of(problem, one), problem.records, tested)
+    except AesiError:  # it was simulated on the fit part alone
+        return None
 
 
 def _notes(evidence: Evidence, tested: Sequence[PreparedRecord], left: ResidualStructure) -> tuple[str, ...]:

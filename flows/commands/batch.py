@@ -29,8 +29,8 @@ def batch(
         float,
         typer.Option(min=0.05, max=0.9, help="Last share of the data kept back, where no test is named."),
     ] = 0.3,
-    max_effects: Annotated[int, typer.Option(min=0, max=10, help="Most effects that are added.")] = 3,
-    seed: Annotated[int, typer.Option(min=0, help="Of what is drawn at random.")] = 0,
+    max_effects: options.MaxEffects = 3,
+    seed: options.Seed = 0,
     workers: Annotated[int, typer.Option(min=1, help="Cells at a time.")] = 2,
     runner: Annotated[
         Literal["local", "dask"], typer.Option(help="Processes here, or a Dask cluster.")

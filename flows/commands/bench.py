@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from aesi.errors import AesiError, InputError
 from flows.commands import complete, options, outputs
+
+if TYPE_CHECKING:
+    from flows.benchmarks.history import Entry
 
 
 def bench(
@@ -24,28 +27,12 @@ def bench(
     ] = None,
 ) -> None:
     """Time and check the project against its peers, in one run on this machine."""
-    from flows.benchmarks import BENCHMARKS, missing, run
-    from flows.benchmarks.history import read_history, regressions
+    from flows.benchmarks import run
+    from flows.benchmarks.history import regressions
 
-    if name is not None and name not in BENCHMARKS:
-        raise InputError(f"there is no benchmark {name!r}; there are: {', '.join(BENCHMARKS)}.")
-    chosen = [name] if name else list(BENCHMARKS)
-    lacking = missing(chosen)
-    if lacking:
-        command = " ".join(f"'{source}'" for source in lacking.values())
-        raise InputError(
-            f"`aesi bench {name or ''}`".replace(" `", "`")
-            + f" compares with {', '.join(lacking)}, not installed here: pip install {command}."
-        )
+    chosen = _chosen(name)
     keywords = dict(_pair(option) for option in given or [])
-    if compare and not compare.exists():
-        raise InputError(f"--compare {compare}: there is no such file.")
-    history = read_history(compare) if compare else []
-    if compare and not history:
-        raise InputError(f"{compare} holds no recorded benchmarks to compare with.")
-    for option in ("write", "report") if compare else ():
-        if option in keywords:
-            outputs.check_file(Path(str(keywords[option])), [compare], option=f"--set {option}")
+    history = _recorded(compare, keywords) if compare else []
     lines = []
     for each in chosen:
         for line in run(each, **keywords):
@@ -58,6 +45,38 @@ def bench(
 
 class Regressed(AesiError):
     """A benchmark is worse than it was."""
+
+
+def _chosen(name: str | None) -> list[str]:
+    """The benchmark of that name, or all.  Raises InputError for an unknown one, and where a peer is not installed."""
+    from flows.benchmarks import BENCHMARKS, missing
+
+    if name is not None and name not in BENCHMARKS:
+        raise InputError(f"there is no benchmark {name!r}; there are: {', '.join(BENCHMARKS)}.")
+    chosen = [name] if name else list(BENCHMARKS)
+    lacking = missing(chosen)
+    if lacking:
+        command = " ".join(f"'{source}'" for source in lacking.values())
+        raise InputError(
+            f"`aesi bench {name or ''}`".replace(" `", "`")
+            + f" compares with {', '.join(lacking)}, not installed here: pip install {command}."
+        )
+    return chosen
+
+
+def _recorded(file: Path, keywords: dict[str, object]) -> list[Entry]:
+    """The history in a file.  Raises InputError where it holds none, or the benchmark would write over it."""
+    from flows.benchmarks.history import read_history
+
+    if not file.exists():
+        raise InputError(f"--compare {file}: there is no such file.")
+    history = read_history(file)
+    if not history:
+        raise InputError(f"{file} holds no recorded benchmarks to compare with.")
+    for option in ("write", "report"):
+        if option in keywords:
+            outputs.check_file(Path(str(keywords[option])), [file], option=f"--set {option}")
+    return history
 
 
 def _pair(option: str) -> tuple[str, object]:

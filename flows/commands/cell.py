@@ -197,9 +197,7 @@ def discover(
     experiment: Annotated[
         Path | None, typer.Argument(help="An experiment file instead of --cell and --data.")
     ] = None,
-    cell: Annotated[
-        Path | None, typer.Option("--cell", help="BPX file, or a model folder that `discover` wrote.")
-    ] = None,
+    cell: options.CellUnlessExperiment = None,
     data: Annotated[
         list[Path] | None, typer.Option("--data", help="Measurement; may be given again.")
     ] = None,
@@ -225,8 +223,8 @@ def discover(
             help="Last share of the data kept back, without --test: 0.3 where none is given.",
         ),
     ] = None,
-    max_effects: Annotated[int, typer.Option(min=0, max=10, help="Most effects that are added.")] = 3,
-    seed: Annotated[int, typer.Option(min=0, help="Of what is drawn at random.")] = 0,
+    max_effects: options.MaxEffects = 3,
+    seed: options.Seed = 0,
     effect_file: options.EffectFiles = None,
     hold: options.HoldOption = None,
     only: Annotated[
@@ -256,11 +254,7 @@ def discover(
         outputs.check_folder(out, given, discovery_files(out))
     if experiment is not None:
         options.check_unsaid(context, BESIDE_AN_EXPERIMENT)
-        options.say_reading([experiment])
-        _check_experiment(experiment, list(overrides or []), out)
-        from flows.jobs.start import discover_experiment
-
-        discover_experiment(str(experiment), list(overrides or []), out, prefect)
+        _discover_experiment(experiment, list(overrides or []), out, prefect)
         return
     if cell is None or not data or out is None:
         raise InputError("give --cell, --data and --out, or an experiment file.")
@@ -293,15 +287,19 @@ def discover(
     flow(case, out, prefect)
 
 
-def _check_experiment(experiment: Path, overrides: list[str], out: Path | None) -> None:
-    """Raises InputError where the finding of an experiment would be written over a file that it names."""
-    from aesi.pipeline.experiment.config import read_experiment
+def _discover_experiment(experiment: Path, overrides: list[str], out: Path | None, prefect: bool) -> None:
+    """Raises InputError where the finding of the experiment would be written over a file that it names."""
+    options.say_reading([experiment])
     from aesi.pipeline.experiment.sources import named_files
     from flows.jobs.discovery import finding_folder
+    from flows.jobs.run_request import RunRequest
+    from flows.jobs.start import discover_experiment
 
-    config = read_experiment(experiment, overrides)
-    place = out or finding_folder(config)
-    outputs.check_folder(place, [experiment, *named_files(config).values()], discovery_files(place))
+    request = RunRequest(str(experiment), tuple(overrides))
+    place = out or finding_folder(request.config)
+    read = [experiment, *named_files(request.config).values()]
+    outputs.check_folder(place, read, discovery_files(place))
+    discover_experiment(request, out, prefect)
 
 
 def export(

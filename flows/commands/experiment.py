@@ -94,7 +94,7 @@ def compare(
         typer.Argument(help="Tracked runs (the beginning of their ids), or experiments for all of theirs."),
     ],
     out: Annotated[Path, typer.Option(help="The page to write.")] = Path("compare.html"),
-    uri: Annotated[str | None, typer.Option(help="Tracking store; the workspace's without it.")] = None,
+    uri: options.StoreUri = None,
 ) -> None:
     """Tracked runs side by side on one offline page: what differed, what came of it, where the error is."""
     outputs.check_page(out)
@@ -108,7 +108,7 @@ def compare(
 def candidate(
     run_id: Annotated[str, typer.Argument(help="A tracked candidate, or a run for the one that it chose.")],
     out: Annotated[Path, typer.Option(help="Folder for model/ and candidate.json.")],
-    uri: Annotated[str | None, typer.Option(help="Tracking store; the workspace's without it.")] = None,
+    uri: options.StoreUri = None,
 ) -> None:
     """A candidate of a search made again from the tracking store alone, with its model."""
     outputs.check_folder(out)
@@ -131,7 +131,7 @@ def ui(
         typer.Option(min=1, max=65535, help="5000 without it; 8080 with --optuna, 4200 with --prefect."),
     ] = None,
     host: Annotated[str, typer.Option(help="Loopback unless you say otherwise.")] = "127.0.0.1",
-    uri: Annotated[str | None, typer.Option(help="Tracking store; the workspace's without it.")] = None,
+    uri: options.StoreUri = None,
     optuna: Annotated[
         bool, typer.Option("--optuna", help="Optuna's dashboard, also while a search runs.")
     ] = False,

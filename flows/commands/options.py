@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
 Value = TypeVar("Value")
 
-CellOption = Annotated[
-    Path, typer.Option("--cell", help="BPX file, or a model folder that `discover` wrote.")
-]
+_CELL = typer.Option("--cell", help="BPX file, or a model folder that `discover` wrote.")
+CellOption = Annotated[Path, _CELL]
+CellUnlessExperiment = Annotated[Path | None, _CELL]
 
 
 def share(option: str) -> Callable[[float | None], float | None]:
@@ -123,6 +123,10 @@ ModelOption = Annotated[
     ),
 ]
 
+MaxEffects = Annotated[int, typer.Option("--max-effects", min=0, max=10, help="Most effects that are added.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Of what is drawn at random.")]
+StoreUri = Annotated[str | None, typer.Option("--uri", help="Tracking store; the workspace's without it.")]
+
 PrefectOption = Annotated[
     bool,
     typer.Option("--prefect/--no-prefect", envvar="AESI_PREFECT", help="Run the stages as a Prefect flow."),
@@ -134,8 +138,8 @@ READING: dict[str, Any] = {
         _LIST,
         typer.Option(
             "--column",
-            help='quantity=name, for other headers: current_a="I[A]"; also cycle=, step=; '
-            "temperature_degc= leaves it out.",
+            help='quantity=name, for other headers: current_a="I[A]", or its number, #2, where there are none; also '
+            "cycle=, step=; temperature_degc=40 states it for every row, temperature_degc= leaves it out.",
         ),
     ],
     "unit": Annotated[
@@ -249,7 +253,10 @@ def measurements(
     out = []
     for path, name in zip(paths, record_names(paths), strict=True):
         end = (until or {}).get(name)
-        out.append(read(path, reading if end is None else reading.but(stop_s=end), name=name).held(hold))
+        told = reading if end is None else reading.but(stop_s=end)
+        out.append(
+            read(path, told, None, name).held(hold)
+        )  # with all rows, as in Python: a fit thins them itself
     return tuple(out)
 
 

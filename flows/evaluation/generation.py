@@ -66,14 +66,7 @@ class Evaluation:
         working: set[str] = set()
         while waiting:
             for key in [k for k in waiting if k not in working]:
-                outcome = self._stored(key)
-                if outcome is None and self._pool.idle and self._tried(self._outcomes.claim, key, True):
-                    outcome = self._stored(key)  # finished between the look and the claim
-                    if outcome is None:
-                        self._pool.start(key, genomes[waiting[key][0]])
-                        working.add(key)
-                        continue
-                    self._tried(self._outcomes.release, key, None)
+                outcome = self._stored_or_begun(key, genomes[waiting[key][0]], working)
                 if outcome is not None:
                     self.tally.found += 1
                     yield from ((position, outcome) for position in waiting.pop(key))
@@ -85,6 +78,20 @@ class Evaluation:
             if waiting and not working:
                 time.sleep(POLL_S)
         self.tally.seconds += time.monotonic() - started
+
+    def _stored_or_begun(self, key: str, genome: Any, working: set[str]) -> Any:
+        """The stored outcome; None where there is none.  Then an idle pool begins the candidate, and its key is added
+        to `working`, unless another process has claimed it."""
+        outcome = self._stored(key)
+        if outcome is not None or not self._pool.idle or not self._tried(self._outcomes.claim, key, True):
+            return outcome
+        outcome = self._stored(key)  # finished between the look and the claim
+        if outcome is None:
+            self._pool.start(key, genome)
+            working.add(key)
+        else:
+            self._tried(self._outcomes.release, key, None)
+        return outcome
 
     def _stored(self, key: str) -> Any:
         if not self._reuse and key not in self._fresh:

@@ -53,16 +53,7 @@ def batch(
     jobs = read_plan(source, cell, soh)
     if runner == "dask":
         check_scheduler(address)
-    cells = "1 cell" if len(jobs) == 1 else f"{len(jobs)} cells, {workers} at a time,"
-    console.say(f"{cells} from {source}; results in {out}")
-    if empty := without_records(source):
-        console.say(f"no record in {', '.join(empty)}; passed over.")
-    if other := of_other_code(jobs, out):
-        were = "was" if len(other) == 1 else "were"
-        console.say(
-            f"{', '.join(other)} {were} done by another version of this program, whose figures are not compared with "
-            "this one's: done again."
-        )
+    _say_plan(console, jobs, source, out, workers)
     rows: dict[str, dict[str, Any]] = {}
     kept = f"What is done is kept in {out}; the same command goes on from there."
     with alone_in(out), kept_on_interrupt(kept), _tracked(jobs, settings, source, console) as tracker:
@@ -77,6 +68,20 @@ def batch(
     failed = sum(row["status"] == "failed" for row in rows.values())
     console.say(f"Finished in {duration(time.monotonic() - started)}; {failed} failed. Summary: {page}")
     return _ordered(jobs, rows)
+
+
+def _say_plan(console: Console, jobs: Sequence[Job], source: Path, out: Path, workers: int) -> None:
+    """What will be done, what is passed over, and what is done again."""
+    cells = "1 cell" if len(jobs) == 1 else f"{len(jobs)} cells, {workers} at a time,"
+    console.say(f"{cells} from {source}; results in {out}")
+    if empty := without_records(source):
+        console.say(f"no record in {', '.join(empty)}; passed over.")
+    if other := of_other_code(jobs, out):
+        were = "was" if len(other) == 1 else "were"
+        console.say(
+            f"{', '.join(other)} {were} done by another version of this program, whose figures are not compared with "
+            "this one's: done again."
+        )
 
 
 @contextmanager

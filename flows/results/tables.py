@@ -112,16 +112,8 @@ def _chosen(store: Store, name: str, run_ids: Sequence[str]) -> tuple[list[Any],
     """The runs asked for, else the newest finished run of each seed that shares setting and program with the newest
     run; and what is left out: all of other settings, and those of seeds that only another version of the program has
     run.
-
-    A discovery of the same experiment has a verdict and no tables.
     """
-    experiment_id = store.find_experiment(name)
-    if experiment_id is None:
-        known = sorted(e.name for e in store.client.search_experiments() if e.name != "Default")
-        there = f" Tracked so far: {', '.join(known)}." if known else " Nothing is tracked there yet."
-        raise InputError(f"no experiment {name!r} is tracked in {without_login(store.uri)}.{there}")
-    condition = f"tags.`{KIND}` = 'run' and attributes.status = 'FINISHED'"
-    finished = [run for run in store.runs(experiment_id, condition) if "verdict" not in run.data.tags]
+    finished = _finished(store, name)
     if run_ids:
         asked = {run.info.run_id: run for run in (_by_id(finished, i, name) for i in run_ids)}
         return _of_one_setting(asked), _LeftOut()
@@ -140,6 +132,17 @@ def _chosen(store: Store, name: str, run_ids: Sequence[str]) -> tuple[list[Any],
             otherwise_set.append(run)
     left_out = {seed: run for seed, run in of_others.items() if seed not in of_program}
     return _by_seed(of_program), _LeftOut(tuple(otherwise_set), tuple(_by_seed(left_out)))
+
+
+def _finished(store: Store, name: str) -> list[Any]:
+    """The finished runs of an experiment, newest first, without its discoveries, which have a verdict and no tables."""
+    experiment_id = store.find_experiment(name)
+    if experiment_id is None:
+        known = sorted(e.name for e in store.client.search_experiments() if e.name != "Default")
+        there = f" Tracked so far: {', '.join(known)}." if known else " Nothing is tracked there yet."
+        raise InputError(f"no experiment {name!r} is tracked in {without_login(store.uri)}.{there}")
+    condition = f"tags.`{KIND}` = 'run' and attributes.status = 'FINISHED'"
+    return [run for run in store.runs(experiment_id, condition) if "verdict" not in run.data.tags]
 
 
 def _by_seed(runs: Mapping[str, Any]) -> list[Any]:
@@ -188,15 +191,22 @@ def _footer(name: str, runs: Sequence[Any], left_out: _LeftOut, format: str) -> 
     for run in runs:
         told = (run.data.tags.get(tag) for tag in ("aesi.fallback", UNFITTED))
         text = " ".join((text, *filter(None, told)))
+    text += _told_of(left_out, runs[0])
+    return {"md": text, "tex": f"% {text}", "csv": f"# {text}"}[format]
+
+
+def _told_of(left_out: _LeftOut, shown: Any) -> str:
+    """Sentences on the runs that are left out, each after a space."""
+    text = ""
     if left_out.by_program:
-        text = f"{text} Left out, as of another version of the program: {_ids(left_out.by_program)}."
+        text = f" Left out, as of another version of the program: {_ids(left_out.by_program)}."
     if others := left_out.by_setting:
-        keys = _set_otherwise(runs[0].data.params, [run.data.params for run in others])
+        keys = _set_otherwise(shown.data.params, [run.data.params for run in others])
         text += (
             f" {len(others)} run{'s' if len(others) > 1 else ''} with other settings{keys and f' ({keys})'} left out: "
             f"{_some([run.info.run_id[:8] for run in others])}; --run ID takes one."
         )
-    return {"md": text, "tex": f"% {text}", "csv": f"# {text}"}[format]
+    return text
 
 
 def _ids(runs: Sequence[Any]) -> str:

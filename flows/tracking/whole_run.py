@@ -73,7 +73,7 @@ def _pairs(run_id: str, values: Mapping[str, str]) -> list[dict[str, str]]:
 
 def read_runs(tracking: Any, experiment_id: str, tag: tuple[str, str]) -> list[Any]:
     """MLflow's runs of an experiment that carry a tag of a value, newest first, those deleted left out."""
-    from mlflow.entities import Metric, Param, Run, RunData, RunInfo, RunTag
+    from mlflow.entities import Metric, Param, Run, RunData, RunTag
     from mlflow.store.tracking.dbmodels.models import SqlLatestMetric, SqlParam, SqlRun, SqlTag
     from sqlalchemy import select
 
@@ -98,23 +98,24 @@ def read_runs(tracking: Any, experiment_id: str, tag: tuple[str, str]) -> list[A
         for table, entity, place in ((SqlParam, Param, 1), (SqlTag, RunTag, 2)):
             for row in _rows_of(connection, table, ids):
                 values[row.run_uuid][place].append(entity(row.key, row.value))
-    return [
-        Run(
-            RunInfo(
-                run_id=run.run_uuid,
-                experiment_id=str(run.experiment_id),
-                user_id=run.user_id,
-                status=run.status,
-                start_time=run.start_time,
-                end_time=run.end_time,
-                lifecycle_stage=run.lifecycle_stage,
-                artifact_uri=run.artifact_uri,
-                run_name=run.name,
-            ),
-            RunData(*values[run.run_uuid]),
-        )
-        for run in found
-    ]
+    return [Run(_run_info(run), RunData(*values[run.run_uuid])) for run in found]
+
+
+def _run_info(run: Any) -> Any:
+    """A row of MLflow's table of runs as its `RunInfo`."""
+    from mlflow.entities import RunInfo
+
+    return RunInfo(
+        run_id=run.run_uuid,
+        experiment_id=str(run.experiment_id),
+        user_id=run.user_id,
+        status=run.status,
+        start_time=run.start_time,
+        end_time=run.end_time,
+        lifecycle_stage=run.lifecycle_stage,
+        artifact_uri=run.artifact_uri,
+        run_name=run.name,
+    )
 
 
 def _rows_of(connection: Any, table: Any, ids: Any) -> Any:

@@ -132,7 +132,7 @@ def test_it_keeps_the_shape_and_is_finite(effect, model):
 
 @both
 @each
-def test_it_acts(effect, model):
+def test_an_effect_moves_the_voltage(effect, model):
     skip_what_the_model_holds(effect, model)
     moved = np.abs(run(effect.activate(), model=model).voltage_v - BASES[model].voltage_v).max()
     assert moved > (0.0 if effect.id == "numerical_error" else 1e-5)
@@ -140,7 +140,7 @@ def test_it_acts(effect, model):
 
 @both
 @each
-def test_it_is_pure(effect, model):
+def test_an_effect_gives_the_same_twice_and_changes_no_input(effect, model):
     skip_what_the_model_holds(effect, model)
     time, current = TIME.copy(), CURRENT.copy()
     active = effect.activate()

@@ -31,7 +31,7 @@ def test_changing_variance_within_five_per_cent_of_the_oracle(name: str) -> None
 
 
 @pytest.mark.parametrize("name", ["spci_linear", "spci_boosted"])
-def test_changing_variance_small(name: str) -> None:
+def test_bands_follow_a_changing_variance_on_a_small_case(name: str) -> None:
     # Two periods of the variance to learn from, one to be judged on: looser than the large case.
     ratio, coverage = ratio_and_coverage(name, 9000, 6000, seed=1)
     assert ratio <= 1.10
@@ -68,7 +68,7 @@ def test_a_band_without_the_adaptive_step_misses_the_step_change() -> None:
 
 
 @pytest.mark.parametrize("name", ["split"])
-def test_exchangeable_residuals_exactly(name: str) -> None:
+def test_exchangeable_residuals_are_covered_as_often_as_their_ranks_say(name: str) -> None:
     """One fresh sample a seed: the number of hits is binomial, with a probability known from the ranks."""
     hits = 0
     for seed in range(SEEDS):

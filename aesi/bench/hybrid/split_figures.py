@@ -44,40 +44,47 @@ def _by_cell(rows: Sequence[CaseRow]) -> dict[str, list[CaseRow]]:
 
 
 def _of(rows: Sequence[CaseRow]) -> dict[str, Any]:
+    """The figures of one cell: of each model, of the best in hindsight, and how far the validation figure is off."""
     out: dict[str, Any] = {"splits": len(rows)}
-    every = [(row["models"], row.get("abroad", {})) for row in rows]
-    for name in rows[0]["models"]:
-        mine = [models[name] for models, _ in every if name in models]
-        out[name] = _spread("mser_pct", [m["mser_pct"] for m in mine])
-        recalibrated = [
-            against(test[name], test[RECALIBRATED])
-            for models, abroad in every
-            for test in (models, *abroad.values())
-            if RECALIBRATED in test
-        ]
-        if recalibrated:
-            out[name] |= _spread("mser_recalibrated_pct", recalibrated)
-        if all("coverage_pct" in m for m in mine):
-            counts = np.array([m["rows"] for m in mine], dtype=float)
-            out[name] |= {
-                "coverage_pct": float(counts @ [m["coverage_pct"] for m in mine] / counts.sum()),
-                "worst_drive_coverage_pct": min(m["worst_drive_coverage_pct"] for m in mine),
-                "winkler_mv": float(counts @ [m["winkler_mv"] for m in mine] / counts.sum()),
-            }
+    home = [row["models"] for row in rows]
+    tests = [test for row in rows for test in (row["models"], *row.get("abroad", {}).values())]
+    for name in home[0]:
+        mine = [models[name] for models in home if name in models]
+        gains = [against(test[name], test[RECALIBRATED]) for test in tests if RECALIBRATED in test]
+        out[name] = (
+            _spread("mser_pct", [m["mser_pct"] for m in mine])
+            | _spread("mser_recalibrated_pct", gains)
+            | _of_bands(mine)
+        )
     best = [
-        max(against(test[name], test[RECALIBRATED]) for name in test)
-        for test, _ in every
-        if RECALIBRATED in test
+        max(against(models[name], models[RECALIBRATED]) for name in models)
+        for models in home
+        if RECALIBRATED in models
     ]
     if best:
         out["best_in_hindsight"] = _spread("mser_recalibrated_pct", best)
-    if BEST in rows[0]["models"]:
+    if BEST in home[0]:
         gaps = [abs(r["validation_mser_pct"][BEST] - r["models"][BEST]["mser_pct"]) for r in rows]
         out["validation_minus_test"] = {"median": float(np.median(gaps)), "worst": max(gaps)}
     return out
 
 
+def _of_bands(models: Sequence[Mapping[str, Any]]) -> dict[str, float]:
+    """Coverage and Winkler score over the rows of all splits; nothing where one of the models has no band."""
+    if not all("coverage_pct" in m for m in models):
+        return {}
+    counts = np.array([m["rows"] for m in models], dtype=float)
+    return {
+        "coverage_pct": float(counts @ [m["coverage_pct"] for m in models] / counts.sum()),
+        "worst_drive_coverage_pct": min(m["worst_drive_coverage_pct"] for m in models),
+        "winkler_mv": float(counts @ [m["winkler_mv"] for m in models] / counts.sum()),
+    }
+
+
 def _spread(name: str, values: Sequence[float]) -> dict[str, float]:
+    """Mean and worst; nothing of no values."""
+    if not values:
+        return {}
     return {f"{name}_mean": float(np.mean(values)), f"{name}_worst": min(values)}
 
 

@@ -21,15 +21,16 @@ from typing import Any
 import numpy as np
 
 from aesi.bench import some_chosen
+from aesi.conformal import FreeRunBands
 from aesi.constants import MV_PER_V
 from aesi.errors import InputError
 from aesi.numerics.metrics import rms
-from aesi.numerics.typing import Array
+from aesi.numerics.typing import Array, BoolArray
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.intervals.bands import reach
 from aesi.pipeline.experiment.physics_models import DECLARED
 from aesi.pipeline.experiment.sections import RepeatsConfig
-from aesi.records import ErrorSeries
+from aesi.records import ErrorModel, ErrorSeries, FreeRun
 
 
 @dataclass(frozen=True)
@@ -131,32 +132,39 @@ def _figures(one: Fitted, tests: Sequence[ErrorSeries]) -> dict[str, Any]:
         "mser_pct": float(100.0 * (1.0 - np.mean(left**2) / np.mean(declared**2))),
         "diverged": sum(run.diverged_at is not None for run in runs),
     }
-    ends = np.cumsum([len(series) for series in tests])[:-1]
     drives = {
         series.name: {"rmse_mv": MV_PER_V * rms(part)}
-        for series, part in zip(tests, np.split(left, ends), strict=True)
+        for series, part in zip(tests, _by_record(left, tests), strict=True)
     }
     figures["drives"] = drives
     if one.bands is None:
         return figures
-    alpha = one.bands.alpha
-    bands = [
-        one.bands.intervals(series, run, reach(one.model, series))
-        for series, run in zip(tests, runs, strict=True)
-    ]
-    low = np.concatenate([band.lower_v for band in bands])
-    high = np.concatenate([band.upper_v for band in bands])
+    low, high = _band(one.bands, one.model, tests, runs)
     covered = (low <= left) & (left <= high)
-    for drive, part in zip(drives.values(), np.split(covered, ends), strict=True):
+    for drive, part in zip(drives.values(), _by_record(covered, tests), strict=True):
         drive["coverage_pct"] = 100.0 * float(part.mean())
-    figures |= {
+    return figures | {
         "rows": len(left),
         "coverage_pct": 100.0 * float(covered.mean()),
         "worst_drive_coverage_pct": min(drive["coverage_pct"] for drive in drives.values()),
         "width_mv": MV_PER_V * float(np.mean(high - low)),
-        "winkler_mv": MV_PER_V * float(np.mean(_winkler(left, low, high, alpha))),
+        "winkler_mv": MV_PER_V * float(np.mean(_winkler(left, low, high, one.bands.alpha))),
     }
-    return figures
+
+
+def _band(
+    bands: FreeRunBands, model: ErrorModel, tests: Sequence[ErrorSeries], runs: Sequence[FreeRun]
+) -> tuple[Array, Array]:
+    """Its edges over all rows, (n,) V each."""
+    along = [
+        bands.intervals(series, run, reach(model, series)) for series, run in zip(tests, runs, strict=True)
+    ]
+    return np.concatenate([band.lower_v for band in along]), np.concatenate([band.upper_v for band in along])
+
+
+def _by_record(column: Array | BoolArray, tests: Sequence[ErrorSeries]) -> list[Array]:
+    """A column over all rows, (n,), as one array a record."""
+    return np.split(column, np.cumsum([len(series) for series in tests])[:-1])
 
 
 def _winkler(left: Array, low: Array, high: Array, alpha: float) -> Array:

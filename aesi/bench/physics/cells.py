@@ -40,13 +40,14 @@ from aesi.physics import Cell, ModelName, initial_state, simulate
 from aesi.records import Measurement
 
 WINDOW_ROWS = 1024
-"""As ECM-UDE judges."""
+"""Rows of a window, as ECM-UDE judges."""
 HELD_WITHIN_V = 0.01
-"""Of the cut-off voltage: rows that a tester holds there. Of those of 0degC_cycle_1 98 % are within 5 mV below and 9
-above it."""
+"""Distance from the cut-off voltage, V, within which a tester holds the rows. Of those of 0degC_cycle_1 98 % are
+within 5 mV below and 9 above it."""
 HELD_SHARE, HELD_FROM_THEN_ON = 0.01, 0.1
-"""Of all rows, and of those from the first of them on: a record with more is one that was held from then on.
-Conventions: 8 of 45 of the Panasonic have 1 to 8 % of all, two of these 30 and 40 % from then on, six 3 to 4 %."""
+"""Shares of held rows among all, and among those from the first of them on: a record with more of both was held from
+then on. Conventions: 8 of 45 of the Panasonic have 1 to 8 % of all, two of these 30 and 40 % from then on, six 3 to
+4 %."""
 NMC, M50T = "about_energy_nmc", "lg_m50t_w8"
 START = "lg_m50_chen2020"
 ECM_UDE = (
@@ -193,31 +194,31 @@ def archive_table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
         key=lambda row: (row["cell"], degc_of(row["record"]), row["record"]),
     )
     keys = [key for key in JUDGED if any(row.get(key) is not None for row in there)]
-    shown = " | ".join(HEADINGS[key] for key in keys)
-    lines = [
-        f"| cell | chamber | records | {shown} | ran out |",
-        "|---|---|---:|" + "---:|" * (len(keys) + 1),
-    ]
-    for cell, place in dict.fromkeys((row["cell"], chamber(row["record"])) for row in there):
-        ours = [row for row in there if (row["cell"], chamber(row["record"])) == (cell, place)]
+    records = (f"    {line}" for line in _by_record(there, keys))
+    return [*_by_chamber(there, keys), "", '??? note "Each record of the archives"', "", *records]
+
+
+def _by_chamber(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Iterator[str]:
+    """Median and worst of the records of each cell and chamber that were not fitted, mV."""
+    yield f"| cell | chamber | records | {' | '.join(HEADINGS[key] for key in keys)} | ran out |"
+    yield "|---|---|---:|" + "---:|" * (len(keys) + 1)
+    for cell, place in dict.fromkeys((row["cell"], chamber(row["record"])) for row in rows):
+        ours = [row for row in rows if (row["cell"], chamber(row["record"])) == (cell, place)]
         figures = [
             [row[key] for row in ours if row.get(key) is not None and key not in row.get("fitted_mv", ())]
             for key in keys
         ]
         told = " | ".join(f"{np.median(each):.1f} / {max(each):.1f}" if each else "" for each in figures)
         out = sum("with_temperature" in row["ran_out"] for row in ours)
-        lines.append(f"| {cell} | {place} | {len(ours)} | {told} | {out or ''} |")
-    lines += [
-        "",
-        '??? note "Each record of the archives"',
-        "",
-        f"    | cell | record | mean degC | {shown} |",
-    ]
-    lines.append("    |---|---|---:|" + "---:|" * len(keys))
-    for row in there:
+        yield f"| {cell} | {place} | {len(ours)} | {told} | {out or ''} |"
+
+
+def _by_record(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Iterator[str]:
+    yield f"| cell | record | mean degC | {' | '.join(HEADINGS[key] for key in keys)} |"
+    yield "|---|---|---:|" + "---:|" * len(keys)
+    for row in rows:
         told = " | ".join(_shown(row, key) for key in keys)
-        lines.append(f"    | {row['cell']} | {row['record']} | {row['mean_degc']:.1f} | {told} |")
-    return lines
+        yield f"| {row['cell']} | {row['record']} | {row['mean_degc']:.1f} | {told} |"
 
 
 def _shown(row: Mapping[str, Any], key: str) -> str:
@@ -252,8 +253,8 @@ def _figures(cells: Path, record: MeasuredRecord, porous: bool) -> dict[str, Any
     measured = data.temperature_degc
     bare = replace(data, temperature_degc=None)
     start, calibrated = FILES[record.data]
-    runs = {"declared": free_run(cell_of(cells, record.data, start), bare)}
     best_cell = cell_of(cells, record.data, start)
+    runs = {"declared": free_run(best_cell, bare)}
     out: dict[str, Any] = {"mean_degc": None if measured is None else round(float(measured.mean()), 1)}
     if calibrated is not None:
         best_cell = cell_of(cells, record.data, calibrated)
@@ -296,7 +297,7 @@ def cell_of(cells: Path, data: str, name: str | None) -> Cell:
 
 
 NOMINAL_AH = {NCR: 2.9, HG2: 3.0}
-"""As the makers state them, for cell files of another size of the same chemistry."""
+"""Capacities as the makers state them, Ah, for cell files of another size of the same chemistry."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,17 +16,19 @@ from aesi.physics import Cell, ModelName, impedance
 from aesi.records import Spectrum
 
 BAND_HZ = (0.01, 100.0)
-"""Between them spectra are judged, and fitted: above, leads and sensors; below, an open-circuit potential's slope."""
+"""Band in which spectra are judged, and fitted: above it they show leads and sensors, below it the slope of an
+open-circuit potential."""
 ASSUMED_DEGC = 25.0
-"""Of a spectrum whose temperature was not measured; it is said."""
+"""Temperature that is assumed, and noted, for a spectrum without one."""
 SPECTRUM_SHARE = 0.1
-"""Of |Z|, what a calibrated model is expected to miss of a spectrum. Fourteen of a Panasonic NCR18650PF at 25 degC,
-fitted beside its C/20, its pulses and a 1C discharge, are left with 6 to 20 %, 10.7 % in all; its 13 at 10 degC, which
-were not, with 13.4 % instead of 15.7, and five of its drives with 1.0 mV less to 0.4 mV more than without them."""
+"""Share of |Z| that a calibrated model is expected to miss of a spectrum. Fourteen of a Panasonic NCR18650PF at 25
+degC, fitted beside its C/20, its pulses and a 1C discharge, are missed by 6 to 20 %, 10.7 % in all. Its 13 at 10
+degC, which were not fitted, are missed by 13.4 % instead of 15.7, and five of its drives by between 1.0 mV less and
+0.4 mV more than without them."""
 
 MOST_CAPACITIES = 10.0
-"""How many capacities of a cell may have been discharged of it. A convention: a record scales a start file to a cell of
-another size, and what is in mAh is a thousand times too much."""
+"""Most charge, in capacities of the cell, that may have been discharged where a spectrum was taken. A convention: a
+record scales a start file to a cell of another size, and a charge in mAh is a thousand times too large."""
 
 
 def state_of(cell: Cell, spectrum: Spectrum) -> float:

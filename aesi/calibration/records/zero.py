@@ -36,15 +36,15 @@ from aesi.records import Measurement
 SLOW_C_RATE = 0.15
 """Slow records: below this rate the zero offset of a cycler's current is a notable share of it, and is fitted."""
 ZERO_SHARE = 5e-4
-"""Of the largest current among the records: what a cycler's zero is uncertain by where no cycle tells it, 0.1 % of its
-range being usual."""
+"""Uncertainty of a cycler's zero where no cycle tells it, as a share of the largest current among the records; 0.1 %
+of a cycler's range is usual."""
 
 
 @dataclass(frozen=True)
 class Zero:
-    """What a cycler reads where no current flows: a mean (A) and a standard deviation, of all slow records alike.
+    """What a cycler reads where no current flows: mean (A) and standard deviation, the same for all slow records.
 
-    sentences : on the cycles that tell it, for a reader.
+    sentences : on the cycles that tell it.
     """
 
     mean_a: float
@@ -52,7 +52,7 @@ class Zero:
     sentences: tuple[str, ...] = ()
 
     def at(self, z: float) -> float:
-        """A, at a working coordinate."""
+        """The zero, A, at a working coordinate."""
         return self.mean_a + self.sd_a * z
 
     @property
@@ -68,7 +68,7 @@ class Zero:
 
 
 def is_slow(record: Measurement, nominal_ah: float) -> bool:
-    """Does it never go beyond C/7, but for single rows?"""
+    """Whether a record stays within C/7, except for single rows."""
     return bool(np.quantile(np.abs(record.current_a), 0.95) <= SLOW_C_RATE * nominal_ah)
 
 

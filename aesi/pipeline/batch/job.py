@@ -24,7 +24,7 @@ from aesi.pipeline.written import CALIBRATED, FINDING, REPORT, ROW
 
 @dataclass(frozen=True)
 class Settings:
-    """What all jobs of a batch share."""
+    """Settings that all jobs of a batch share."""
 
     holdout: float = 0.3
     max_effects: int = 3
@@ -81,15 +81,15 @@ def of_other_code(jobs: Iterable[Job], out: Path) -> list[str]:
 
 
 def _known(folder: Path, key: str) -> dict[str, Any] | None:
-    """The row of a job that was done with the same files, settings and code, and whose finding and page are still
-    there: a row without them has been torn out of its folder."""
+    """The row of a job that was done before, with the same files, settings and code. None where its finding or its
+    page is gone: the row would stand alone then."""
     kept = _kept(folder)
     whole = kept.get("key") == key and all((folder / name).is_file() for name in (FINDING, REPORT))
     return kept["row"] if whole else None
 
 
 def _kept(folder: Path) -> dict[str, Any]:
-    """What a job left, nothing where it left none that can be read."""
+    """The row that a job left in its folder; empty where there is none that can be read."""
     try:
         kept = json.loads((folder / ROW).read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -22,9 +22,9 @@ from aesi.physics.cell import Soh, checked_soh, read_soh
 
 CELL_FILES = ("*.bpx.json", "*.json")
 LAID_BESIDE = (".", "~$")
-"""How the names of what systems lay beside files begin: hidden ones, and locks of open workbooks."""
+"""Beginnings of the names of files that systems lay beside others: hidden ones, and locks of open workbooks."""
 OTHER_SIGNS = {";": "semicolons", "\t": "tabs"}
-"""What else separates the cells of tables, and is not read: a semicolon stands between the files of one cell."""
+"""Other separators of tables, which are refused: the semicolon stands between the files of one cell."""
 COLUMNS = ("name", "data", "cell", "test", "soc0", "soh", "specimen", "at")
 
 
@@ -50,11 +50,11 @@ class Job:
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """What is read: the cell's file (a saved model is a folder) and the records."""
+        """The files that the job reads: the cell's (a saved model is a folder) and the records."""
         return self.cell, *self.data, *self.tests
 
     def key(self, settings: str) -> str:
-        """What identifies the job: the content of its files, what each is for, and the settings it is run with."""
+        """Hash that identifies the job: content and purpose of its files, and its settings."""
         sha = hashlib.sha256(f"{settings}|{self.soc0}|{self.soh}|{bool(self.specimen)}".encode())
         for role, paths in (("cell", (self.cell,)), ("data", self.data), ("tests", self.tests)):
             for path in paths:
@@ -111,8 +111,8 @@ def _check_one_visit(source: Path, jobs: tuple[Job, ...]) -> None:
 
 
 def _check_one_cell(source: Path, jobs: tuple[Job, ...]) -> None:
-    """Raises InputError where check-ups of one specimen start from different cell files: what was lost between two is
-    told from the same beginning, or it is the difference of the files."""
+    """Raises InputError where check-ups of one specimen start from different cell files: what was lost between two
+    of them shows only from the same start, and would be mixed with the difference of the files."""
     first: dict[str, Job] = {}
     for job in (each for each in jobs if not each.unusable):
         begun = first.setdefault(job.specimen, job) if job.specimen else job
@@ -205,7 +205,7 @@ def _jobs(table: Path, stream: TextIO, cell: Path | None) -> Iterator[Job]:
 
 @dataclass(frozen=True)
 class _Row:
-    """A row of a table, and where it stands, as sentences begin with."""
+    """A row of a table, by its columns, and the place that sentences on it begin with."""
 
     table: Path
     cells: Mapping[str | None, Any]
@@ -216,7 +216,7 @@ class _Row:
         return f"{self.table}, line {self.line}"
 
     def text(self, column: str) -> str:
-        """What stands in a cell; '' where nothing does or there is no such column."""
+        """The text in a column of the row; '' where it is empty or there is no such column."""
         return (self.cells.get(column) or "").strip()
 
     def files(self, column: str) -> tuple[Path, ...]:

@@ -1,4 +1,4 @@
-"""What a batch comes to: a table of its cells, and for check-ups the trends of resistance, inventory and material."""
+"""The summary of a batch: a table of its cells, and for check-ups the trends of resistance, inventory and material."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""How many rows a search is run on: as many as the records that it fits leave it, whatever it is judged by.
+"""How many rows a search is run on. Only the records that it fits decide that, not those that judge it.
 
-What is fitted is thinned only where it has more than `MOST_ROWS` together, the longest records first. A test record
-chooses nothing, not even this: it is thinned by its own length, and one that begins with a fitted record, or continues
-it, as that one is as far as that goes, so that what was fitted is known again in it.
+Fitted records are thinned where they have more than `MOST_ROWS` together, the longest first. A test record chooses
+nothing, not even this: it is thinned by its own length. One that begins with a fitted record, or continues it, is
+thinned like that one as far as it goes, so that the fitted rows are recognised in it.
 """
 
 from __future__ import annotations
@@ -19,12 +19,13 @@ from aesi.records import Measurement
 from aesi.tracer.case.records import joined, led_by
 
 MOST_ROWS = 80_000
-"""A hypothesis is simulated hundreds of times: more rows than these take hours, and tell hardly more."""
+"""Most rows of the fitted records together: a hypothesis is simulated hundreds of times, and more rows take hours
+and tell hardly more."""
 
 
 def within_budget(case: Case) -> Case:
-    """The case with at most MOST_ROWS rows of what is fitted together, and of each test record behind what is fitted of
-    it; a note of each record says where that told."""
+    """The case with at most MOST_ROWS rows of the fitted records together, and as many of each test record behind
+    its fitted part. A note of each thinned record says so."""
     fitted = (*case.measurements, *case.good)
     most = most_rows_each([min(len(record), MAX_ROWS) for record in fitted], MOST_ROWS)
     return replace(
@@ -36,8 +37,8 @@ def within_budget(case: Case) -> Case:
 
 
 def most_rows_each(rows: Sequence[int], most: int) -> int:
-    """The most rows that each record may have, so that all have at most `most` together: what short ones do not need is
-    for the long ones.
+    """The most rows that each record may have, so that all have at most `most` together. What short records do not need
+    is left to the long ones.
 
     rows : of each.
     """
@@ -56,7 +57,8 @@ def _thinned(record: Measurement, most: int) -> Measurement:
 
 
 def _judging(record: Measurement, fitted: Sequence[Measurement], most: int) -> Measurement:
-    """A record that judges; where a fitted one leads to it, with that before it if either is thinned.
+    """A record that judges. Where a fitted record leads to it and either is thinned, it is given with that record's
+    rows before it.
 
     fitted : as they were given.  most : rows that each of them may have.
     """

@@ -27,12 +27,12 @@ from aesi.records import Measurement
 COLD = CATALOGUE["ambient_temperature"]
 """What a record may be explained by, within its own bounds."""
 STEP_K = 5.0
-"""Between the temperatures that are tried."""
+"""K between the temperatures that are tried."""
 SIZES = np.geomspace(1.0 / 16.0, 2.0, 16)
-"""Of other cells, over the declared one. 18 measured records of an LG 18650HG2 and a Panasonic NCR18650PF at -20 to 2
-degC that do not fit the files of their cells at 25 degC are 66 to 162 mV off at the best temperature, which is -25 to 5
-degC, and 1.4 times as much or more with the best size; of a 12.5 Ah pouch cell with the file of one of 30 Ah it is the
-other way round."""
+"""Sizes of other cells that are tried, over the declared one. 18 measured records of an LG 18650HG2 and a Panasonic
+NCR18650PF at -20 to 2 degC that do not fit the files of their cells at 25 degC are 66 to 162 mV off at the best
+temperature, which is -25 to 5 degC, and at least 1.4 times as much with the best size; of a 12.5 Ah pouch cell with
+the file of one of 30 Ah it is the other way round."""
 
 
 def with_cold_admitted(case: Case) -> Case:
@@ -59,7 +59,7 @@ def _admitted(given: HybridModel, record: Measurement, soc0: float | None, searc
 
 
 def _in_the_cold(given: HybridModel, record: Measurement, soc0: float | None) -> str | None:
-    """What says that the record can be of a colder cell, as a sentence; None where it cannot."""
+    """A sentence on why the record can be of a colder cell; None where it cannot."""
     coldest, _ = COLD.parameters["shift_k"].bounds
     acts = any(one.id == COLD.id for one in given.effects)
     if acts or not depends_on_temperature(given.cell) or not _allowed(given, record, coldest):
@@ -82,7 +82,7 @@ def _in_the_cold(given: HybridModel, record: Measurement, soc0: float | None) ->
 
 
 def _allowed(given: HybridModel, record: Measurement, shift_k: float) -> bool:
-    """Do charge and voltages allow the file's capacity at `shift_k` from the declared temperature?"""
+    """Whether charge and voltages allow the file's capacity at `shift_k` from the declared temperature."""
     degc = given.cell.initial_temperature_k + shift_k - ZERO_CELSIUS_K
     try:
         check_measured(given.cell, [replace(record, temperature_degc=np.full(len(record), degc))])

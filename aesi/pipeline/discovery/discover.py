@@ -28,6 +28,7 @@ from aesi.pipeline.written import ARCHIVE, FINDING, MODEL, REPORT
 from aesi.records import Measurement
 from aesi.tracer import Discovery, discover
 from aesi.tracer.discovery import Progress
+from aesi.tracer.report.candidate_effects import CandidateEffect
 from aesi.tracer.report.outcome import Errors, Part, State
 from aesi.tracer.report.own_parameters import OwnParameter
 from aesi.tracer.report.yardstick import POINTS_TO, Pointer
@@ -37,7 +38,7 @@ STATES: tuple[State, ...] = ("before", "recalibrated", "after")
 HOLDOUT = 0.3
 """Last share of the data that is kept back where there are no test records and nothing else is said."""
 ABBREVIATIONS = {"ocv": "OCV", "ocp": "OCP"}
-"""Words of effect ids that a title writes in another way."""
+"""Words of effect ids -> how titles write them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,9 +70,10 @@ class Case:
     good: tuple[Measurement, ...] = ()
     of_experiment: bool = False
 
-    def __post_init__(self) -> None:
-        """Raises DataError for a record that is given twice."""
+    def checked(self) -> Case:
+        """The case as it is.  Raises DataError for a record that is given twice."""
         check_distinct((*self.measurements, *self.good), self.tests, led=True)
+        return self
 
     @property
     def records(self) -> tuple[Measurement, ...]:
@@ -79,22 +81,22 @@ class Case:
         return (*self.measurements, *self.good, *self.tests)
 
     def with_each(self, changed: Callable[[Measurement], Measurement]) -> Case:
-        """The case with what `changed` makes of each of its records."""
+        """The case with `changed` applied to each of its records."""
         groups = (self.measurements, self.tests, self.good)
         measurements, tests, good = (tuple(map(changed, group)) for group in groups)
         return replace(self, measurements=measurements, tests=tests, good=good)
 
     @property
     def kept_back(self) -> float:
-        """The last share of each record that nothing is chosen by."""
+        """Last share of each record that chooses nothing."""
         if self.tests:
             return 0.0
         return HOLDOUT if self.holdout is None else self.holdout
 
     @property
     def restrictions(self) -> tuple[str, ...]:
-        """Sentences on effects that are not tried, so that nobody reads the verdict as one about them, and on what was
-        asked and is not used."""
+        """Sentences on effects that are not tried, so that nobody reads the verdict as one about them, and on
+        options that are not used."""
         only, without = (
             ", ".join(name.strip() for names in given for name in names.split(","))
             for given in (self.only, self.without)
@@ -114,7 +116,7 @@ class Case:
 
     @cached_property
     def assumed(self) -> tuple[str, ...]:
-        """Sentences on the temperature of the records that hold none, and on what of the declared cell is not taken."""
+        """Sentences on the temperature of records that hold none, and on what of the declared cell is left out."""
         given = self.declared()
         untold = (m for m in self.records if m.temperature_degc is None)
         without = "the saved model's learnt correction is left out: what is sought is what its physics lacks."
@@ -129,11 +131,12 @@ class Case:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was not tried, not used or assumed, and what a reader dropped, mapped or averaged in the files."""
+        """Sentences on what was not tried, not used or assumed, and on what a reader dropped, mapped or averaged in
+        the files."""
         return (*self.restrictions, *self.assumed, *(note for m in self.records for note in m.notes))
 
     def declared(self) -> HybridModel:
-        """What the cell is declared to be.  Raises CellError or InputError for what cannot be read."""
+        """The declared cell and effects.  Raises CellError or InputError for what cannot be read."""
         return declared_model(self.cell).with_soh(self.soh)
 
     def tried(self) -> dict[str, Effect]:
@@ -177,9 +180,10 @@ def write_discovery(out: Path, case: Case, found: Discovery, mlflow_run_id: str 
 
 
 def found_model(found: Discovery) -> HybridModel:
-    """The cell with what was found: in its file as far as that holds it, the rest as effects.
+    """The cell with what was found: as far as its file can hold it as values of the cell, the rest as effects.
 
-    What moves full and empty (lost lithium or active material) stays an effect, so that a state of charge is the same.
+    Lost lithium and active material, which move full and empty, stay effects, so that a state of charge keeps its
+    meaning.
     """
     inside = folded(found.cell, found.model_effects)
     if not inside.same_window(found.cell):
@@ -218,21 +222,7 @@ def discovery_content(found: Discovery, asked: Sequence[str] = ()) -> dict[str, 
         "structured_mv": MV_PER_V * verdict.structured_v,
         "tolerance_mv": MV_PER_V * verdict.tolerance_v,
         "margin": verdict.margin,
-        "candidates": [
-            {
-                "effect": c.effect,
-                "kind": c.kind,
-                "score": c.score,
-                "test_rmse_mv": None if c.test_rmse_v is None else MV_PER_V * c.test_rmse_v,
-                "parameters": {
-                    name: {"value": p.value, "low": p.low, "high": p.high, "unit": p.unit}
-                    for name, p in c.parameters.items()
-                },
-                "hypothesis": list(c.hypothesis),
-                "remark": c.remark,
-            }
-            for c in found.candidates
-        ],
+        "candidates": [_candidate_row(c) for c in found.candidates],
         "own_parameters": {state: [_own_row(one) for one in rows] for state, rows in found.own.items()},
         "files": _file_rows(found),
         "dependence": _dependence(found),
@@ -249,7 +239,7 @@ def discovery_content(found: Discovery, asked: Sequence[str] = ()) -> dict[str, 
 
 
 def _model(found: Discovery) -> dict[str, Any]:
-    """Which model of the cell every hypothesis used, and by how much the two of the declared cell differ."""
+    """The model of the cell that every hypothesis used, and how far the two models of the declared cell differ."""
     choice, told = found.choice, found.choice.reduction
     out: dict[str, Any] = {"name": choice.model, "sentence": choice.sentence}
     if told is not None:
@@ -266,6 +256,22 @@ def _errors(found: Discovery, state: State, part: Part) -> dict[str, float]:
         "rmse_mv": MV_PER_V * errors.rmse_v,
         "mae_mv": MV_PER_V * errors.mae_v,
         "max_mv": MV_PER_V * errors.max_v,
+    }
+
+
+def _candidate_row(candidate: CandidateEffect) -> dict[str, Any]:
+    test_v = candidate.test_rmse_v
+    return {
+        "effect": candidate.effect,
+        "kind": candidate.kind,
+        "score": candidate.score,
+        "test_rmse_mv": None if test_v is None else MV_PER_V * test_v,
+        "parameters": {
+            name: {"value": p.value, "low": p.low, "high": p.high, "unit": p.unit}
+            for name, p in candidate.parameters.items()
+        },
+        "hypothesis": list(candidate.hypothesis),
+        "remark": candidate.remark,
     }
 
 
@@ -297,7 +303,7 @@ def _dependence(found: Discovery) -> list[dict[str, Any]]:
 
 
 def _pointers(found: Discovery) -> list[dict[str, Any]]:
-    """None where there was too little for a correction, before or after."""
+    """Rows for each group of variables; none where the data were too few for a correction, before or after."""
     before, after = found.before.yardstick.pointers, found.after.yardstick.pointers
     if not before or not after:
         return []
@@ -315,7 +321,7 @@ def _pointers(found: Discovery) -> list[dict[str, Any]]:
 
 
 def view(found: Discovery, content: Mapping[str, Any], title: str, mlflow_run_id: str = "") -> DiscoveryView:
-    """What the report shows."""
+    """The view that the report is made of."""
     titles = {name: _title(name) for name in (*CATALOGUE, *(c.effect for c in found.candidates))}
     return DiscoveryView(
         title=title,

@@ -1,4 +1,4 @@
-"""What `aesi.discover` gives back: the verdict, its figures as a table and a plot, and the model it leads to."""
+"""The result of `aesi.discover`: the verdict, its figures as a table and a plot, and the model it leads to."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LABELS = {"before": "as declared", "recalibrated": "recalibrated", "after": "aft
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """What a discovery says of a cell.  case : what was asked.  found : the tracer's answer, whole."""
+    """The result of a discovery.  case : what was asked.  found : the tracer's answer, whole."""
 
     case: Case
     found: Discovery
@@ -47,22 +47,23 @@ class Finding:
 
     @property
     def confidence(self) -> float:
-        """Of the verdict, between 0 and 1."""
+        """Confidence of the verdict, between 0 and 1."""
         return float(self.content["confidence"])
 
     @property
     def reason(self) -> str:
-        """What the verdict rests on, in a sentence."""
+        """A sentence on what the verdict rests on."""
         return str(self.content["reason"])
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Where the test part contradicts the verdict, or the written model does worse there than another one."""
+        """Sentences on where the test part contradicts the verdict, or the written model does worse there than
+        another one."""
         return tuple(self.content["warnings"])
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was assumed, and what the reader did to the files."""
+        """Sentences on what was assumed, and on what the reader did to the files."""
         return tuple(self.content["notes"])
 
     def rmse_mv(
@@ -78,7 +79,7 @@ class Finding:
 
     @cached_property
     def content(self) -> dict[str, Any]:
-        """What discovery.json holds."""
+        """The content of discovery.json."""
         return discovery_content(self.found, self.case.notes)
 
     @cached_property

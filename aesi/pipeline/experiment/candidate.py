@@ -19,8 +19,9 @@ from aesi.sparse import Candidate, FitnessWeights, Genome, Problem, SparseModel,
 from aesi.sparse.search.genome_space import GenomeSpace
 
 CALIBRATION_RESIDUALS = 26_000
-"""What a candidate's intervals are calibrated on. Thinned to pieces that each lose their first window, this leaves
-the 20,000 rows from which SPCI needs one fit instead of six: 0.5 instead of 1.8 s a candidate at 88,200 rows."""
+"""Residuals that a candidate's intervals are calibrated on. Thinned to pieces that each lose their first window,
+these leave the 20,000 rows from which SPCI needs one fit instead of six: 0.5 instead of 1.8 s a candidate at 88,200
+rows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +67,7 @@ def _with_intervals(outcome: Candidate, problem: Problem, config: ExperimentConf
 
 
 def _scores(problem: Problem, config: ExperimentConfig, outcome: Candidate, model: SparseModel) -> Scores:
-    """How the intervals of one ensemble do on validation."""
+    """Scores of the intervals of one ensemble on validation."""
     calibration, judged = _roles(problem, outcome, model)
     conformal = config.conformal
     return validation_scores(
@@ -108,22 +109,22 @@ def _residual(model: SparseModel, record: ErrorSeries) -> _Driven:
 
 
 def scorer(problem: Problem, config: ExperimentConfig) -> partial[ScoredCandidate | Failed]:
-    """`score` with the problem and the experiment given: what a worker process calls with a genome."""
+    """`score` with the problem and the experiment bound, which a worker process calls with a genome."""
     return partial(score, problem, config)
 
 
 def weights(config: ExperimentConfig) -> FitnessWeights:
-    """gamma of the scalar fitness."""
+    """Weights (gamma) of the scalar fitness."""
     return FitnessWeights(*config.search.weights)
 
 
 def top_share(config: ExperimentConfig) -> float:
-    """Share of the candidates that are averaged: that of an ensemble's members among the resamples.
+    """Share of the candidates that are averaged: the same as that of the resamples which make an ensemble.
 
-    One alone where corrections are shrunk by what left-out drives bear out (fade.py), which takes off what was chance:
-    over the development splits of the NMC drive in `aesi bench splits` (16 candidates) the mean of the two
-    fittest takes 2.1 points less off the recalibrated model's squared error than the fittest, their mean shrunk as one
-    1.3 less.
+    It is one candidate alone where corrections are shrunk by what left-out drives bear out (fade.py), since that takes
+    off what was chance. Over the development splits of the NMC drive in `aesi bench splits` (16 candidates) the mean of
+    the two fittest takes 2.1 points less off the recalibrated model's squared error than the fittest alone, and their
+    mean shrunk as one 1.3 less.
     """
     return 0.0 if config.library.fade else config.search.top_share
 

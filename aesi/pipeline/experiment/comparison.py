@@ -1,4 +1,5 @@
-"""What a page that compares runs needs of one: how sure its figures are, its genes and terms, maps of its error."""
+"""What the page that compares runs shows of one of them: how sure its figures are, its genes and terms, maps of its
+error."""
 
 from __future__ import annotations
 
@@ -15,12 +16,12 @@ from aesi.pipeline.report.views import RecordTrace
 
 SCHEMA = "aesi.comparison/1"
 BLOCK_S = 60.0
-"""Errors forget each other within about this time; whole blocks of it are drawn again."""
+"""Length of a bootstrap block, s: errors forget each other within about this time."""
 DRAWS = 1000
 """Block-bootstrap resamples: the ends of a 90 % interval are then known to about a percentile."""
 LEVEL_PCT = 90.0
 BINS = 16
-"""Of current and of state of charge."""
+"""Bins of current, and of state of charge."""
 
 
 def comparison(result: Result) -> dict[str, Any]:

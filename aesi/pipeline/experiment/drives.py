@@ -63,7 +63,7 @@ def _repeat(series: ErrorSeries, period_s: float, number: int) -> ErrorSeries:
 
 
 WHOLE = 0.99
-"""Of a period: a logger's last rows may be missing of a repeat that is a whole one. A convention."""
+"""Share of a period from which a repeat counts as whole: a logger's last rows may be missing. A convention."""
 
 
 def cut_short(time_s: Array, repeats: RepeatsConfig) -> list[str]:
@@ -99,20 +99,20 @@ def training_drives(
 
 
 HALVES = 2
-"""A repeat is left out in two parts: a row of a test repeat between two is no further from trained ones (`cuts`)."""
+"""Parts in which a repeat is left out: a row of a test repeat between two is no further from trained ones (`cuts`)."""
 
 
 def cuts(data: DataConfig) -> int:
-    """Into how many parts a training drive is cut to be left out in turn.
+    """Number of parts that a training drive is cut into to be left out in turn.
 
-    In two for repeats of one record, which lie side by side in the state of charge. A test repeat lies between two
-    repeats of training, so that no row of it is further than half a repeat from trained ones; that is as far as half a
-    training repeat is from its other half. To leave out whole repeats would ask for more than the test does.
+    Repeats of one record, which lie side by side in the state of charge, are cut in two. A test repeat lies between two
+    training repeats, so that no row of it is further than half a repeat from trained ones; one half of a training
+    repeat is as far from its other half. To leave out whole repeats would ask for more than the test does.
     """
     return HALVES if data.repeats is not None else 1
 
 
 def parts(n: int, count: int) -> list[slice]:
-    """n rows in consecutive parts of like length."""
+    """Slices of n rows in consecutive parts of like length."""
     edges = np.linspace(0, n, count + 1).round().astype(int)
     return [slice(int(a), int(b)) for a, b in pairwise(edges)]

@@ -89,9 +89,9 @@ def final_models(
 ) -> FinalModels:
     """The chosen candidate's two ensembles, and the baselines that the experiment names, in its order.
 
-    keep : asked for each baseline; what else there is takes no fit.
-    A baseline that cannot be fitted is left out: it is what the rest is compared with, and no reason to lose the
-    search. Raises FitError where nothing else is to be judged.
+    keep : called for each baseline; the ensembles need no fit.
+    A baseline that cannot be fitted is left out, since it only serves to compare: the search is not lost for it. Raises
+    FitError where nothing else is left to judge.
     """
     fitted, unfitted = [], []
     for name in config.models:

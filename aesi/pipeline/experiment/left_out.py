@@ -67,7 +67,8 @@ class TrainingDrives:
 
     @property
     def of_several_records(self) -> bool:
-        """Then each has a charge of its own, also where one is left out."""
+        """Whether the drives are of several records. Each record then has a charge of its own, also where one is
+        left out."""
         return len({name for name, _ in self.drives}) > 1
 
     def under(self, physics: PhysicsModels) -> tuple[ErrorSeries, ...]:
@@ -78,9 +79,11 @@ class TrainingDrives:
         return training_part(self.config.data, series_under(physics, records, self.config)[0], self.roles)
 
     def left_out(self, fitted: PhysicsModels) -> tuple[PhysicsModels, LeftOutDrives]:
-        """The physics with what of it carries over, and the training drives under physics without each piece in turn.
+        """The share of the recalibrated physics that carries over, and the training drives under physics without each
+        piece in turn.
 
-        fitted : to all training rows."""
+        fitted : to all training rows.
+        """
         pieces = self.pieces()
         refitted = [self._refitted(fitted, piece) for piece in pieces.folds]
         slopes = np.array([self._slope(*each) for each in zip(refitted, pieces.folds, strict=True)])
@@ -101,7 +104,7 @@ class TrainingDrives:
         return HeldOutDrive.of(self.under(physics), piece.drive, piece.rows)
 
     def pieces(self) -> Pieces:
-        """What is left out in turn."""
+        """The pieces that are left out in turn."""
         count = cuts(self.config.data)
         lengths = [rows.stop - rows.start for _, rows in self.drives]
         return Pieces(
@@ -110,7 +113,7 @@ class TrainingDrives:
         )
 
     def as_they_are(self, train: tuple[ErrorSeries, ...]) -> LeftOutDrives:
-        """Under physics that is the same for all: as declared, or of a single drive."""
+        """The training drives under physics that is the same for all: as declared, or of a single drive."""
         pieces = self.pieces()
         made = [
             tuple(HeldOutDrive.of(train, piece.drive, piece.rows) for piece in each)
@@ -170,6 +173,6 @@ def slope_on(error: Array, taken_off: Array) -> float:
 
 
 def carried_over(slopes: Array) -> float:
-    """a of (1); the whole where no part can tell."""
+    """a of (1); 1 where no part can tell."""
     known = slopes[np.isfinite(slopes)]
     return float(np.clip(np.median(known), 0.0, 1.0)) if len(known) else 1.0

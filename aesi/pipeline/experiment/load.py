@@ -7,6 +7,7 @@ the states that its history gave it.
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -31,24 +32,26 @@ from aesi.pipeline.experiment.sources import (
     sources_of,
     with_keys,
 )
-from aesi.pipeline.notes import of_day, on_temperatures, temperature_sentence
+from aesi.pipeline.notes import of_contradiction, of_day, on_temperatures, temperature_sentence
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
-from aesi.records import Hold, LeftOutDrives, Split, hold_sentence
+from aesi.records import ErrorSeries, Hold, LeftOutDrives, Role, Split, hold_sentence
 
 DFN_NOTE = "The physics is the porous electrode: DFN in tables and figures, where others have ESPM."
 
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """What an experiment works on.
+    """The data that an experiment works on.
 
     config : the experiment as it is run, with data and cell of the fallback where `fallback` says why.
-    digests : record name -> content hash of what was measured.  notes : what a reader of the report should know
-    about the data: resampling, dropped rows, a fallback.  soc0 : state of charge at the first row, by record.
-    cell, soc0 : of the physics that is corrected (`cell.start`).  files : hash of the files that say what the cell is
-    declared to be.  left_out : the training drives under physics
-    that was fitted without a part of one (`cuts`), or without one, each in turn.
+    cell, soc0 : of the physics that is corrected (`cell.start`); soc0 is the state of charge at the first row, by
+    record.
+    left_out : the training drives under physics that was fitted without a part of one (`cuts`), or without one, in
+    turn.
+    digests : record name -> content hash of what was measured.  notes : what a reader of the report should know about
+    the data: resampling, dropped rows, a fallback.
+    files : hash of the files that declare the cell.
     """
 
     cell: Cell
@@ -75,8 +78,8 @@ class Loaded:
 def load(config: ExperimentConfig) -> Loaded:
     """Measurements, simulated and subtracted, by role.
 
-    With a `fallback` section, data that cannot be had are replaced by it; what is wrong with data that are there is
-    raised. A note says so, and the experiment's own note, which is about the data that were asked for, is left out.
+    Where a `fallback` section is given, it replaces data that cannot be had; a note says so, and the experiment's own
+    note, which is about the data that were asked for, is left out. A fault in data that are there is raised.
     Raises ConfigError or DataError naming the file and what to do.
     """
     check_roles(config)
@@ -103,7 +106,7 @@ def load(config: ExperimentConfig) -> Loaded:
 
 
 def _called(config: ExperimentConfig) -> str:
-    """What the data of an experiment are, as a person says it."""
+    """The data of an experiment, in words."""
     if config.data.kind != "virtual":
         return str(config.data.set or config.cell.bpx)
     virtual = config.data.virtual
@@ -116,43 +119,24 @@ def _load(config: ExperimentConfig) -> Loaded:
     path = cell_path(config)
     file = declared_model(path).with_soh(config.cell.soh)
     given = replace(file, effects=(*file.effects, *_effects(config)), model=config.cell.model or file.model)
-    cell, hold = given.cell, config.data.hold
     sources = sources_of(config, path)
     records, told = _on_grid(config, given, sources)
-    notes = [*cell.unread, *of_day(cell, config.cell.soh), *told]
-    drives = training_drives(config.data, records, sources.roles)
-    if config.data.repeats is not None:
-        (cut,) = records.values()
-        notes += cut_short(cut.measurement.time_s, config.data.repeats)
-    for name, rows in drives:
-        records[name].rows[rows] = True
-    training = TrainingDrives(config, records, drives, sources.roles)
-    physics = physics_models(
-        cell,
-        given.effects,
-        records,
-        hold,
-        config.cell.start,
-        model=given.model,
-        own_charges=training.of_several_records,
-    )
-    left_out = None
-    if config.cell.start == "recalibrated" and len(drives) > 1:
-        physics, left_out = training.left_out(physics)
-    if given.model == "dfn":
-        notes.append(DFN_NOTE)
-    series, empty = series_under(physics, records, config)
-    for name, record in records.items():
-        series[name] = physics.with_slopes(series[name], record, hold)
-    for name in empty:
-        if name not in sources.roles["test"]:
-            _refuse(physics, name, records[name], hold)
-        notes.append(f"{name} runs empty in the model; its kinetics were held at the edge from there on.")
+    training = _training(config, records, sources.roles)
+    physics, left_out = _physics(given, training)
+    series, of_empty = _series(physics, training)
     split = by_role(config.data, series, sources.roles)
+    notes = [
+        *given.cell.unread,
+        *of_day(given.cell, config.cell.soh),
+        *told,
+        *_of_repeats(config, records),
+        *([DFN_NOTE] if given.model == "dfn" else []),
+        *of_empty,
+    ]
     chosen = physics.chosen
     return Loaded(
         cell=chosen.cell,
-        cell_name=cell.name or path.stem,
+        cell_name=given.cell.name or path.stem,
         effects=given.effects,
         split=split,
         left_out=left_out or training.as_they_are(split.train),
@@ -163,6 +147,59 @@ def _load(config: ExperimentConfig) -> Loaded:
         model=given.model,
         files=_declared_in(path, config),
     )
+
+
+def _training(
+    config: ExperimentConfig, records: dict[str, FitRecord], roles: Mapping[Role, Sequence[str]]
+) -> TrainingDrives:
+    """The drives that train, whose rows are opened to fits in the records."""
+    drives = training_drives(config.data, records, roles)
+    for name, rows in drives:
+        records[name].rows[rows] = True
+    return TrainingDrives(config, records, drives, roles)
+
+
+def _of_repeats(config: ExperimentConfig, records: Mapping[str, FitRecord]) -> list[str]:
+    """Sentences on the repeats that a record which is cut into them ends in."""
+    if config.data.repeats is None:
+        return []
+    (cut,) = records.values()
+    return cut_short(cut.measurement.time_s, config.data.repeats)
+
+
+def _physics(given: HybridModel, training: TrainingDrives) -> tuple[PhysicsModels, LeftOutDrives | None]:
+    """The physics, and the training drives under physics that has not seen them; None where it is the same for all:
+    as declared, or of a single drive."""
+    config = training.config
+    physics = physics_models(
+        given.cell,
+        given.effects,
+        training.records,
+        config.data.hold,
+        config.cell.start,
+        model=given.model,
+        own_charges=training.of_several_records,
+    )
+    if config.cell.start == "recalibrated" and len(training.drives) > 1:
+        return training.left_out(physics)
+    return physics, None
+
+
+def _series(physics: PhysicsModels, training: TrainingDrives) -> tuple[dict[str, ErrorSeries], list[str]]:
+    """The error series of each record under the physics, with its slopes, and a sentence on each test that runs empty.
+
+    Raises SimulationError where another record does.
+    """
+    records, hold = training.records, training.config.data.hold
+    series, empty = series_under(physics, records, training.config)
+    for name, record in records.items():
+        series[name] = physics.with_slopes(series[name], record, hold)
+    for name in empty:
+        if name not in training.roles["test"]:
+            _refuse(physics, name, records[name], hold)
+    return series, [
+        f"{name} runs empty in the model; its kinetics were held at the edge from there on." for name in empty
+    ]
 
 
 def _declared_in(cell: Path, config: ExperimentConfig) -> str:
@@ -176,8 +213,8 @@ def _declared_in(cell: Path, config: ExperimentConfig) -> str:
 def _on_grid(
     config: ExperimentConfig, given: HybridModel, sources: Sources
 ) -> tuple[dict[str, FitRecord], list[str]]:
-    """The records in even rows, each with its state of charge at the first of them and no row seen by a fit yet; and
-    what was assumed and done to them, in sentences.
+    """The records in even rows, each with its state of charge at the first row and no row open to a fit yet; and
+    sentences on what was assumed and done to them.
 
     Raises DataError where one cannot be of the cell.
     """
@@ -194,12 +231,13 @@ def _on_grid(
         start = initial_state(
             cell, measurement, declared, data.hold, given.effects, shared=shared, model=given.model
         )
-        held = hold_sentence(measurement.name, data.hold, "hold" in data.model_fields_set, "data.hold: {}")
+        held = hold_sentence(measurement.name, data.hold, data.declared_hold is not None, "data.hold: {}")
         even = to_even(measurement, data.dt_s, data.hold)
         notes += [
             with_keys(start.sentence),
             held,
             temperature_sentence(cell, measurement, given.effects),
+            *map(with_keys, of_contradiction(given, even, start.soc, data.hold)),
             *map(with_keys, even.notes),
         ]
         records[name] = no_rows(even, start.soc, start.read_sd)

@@ -31,17 +31,17 @@ from aesi.sparse.ranking import svd_ranking
 SCHEMA = "aesi.summary/1"
 VERSIONS = ("aesi", "numpy", "scipy", "scikit-learn", "optuna", "mlflow", "prefect")
 SHORT: Mapping[ModelName, str] = {"espm": DECLARED, "dfn": "DFN"}
-"""How tables and figures call the physics."""
+"""Names of the physics in tables and figures."""
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """All that an experiment ended with.
+    """The end of an experiment.
 
     candidates : rows with number, oob, valid, terms, fitness, feasible, front, chosen.
     chosen : the candidates the models come from, as one.  run_id : of the tracked run.  seconds : wall time so far.
-    failed : how many candidates more were evaluated and came to nothing.  unfitted : a sentence each baseline that
-    could not be fitted.
+    failed : how many further candidates were evaluated and failed.  unfitted : a sentence on each baseline that could
+    not be fitted.
     """
 
     config: ExperimentConfig
@@ -116,7 +116,7 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
 
 
 def notes(result: Result) -> tuple[str, ...]:
-    """What a reader should know: of the data, of terms and models left out, of intervals not calibrated."""
+    """Sentences on the data, on terms and models left out, and on intervals that were not calibrated."""
     without_intervals = (note for one in result.fitted for note in one.notes)
     alone = f"The saved model is the {result.corrected} alone, without bands: {result.best} cannot be kept with it."
     told = () if result.kept else (alone,)
@@ -156,7 +156,7 @@ def hybrid(result: Result) -> HybridModel:
 
 
 def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
-    """What the report shows."""
+    """The view that the report is made of."""
     genome = result.chosen.genome
     shown = published_by(result.loaded.model)
     return RunView(

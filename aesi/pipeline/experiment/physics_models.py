@@ -33,7 +33,7 @@ from aesi.records import ErrorSeries, Hold, Measurement
 DECLARED = "ESPM"
 RECALIBRATED = "ESPM recalibrated"
 FREE = {"ESPM, one resistor": RESISTOR, "ESPM, initial state fitted": INITIAL_STATE, RECALIBRATED: ALL}
-"""Name -> the parameters that are fitted, by their places in PRIORS."""
+"""Name -> places in PRIORS of the parameters that are fitted."""
 PHYSICS_NAMES = (DECLARED, *FREE)
 
 
@@ -46,11 +46,11 @@ class PhysicsModels:
 
     @property
     def chosen(self) -> PhysicsStart:
-        """What the correction is learned on."""
+        """The physics that the correction is learned on."""
         return self.by_name[self.start]
 
     def carried(self, share: float) -> PhysicsModels:
-        """With that share of each deviation of the recalibrated one."""
+        """The models with this share of each deviation of the recalibrated one."""
         whole = self.by_name[RECALIBRATED]
         if share == 1.0:
             return self
@@ -97,7 +97,7 @@ def physics_models(
     *,
     own_charges: bool,
 ) -> PhysicsModels:
-    """All of them, fitted to the rows that the records admit; start : "declared" or "recalibrated".
+    """All physics models, fitted to the rows that the records admit; start : "declared" or "recalibrated".
 
     begin : fitted to nearly the same rows.  own_charges : see `recalibrate`.
     """

@@ -53,13 +53,13 @@ from aesi.pipeline.product.deviations import (
 from aesi.records import Hold, Measurement
 
 MODEL_ERROR_V = 0.01
-"""The least s. Models of measured cells leave 4 to 13 mV, geometric mean 9, on eight development records of `aesi bench
-real`."""
+"""Least s, V. Models of measured cells leave 4 to 13 mV, geometric mean 9, on eight development records of `aesi
+bench real`."""
 MEMORY_S = 100.0
-"""T, within the integral correlation times of those errors, 45 to 670 s. Over the same splits as below a
-recalibration takes 4.1 points less off the squared error (3.6 at worst) with half of it, 3.0 (6.3) with twice."""
+"""T, s, within the integral correlation times of those errors, 45 to 670 s. Over the splits above a recalibration
+takes 4.1 points less off the squared error (3.6 at worst) with half of it, 3.0 (6.3) with twice."""
 EVERY_S = 5.0
-"""Distance of the rows that are fitted, short against T."""
+"""s between the rows that are fitted, short against T."""
 ROUNDS = 8
 ROUNDS_AGAIN = 3
 """Gauss-Newton steps at most, from the declared cell and from a fit to nearly the same rows: with four no split of the
@@ -77,7 +77,8 @@ drive of an LFP cell, whose declared model misses 67, moved the start by 9 devia
 off; with s of what is left, by less than 1.2 and to 74. Of ten development splits of the NMC drive and two of the LG
 HG2 one changes: parts 4 and 5 take 60.0 instead of 57.2 % off the others."""
 GAIN = 0.05
-"""Of the cost: a descent ends with a step that gains less. With ten times less no split changes by 0.1 %."""
+"""Least gain of a step, as a share of the cost, before a descent ends. With ten times less no split changes by 0.1
+%."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,11 +105,11 @@ def recalibrate(
     *,
     own_charges: bool = False,
 ) -> PhysicsStart:
-    """The declared physics with its free parameters where the records' rows, and what was known of them, want them.
+    """The declared physics with its free parameters fitted to the records' rows and to what was known of them.
 
     begin : a fit of the same parameters to nearly the same rows, from which few rounds are enough.
     own_charges : the training drives are of several records, each with a charge of its own.
-    Where no row may be looked at, or nothing can be simulated, it is the declared one.
+    The declared physics comes back where no row may be looked at, or nothing can be simulated.
     """
     fit = _Fit(
         declared,
@@ -146,7 +147,7 @@ class _Fit:
     error_v: float = MODEL_ERROR_V
 
     def missed_v(self, z: Array) -> float:
-        """What the model leaves, V RMS, at deviations z (n_free,) that it can be simulated at."""
+        """V RMS that the model misses, at deviations z (n_free,) that it can be simulated at."""
         left = self._left(z)
         assert left is not None
         _, every_s = _spacing(self.records[0].measurement)  # all are evenly sampled alike
@@ -180,7 +181,7 @@ class _Fit:
         return np.vstack([slopes, np.eye(len(z))])
 
     def _left(self, z: Array) -> Array | None:
-        """What is left of the voltages, in deviations; None where the model fails."""
+        """Residual of the voltages, in deviations; None where the model fails."""
         try:
             physics = self.physics(z)
             parts = [self._of(physics, record) for record in self.records]

@@ -33,7 +33,7 @@ KEYS = {
     "--from-s": "a file of its own, by `aesi data convert --from-s`",
     "--soh": "cell.soh",
 }
-"""Option of a command that reads files -> what says the same in an experiment file."""
+"""Option of a command that reads files -> the key of an experiment file that says the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +45,7 @@ class Sources:
 
 
 def sources_of(config: ExperimentConfig, cell: Path) -> Sources:
-    """What the experiment names; cell : the BPX file from which virtual records are made.
+    """The records that the experiment names; cell : the BPX file from which virtual records are made.
 
     Raises DataError where a record that judges is fitted or chosen on as well.
     """
@@ -81,7 +81,7 @@ def named_files(config: ExperimentConfig) -> dict[str, Path]:
 
 
 def _named(sections: ExperimentConfig | FallbackConfig) -> dict[str, str]:
-    """As `named_files`, of one cell and its data, as they are written."""
+    """`named_files` of one cell and its data, as they are written."""
     cell, data = sections.cell, sections.data
     names = {} if cell.bpx == "catalogue" else {"cell": cell.bpx}
     names |= {f"cell: effect_files: {name}": name for name in cell.effect_files}
@@ -111,8 +111,9 @@ def catalogue_files(config: ExperimentConfig) -> list[Path]:
 
 
 def check_there(config: ExperimentConfig) -> None:
-    """Raises ConfigError for a file of one's own that the experiment names and that is not there, with the nearest:
-    what can be known before anything is started. Those of a fallback are asked for where it is fallen back to."""
+    """Raises ConfigError, with the nearest name, for a file of the user's own that the experiment names and that is
+    not there: this can be known before anything is started. Files of a fallback are checked where it is fallen back
+    to."""
     for what, name in _named(config).items():
         path = config.path(name)
         if not path.exists() and not (what == "cell" and config.fallback):
@@ -134,11 +135,12 @@ def discovery_records(
         experiment = virtual_experiment(config, cell)
         return experiment.train, experiment.test, ()
     placed = _placed(_locator(config), (*wanted.fit, *wanted.test, *wanted.good))
+    hold = wanted.hold or config.data.declared_hold
 
     def until(names: Sequence[str], stop_s: Mapping[str, float | None]) -> tuple[Measurement, ...]:
         reading = config.data.reading
         return tuple(
-            _record(placed[name][0], reading.but(stop_s=stop_s.get(name)), placed[name][1]).held(wanted.hold)
+            _record(placed[name][0], reading.but(stop_s=stop_s.get(name)), placed[name][1]).held(hold)
             for name in names
         )
 
@@ -180,8 +182,8 @@ def cell_path(config: ExperimentConfig) -> Path:
 
 
 def _placed(where: Callable[[str], Path], names: Sequence[str]) -> dict[str, tuple[Path, str]]:
-    """Name in the experiment -> file of the record, and what it is called: no two alike, since what is told of a record
-    is kept by its name, and files of several folders may have one."""
+    """Name in the experiment -> file of the record, and the record's own name. No two of these are alike, since
+    results are kept by them and files of several folders may share a name."""
     paths = {name: where(name) for name in names}
     called = record_names(list(paths.values()))
     return {name: (path, one) for (name, path), one in zip(paths.items(), called, strict=True)}
@@ -193,7 +195,9 @@ def _record(path: Path, reading: Reading, called: str | None = None) -> Measurem
     called : None calls it as its file is.
     """
     try:
-        return read(path, reading, name=called)
+        return read(
+            path, reading, None, called
+        )  # with all rows, whose averages are taken once, on the step asked for
     except DataError as error:
         raise DataError(with_keys(str(error))) from None
 

@@ -1,4 +1,4 @@
-"""What a cell is declared to be: by a BPX file, by a saved model, or by an object at hand."""
+"""The declared cell: by a BPX file, by a saved model, or by an object at hand."""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
 """Parameters that a cell's file declares and a drive can tell of, and a physics model some deviations away in them.
 
-A deviation is what a parametrisation leaves open that is to serve other drives as well; how each was measured is told
-in `aesi.pipeline.experiment.recalibrate`, which fits them. `slopes_v` says what each is worth in volts along a record:
-what the fitted rows leave open of the parameters, times that, is what they leave open of the voltage there.
+One deviation is what a parametrisation leaves open that is to serve other drives as well; how each was measured is told
+in `aesi.pipeline.experiment.recalibrate`, which fits them. `slopes_v` says how many volts one deviation of each is
+worth along a record. Times what the fitted rows leave open of the parameters, that gives what they leave open of the
+voltage.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from aesi.physics.simulation import model_with
 from aesi.records import Hold, Measurement, Run
 
 STEP = 0.05
-"""Of a difference quotient, in deviations."""
+"""Step of a difference quotient, in deviations."""
 
 SOC0, CONTACT, FILM = "soc0", "contact", "film"
 
@@ -54,7 +55,7 @@ RATES = {"solid_diffusivity": SOLID_EA, "charge_transfer_kinetics": RATE_ENERGY_
 """Effect -> deviation of its activation energies, as a calibration starts from; a file of one temperature keeps it."""
 POTENTIALS = "ocp_shape"
 POTENTIAL_SHARE = 0.6
-"""Of the spread that the catalogue gives for half cells of other makes."""
+"""Share of the spread that the catalogue gives for half cells of other makes."""
 BALANCE = ("active_material_loss_negative", "active_material_loss_positive", "lithium_inventory_loss")
 PRIORS = (
     FileParameter(SOC0, "shift", 0.001),
@@ -70,7 +71,8 @@ PRIORS = (
     *_waves(),
 )
 FILMS = tuple(FileParameter(FILM, side, STEP, True, FILM_ENERGY_SD) for side in ("negative", "positive"))
-"""No fit moves them, which at one temperature are like contacts; they change with it as rates do."""
+"""Films of the electrodes. No fit moves them, since at one temperature they are like contacts; with temperature they
+change as rates do."""
 ENERGIES_J_MOL = np.array([prior.energy_j_mol / prior.prior_sd for prior in (*PRIORS, *FILMS)])
 """(n_slopes,) deviation of each activation energy over that of the logarithm of its rate; 0 where there is none."""
 ALL = tuple(range(len(PRIORS)))

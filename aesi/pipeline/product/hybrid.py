@@ -37,12 +37,12 @@ from aesi.records.checked import numbers, row_words
 from aesi.sparse import SparseModel
 
 MOST_STEP = 1.5
-"""Steps of the correction between two rows, beyond which the voltage a step before the later one is not known from
-rows before it: of what would be filled in a third and more is the row's own. A convention: loggers' stamps wander by
-less."""
+"""Most distance of two rows, in steps of the correction, at which the voltage a step before the later one is known
+from earlier rows: of what would be filled in, a third and more is the later row's own. A convention: loggers' stamps
+wander by less."""
 
 END_BEFORE = ", or end the record before that (--to-s on the command line)."
-"""How a sentence on a record that runs out ends here: a correction and bands say nothing of a cell that has."""
+"""End of a sentence on a record that runs out: a correction and bands say nothing of a cell that has run out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,7 +263,8 @@ class HybridModel:
     def _with_slopes(
         self, series: ErrorSeries, record: Measurement, soc0: float, soc0_sd: float
     ) -> ErrorSeries:
-        """With what the band asks of the physics: a simulation for each parameter left open, and for the start."""
+        """The series with the slopes that the band needs of the physics: a simulation for each parameter left open,
+        and one for the start."""
         if self.bands is not None and soc0_sd > 0.0:
             physics = PhysicsStart(self.cell, self.cell, self.effects, model=self.model)
             begins_v = start_v(physics, record, soc0, soc0_sd, self.hold, series.model_v)
@@ -327,7 +328,7 @@ class HybridModel:
 
 @contextmanager
 def _as_saved(file: Path) -> Iterator[None]:
-    """What is wrong with the content of a file of a model, as a sentence that names the file."""
+    """A sentence, naming the file, on what is wrong with the content of a file of a model."""
     try:
         yield
     except CellError:

@@ -74,14 +74,14 @@ def read_model(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
 
 
 def _below(folder: Path) -> str:
-    """The newest model in a folder of runs, as a question, where somebody named that instead."""
+    """A question after the newest model in a folder of runs, where somebody named that instead."""
     heads = [head for pattern in (MODEL, f"*/{MODEL}") for head in folder.glob(f"{pattern}/{HEAD}")]
     newest = max(heads, key=lambda head: head.stat().st_mtime, default=None)
     return "." if newest is None else f"; did you mean {newest.parent}?"
 
 
 def part_file(folder: Path, name: str) -> Path:
-    """Where a part is kept."""
+    """Path of a part's file."""
     return folder / f"{name}.json"
 
 

@@ -14,14 +14,15 @@ from aesi.records import ErrorModel, ErrorSeries
 from aesi.sparse import SparseModel
 
 ALL_PCT, NONE_PCT = 99.5, 0.5
-"""What is told as 100 and as 0 %."""
+"""From and up to here a share is told as 100 and as 0 %."""
 TELLING_K = 2.0
-"""What is told of how far the mean temperature is off: by itself so much leaves 94 % of a fading correction at 25 degC,
-and 88 % at -20 degC."""
+"""K by which the mean temperature has to be off to be told: by itself that leaves 94 % of a fading correction at 25
+degC, and 88 % at -20 degC."""
 
 
 def trained_on(model: ErrorModel | None, bands: FreeRunBands | None) -> Visited | None:
-    """The charges and temperatures that a correction was trained on; None of what is none, or does not know."""
+    """The charges and temperatures that a correction was trained on; None where there is no correction, or it does
+    not know."""
     if not isinstance(model, SparseModel):
         return None
     if model.fade is not None:
@@ -62,7 +63,7 @@ def trained_figures(
 
 
 def trained_sentence(name: str, figures: Mapping[str, Any], *, one_step: bool = False) -> str:
-    """What the figures say of a record of that name, predicted in free run or one step ahead."""
+    """A sentence from the figures on a record of that name, predicted in free run or one step ahead."""
     share, kept = figures["outside_pct"], figures["kept_pct"]
     head = f"{name}: {_share(share)} of the rows lie outside the range the correction was trained on"
     where, beyond = "", figures["beyond_k"] or 0.0

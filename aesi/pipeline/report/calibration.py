@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from aesi.pipeline.impedance import SpectrumError
 
 STATES = {"before": "start file", "recalibrated": "as the file is simulated", "after": "as fitted"}
-"""Of a trace: the state of the model -> what the page calls it."""
+"""State of the model in a trace -> what the page calls it."""
 COURSES = {"diffusivity": "solid diffusivity", "rate": "reaction rate", "film": "film resistance"}
 """Quantities that follow a course over stoichiometry: in the name of a knot -> in words."""
 SIDES = {"negative": style.BLUE, "positive": style.VERMILLION}
@@ -35,7 +35,7 @@ KNOT, PERCENT = "_at_", "_percent"
 
 @dataclass(frozen=True, eq=False)
 class CalibrationView:
-    """What the page shows.
+    """Everything the page shows.
 
     content : of the report in JSON (see `aesi.pipeline.calibrate.calibration_content`).  model : its name in words.
     traces : each record as it was fitted; `before_v` is of the start file, `recalibrated_v` of the file that was
@@ -69,7 +69,7 @@ def write_calibration_report(path: str | Path, view: CalibrationView) -> Path:
 
 
 def finding(content: Mapping[str, Any]) -> str:
-    """How far off the fit is on its records, and the start file before, in free run; then the file by itself."""
+    """Sentence on how far off the records the fit is, and was the start file, in free run; then the file by itself."""
     files = content["files"]
     after, before, simulated = (
         _range([row[f"{key}_rmse_mv"] for row in files]) for key in ("after", "before", "as_simulated")
@@ -121,18 +121,12 @@ def courses(parameters: Sequence[Row]) -> dict[str, Figure]:
     """The factors at the knots over stoichiometry, both electrodes, a panel a quantity; none without knots."""
     from plotly.subplots import make_subplots
 
-    found: dict[tuple[str, str], list[tuple[float, Row]]] = {}
-    for row in parameters:
-        course, is_knot, place = row["name"].partition(KNOT)
-        side, _, what = course.partition(".")
-        if is_knot and what in COURSES and side in SIDES:
-            found.setdefault((what, side), []).append((float(place.removesuffix(PERCENT)), row))
+    found = _knots(parameters)
     shown = [what for what in COURSES if any(key[0] == what for key in found)]
     if not shown:
         return {}
     fig = make_subplots(rows=1, cols=len(shown), horizontal_spacing=0.08)
     for (what, side), knots in sorted(found.items()):
-        knots.sort(key=lambda knot: knot[0])
         rows = [row for _, row in knots]
         fig.add_scatter(
             x=[place for place, _ in knots],
@@ -161,3 +155,14 @@ def courses(parameters: Sequence[Row]) -> dict[str, Figure]:
         "little."
     )
     return {"courses": style.framed(fig, "Courses over stoichiometry", caption, 340)}
+
+
+def _knots(parameters: Sequence[Row]) -> dict[tuple[str, str], list[tuple[float, Row]]]:
+    """(quantity, electrode) -> place in the window, %, and row of each knot, in order of the places."""
+    found: dict[tuple[str, str], list[tuple[float, Row]]] = {}
+    for row in parameters:
+        course, is_knot, place = row["name"].partition(KNOT)
+        side, _, what = course.partition(".")
+        if is_knot and what in COURSES and side in SIDES:
+            found.setdefault((what, side), []).append((float(place.removesuffix(PERCENT)), row))
+    return {key: sorted(knots, key=lambda knot: knot[0]) for key, knots in found.items()}

@@ -38,7 +38,7 @@ RANGES = (
     "scatters, not how much another seed would."
 )
 MOST_COLUMNS = 40
-"""Of runs side by side; more are summed up in one column."""
+"""Most runs that are shown side by side; more are summed up in one column."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +70,7 @@ class ComparedRun:
 
 @dataclass(frozen=True)
 class ComparedCell:
-    """Text, what it sorts by (None: the text), and the range below it."""
+    """A cell of a table: its text, what it sorts by (None: the text), and the range below it."""
 
     text: str
     sort: float | None = None
@@ -118,14 +118,15 @@ def differing_settings(runs: Sequence[ComparedRun]) -> list[str]:
 
 
 def _finding(runs: Sequence[ComparedRun]) -> str:
-    """What came of the runs: which errs least in free run, and whether a correction helped; the verdicts."""
+    """A sentence on the runs: which errs least in free run, whether a correction helped, and the verdicts."""
     return (
         " ".join(filter(None, (_least(runs), _harmed(runs), _found(runs)))) or f"{len(runs)} runs compared."
     )
 
 
 def _least(runs: Sequence[ComparedRun]) -> str:
-    """The run that errs least, where all were judged on the same and the figures as shown tell it from the next."""
+    """A sentence on the run that errs least, or on why none does: the runs were judged on different records, or the
+    figures as shown do not tell it from the next."""
     if not _judged_alike(runs):
         count = sum(FREE_RUN_MV in run.metrics for run in runs)
         return (

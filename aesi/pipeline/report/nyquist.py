@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from aesi.pipeline.impedance import SpectrumError
 
 SHOWN = 6
-"""Spectra of one temperature that a figure can hold."""
+"""Most spectra of one temperature in a figure."""
 
 
 def nyquist(spectra: Sequence[SpectrumError], title: str) -> Figure:
@@ -47,7 +47,7 @@ def nyquist(spectra: Sequence[SpectrumError], title: str) -> Figure:
 
 
 def nyquist_figures(spectra: Sequence[SpectrumError]) -> dict[str, Figure]:
-    """By name on the page, a temperature each."""
+    """A figure for each temperature, by its name on the page."""
     groups: dict[str, list[SpectrumError]] = {}
     for spectrum in spectra:
         degc = spectrum.measured.temperature_degc

@@ -125,7 +125,7 @@ def _fixed(value: Any, digits: int = 1, unit: str = "") -> str:
 
 
 def _significant(value: Any, digits: int = 3) -> str:
-    """To so many digits; what is up to a million is written out and not as a power of ten."""
+    """The number in so many significant digits, without a power of ten up to a million."""
     if not _known(value):
         return ABSENT
     text = f"{value:.{digits}g}"

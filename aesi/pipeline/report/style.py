@@ -57,6 +57,6 @@ def model_colours(names: Sequence[str], physics: str) -> dict[str, str]:
 
 
 def translucent(colour: str, alpha: float = 0.22) -> str:
-    """The same colour as rgba."""
+    """A colour as rgba, with this opacity."""
     red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
     return f"rgba({red},{green},{blue},{alpha:g})"

@@ -1,7 +1,7 @@
-"""The tables of the paper, from plain rows: what stands in which.
+"""The tables of the paper, from plain rows: which figures stand in which.
 
-A row is an entry of `models` in a run's summary.json. Every value is optional and shows as a dash where it is
-absent; beyond the published schema a row may carry
+A row is an entry of `models` in a run's summary.json. Every value is optional and shows as a dash where it is absent;
+beyond the published schema a row may carry
 
     validation_mser_pct   over training drives that chose nothing
     free_run   {train,valid,test}_{mser_pct,mser_recalibrated_pct,rmse_mv}, diverged (the number of records left behind)
@@ -70,7 +70,7 @@ def interval_table(models: Sequence[Row]) -> Table:
 
 
 def method_table(models: Sequence[Row]) -> Table:
-    """What the method of the intervals buys: the same residuals, calibrated by each method."""
+    """The methods of the intervals beside each other, calibrated on the same residuals."""
     rows = [
         {"name": f"{row['name']}, {method}", "by_method": figures}
         for row in _having(models, "intervals_by_method")
@@ -231,7 +231,7 @@ def _horizons(row: Row) -> list[str]:
 
 
 def _brackets(models: Sequence[Row]) -> str:
-    """What stands in brackets, for the caption; '' where a row is of one run."""
+    """Words for the caption on what stands in brackets; '' where a row is of one run."""
     seeds = max((int(row.get("seeds") or 0) for row in models), default=0)
     return f" In brackets: lowest and highest of {seeds} seeds." if seeds else ""
 

@@ -23,7 +23,7 @@ TELLING_SHARE = 0.01
 """A share of the residual's variance below this is not worth a bar."""
 
 NOT_COMPARED: dict[str, Any] = {"free_run": None, "one_step": None, "intervals": None}
-"""Of a model that the experiment does not name among those that it compares: there are no figures."""
+"""Row of a model that the experiment does not name among those that it compares: it has no figures."""
 
 
 def write_run_report(path: str | Path, view: RunView) -> Path:

@@ -1,9 +1,9 @@
-"""What a user would pick instead, on the same features and splits; each a function of problem and tuning.
+"""Baselines: what a user would pick instead, on the same features and splits, each a function of problem and tuning.
 
-Those that try several settings judge them as the search does: losses in its regime, its weights, its constraints.
-SINDy-C and ridge, where no term holds the error, and boosted trees fade as its candidates do while these are judged.
-None has the leverage in its fade, which the ensembles get once they are chosen; constant, PySINDy's median and DMD do
-not fade.
+Those that try several settings judge them as the search does: by losses in its regime, its weights and its constraints.
+While they are judged, SINDy-C and ridge (where no term holds the error) and boosted trees fade as the search's
+candidates do. None has the leverage in its fade, which the ensembles get only once they are chosen. The constant,
+PySINDy's median and DMD do not fade.
 """
 
 from collections.abc import Callable

@@ -23,11 +23,11 @@ class HasFitness(Protocol):
 
 
 class Bred(HasFitness, Protocol):
-    """What an evaluation gives: its genome, and how fit it is."""
+    """Result of an evaluation: its genome, and how fit it is."""
 
     @property
     def genome(self) -> Genome:
-        """What was evaluated."""
+        """The genome that was evaluated."""
         ...
 
 

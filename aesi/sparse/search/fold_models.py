@@ -1,12 +1,12 @@
-"""The models behind free-run residuals: each fitted on all training rows but one long piece, and that piece.
+"""Models behind free-run residuals: each is fitted to all training rows but one long piece, on which it is then tried.
 
 The search may judge candidates on shorter pieces (`Options.fold`); the drift of a free run shows only over a long one.
 
-They are fitted, as the model that is served, to what physics fitted to all training drives leaves, and meet the piece
-under physics that has not seen it. Fitted to what that physics leaves of the other rows, as the search judges, they
-came out better than drives of the test did: over the development splits in `aesi bench splits` the bands of AESI I then
-covered 87 % of the NMC drive and 51 % of the LG M50T's, instead of 90 and 66 %, at Winkler scores of 51.1 and 40.8
-instead of 50.8 and 29.0 mV.
+Like the model that is served, they learn the error of physics that was fitted to all training drives; they are tried on
+the piece under physics that has not seen it. Had they learnt the error of physics that has not seen the piece, as the
+search does, they would come out better than on the drives of the test: over the development splits in `aesi bench
+splits` the bands of AESI I then covered 87 % of the NMC drive and 51 % of the LG M50T's, instead of 90 and 66 %, at
+Winkler scores of 51.1 and 40.8 instead of 50.8 and 29.0 mV.
 """
 
 from __future__ import annotations
@@ -58,13 +58,7 @@ def fold_models(
     drives = problem.folds_are_drives
     if cut is None:
         cut = problem.folds if drives else pieces(problem.spans, max(1, n // N_PIECES))
-    augmented = np.empty((n, len(active) + 1), order="F")
-    augmented[:, :-1] = problem.theta(active).T
-    augmented[:, -1] = problem.target
-    augmented *= np.sqrt(problem.row_weights)[:, None]
-    q_rows, r = orthonormal(augmented)
-    factors = triangular_factors(weighted_grams(q_rows, leave_out_weights(cut, n)), r)
-    for i, ((a, b), factor) in enumerate(zip(cut, factors, strict=True)):
+    for i, ((a, b), factor) in enumerate(zip(cut, _factors_without(problem, active, cut), strict=True)):
         coefficients = sum((member.coefficients(factor) for member in members), start=np.zeros(len(active)))
         if not coefficients.any():
             continue
@@ -79,6 +73,17 @@ def fold_models(
             model = replace(model, fade=Fade(judged.fade.amplitude, region))
         record, rows = fold_samples(problem, a, b)
         yield model, left_out[i].series if drives and left_out else record, rows
+
+
+def _factors_without(problem: Problem, active: IntArray, cut: Sequence[Span]) -> Array:
+    """(pieces, m + 1, m + 1) triangular factors of the active terms (m,) and the target, each without one piece."""
+    n = len(problem.target)
+    augmented = np.empty((n, len(active) + 1), order="F")
+    augmented[:, :-1] = problem.theta(active).T
+    augmented[:, -1] = problem.target
+    augmented *= np.sqrt(problem.row_weights)[:, None]
+    q_rows, r = orthonormal(augmented)
+    return triangular_factors(weighted_grams(q_rows, leave_out_weights(cut, n)), r)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +128,8 @@ def _terms(problem: Problem, candidate: Candidate, stable: bool) -> IntArray:
 
 
 def with_leverage(model: SparseModel, problem: Problem, lambda1: float) -> SparseModel:
-    """The model with the leverage of a fit of its terms to all training rows, by which it fades, too, if it does."""
+    """The model with the leverage of a fit of its terms to all training rows. If the model fades, it fades by that,
+    too."""
     number = {term: j for j, term in enumerate(problem.library.terms)}
     which: IntArray = np.array([number[term] for term in model.library.terms])
     return replace(model, leverage=Leverage.of(problem.full_factor[:, which], lambda1, problem.theta(which)))

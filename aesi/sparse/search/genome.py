@@ -55,7 +55,7 @@ class Genome:
         d: int,
         feedback: bool = True,
     ) -> Genome:
-        """From a mask over the library's terms."""
+        """A genome with the terms of a mask over the library."""
         return cls(pack(np.fromiter(chosen, dtype=bool)), lambda1, lambda2, tau, p_c, d, feedback)
 
     @classmethod
@@ -88,7 +88,7 @@ class Genome:
         return hashlib.sha256("\n".join(names).encode()).hexdigest()[:16]
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON values."""
+        """Plain JSON values."""
         return dict(self.__dict__)
 
     @classmethod

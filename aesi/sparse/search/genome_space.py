@@ -49,10 +49,10 @@ class GenomeSpace:
         )
 
     def plain_starts(self) -> tuple[Genome, ...]:
-        """What a user would try first: the whole library under a strong ridge, with and without feedback.
+        """The genomes that a user would try first: the whole library under a strong ridge, with and without feedback.
 
-        A search that begins with them never ends below them. Begun at random alone, searches of 100 to 200
-        candidates on a measured cell now and then stayed with a dozen terms and half of the reduction.
+        A search that begins with them never ends below them. Begun at random alone, searches of 100 to 200 candidates
+        on a measured cell now and then stayed with a dozen terms and half of the reduction.
         """
         extents = {(min(1, self.p_c[1]), min(2, self.d[1])), (self.p_c[1], self.d[1])}
         return tuple(

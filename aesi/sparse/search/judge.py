@@ -17,7 +17,7 @@ from aesi.sparse.search.problem import Problem
 from aesi.sparse.search.rows import balanced_weights, spans_of
 
 _MOST_MEMORY = 0.9999
-"""Of what is left of an error after a step; at 1 the first error would never be forgotten."""
+"""Largest share of an error that is left after a step; at 1 the first error would never be forgotten."""
 
 
 @dataclass(frozen=True)

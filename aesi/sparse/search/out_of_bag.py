@@ -21,7 +21,7 @@ from aesi.sparse.search.judge import drive_of, free_predictions, one_step_predic
 from aesi.sparse.search.problem import Problem
 
 _ROWS_AT_ONCE = 1024
-"""They bound the memory; nothing else depends on them."""
+"""Rows that are worked on at once; it bounds the memory, and no result depends on it."""
 
 
 def out_of_bag(problem: Problem, active: IntArray, fits: Array, resamples: IntArray) -> Array:

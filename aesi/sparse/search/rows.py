@@ -51,7 +51,7 @@ class TrainingRows:
 
 
 def training_rows(train: Sequence[ErrorSeries], library: Library, outside: Outside) -> TrainingRows:
-    """Of records with the inputs of the library.  Raises DataError for fewer rows than terms."""
+    """Training rows of records that have the inputs of the library.  Raises DataError for fewer rows than terms."""
     scaling = Scaling.of([variables(record) for record in train], outside)
     scaled = [scaling.apply(variables(record)[:-1]) for record in train]
     rows = np.vstack(scaled)

@@ -31,7 +31,7 @@ class UnseenErrors:
 
 
 def refits_physics_per_fold(drives: bool, feedback: bool, parts: int, folds: int) -> bool:
-    """Is each fold judged by the error of physics that was fitted without it?
+    """Whether each fold is judged by the error of physics that was fitted without it.
 
     drives : whether folds are whole records or parts of them; there is no such physics of pieces of rows.
     feedback : whether terms may hold the error itself: then all is judged by the physics that is served.

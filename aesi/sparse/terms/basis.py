@@ -14,7 +14,7 @@ from aesi.numerics.compiled import kept_njit
 from aesi.numerics.typing import Array, IntArray
 
 MAX_ORDER = 5
-"""Of Chebyshev polynomials; the functions after them are special ones."""
+"""Highest order of the Chebyshev polynomials; the functions after them are special ones."""
 FUNCTIONS = ("1", "T1", "T2", "T3", "T4", "T5", "sin", "cos", "tan", "sinh", "cosh", "tanh")
 SPECIAL = range(MAX_ORDER + 1, len(FUNCTIONS))
 """The numbers of the functions that are not polynomials."""

@@ -40,7 +40,7 @@ class Term:
     factors: tuple[Factor, ...] = ()
 
     def name(self, variables: Sequence[str]) -> str:
-        """As in `T1(I)*T1(c_e0)`."""
+        """Readable name, such as `T1(I)*T1(c_e0)`."""
         return "*".join(f"{FUNCTIONS[f]}({variables[v]})" for v, f in self.factors) or "1"
 
     @property
@@ -59,7 +59,7 @@ class Term:
         return next((f for v, f in self.factors if v == 0), 0)
 
     def without_error(self) -> Term:
-        """The part that depends on the inputs alone."""
+        """The term without its factor in the error: it depends on the inputs alone."""
         return Term(tuple(factor for factor in self.factors if factor[0] != 0))
 
 

@@ -68,7 +68,7 @@ class Scaling:
         return float(0.5 * (self.high[0] - self.low[0]))
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON values."""
+        """Plain JSON values."""
         return {"low": self.low.tolist(), "high": self.high.tolist(), "outside": self.outside}
 
     @classmethod

@@ -21,16 +21,17 @@ FEWEST = 4
 SEEN_SHARE = 2.0 / 3.0
 """Share of the blocks, from the first on, that is fitted in the fold that leaves out the end."""
 FEWEST_MEASURED = 6
-"""Blocks that one record of a measured cell may always have; more need as many independent samples of the model error,
-which lasts longer there."""
+"""Blocks that a record of a measured cell may have in any case. It has more only where it holds as many independent
+samples of the model error, which lasts longer there."""
 RANGES = 3
 """Ranges of the current's RMS, and of the state of charge, by which blocks are left out together."""
 WINDOW_S = 20.0
-"""What is gone from a mean over so long is an error within seconds: it lasts 4 to 6 s on six development records. Over
-60 s it is 7 to 10 s, since the drift of what lasts is part of it (`python -m aesi.bench.fast_error`)."""
+"""Length of the window, s, that tells an error within seconds from a lasting one: what differs from the window's
+mean counts as an error within seconds. Its correlation time is 4 to 6 s on six development records; with windows of
+60 s it is 7 to 10 s, since part of the slow drift is then counted in (`python -m aesi.bench.fast_error`)."""
 OTHER_RATE = 1.1
-"""Times the smallest mean of such a range that the largest one has to be: where the current never changes there is one
-rate. A convention."""
+"""The largest mean of the ranges of current has to be at least this many times the smallest, or they are no
+different rates: a current that never changes is one rate. A convention."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +69,7 @@ class Windows:
         return np.flatnonzero(np.diff(self.of_row, prepend=-1))
 
     def means(self, columns: Array) -> Array:
-        """Of each column (n, m) over the window of each row."""
+        """(n, m) for each row, the mean of each column (n, m) over the row's window."""
         weighted = columns * self.row_weight[:, None]
         return np.asarray(np.add.reduceat(weighted, self._opens, axis=0)[self.of_row])
 

@@ -29,7 +29,8 @@ FOREIGN_CELL_V = 0.25
 file of an LG M50, sized to cells of other makes, errs by 50 to 115 mV RMS on their drives from 10 to 40 degC
 (`aesi bench cells`, declared; docs/cells.md). At 0 degC and below it errs by 100 mV and more, 468 at worst."""
 CONDITIONS = 5
-"""Of an unmeasured quantity, over its range: a cell at -10 degC whose temperature nobody gives is off by 290 mV."""
+"""Values that are tried of a quantity that was not measured, evenly over its range: a cell at -10 degC whose
+temperature nobody gives is off by 290 mV."""
 
 
 def check_compared(problem: InverseProblem) -> None:
@@ -102,7 +103,8 @@ def _typical_v(record: PreparedRecord, voltage_v: Array) -> float:
 
 
 def _unmeasured(problem: InverseProblem, record: PreparedRecord) -> Iterator[ActiveEffect]:
-    """Over the range of each effect of one parameter that infers what the record does not hold."""
+    """Active effects that stand in for what the record does not hold (its temperature): those of one parameter, at
+    `CONDITIONS` values over its range."""
     for effect in problem.effects.values():
         if effect.infers is None or record.data.temperature_degc is not None or len(effect.parameters) != 1:
             continue

@@ -39,8 +39,8 @@ def fitted_kelvin(cell: Cell) -> float | None:
 
 
 def far_from_file(cell: Cell, data: Measurement, supposed: bool) -> bool:
-    """Is a record further from the one temperature that the file was fitted at than records have to be to tell
-    energies?
+    """Whether a record's temperature is further from the one that the file was fitted at than records must lie apart
+    for a fit to tell activation energies.
 
     supposed : whether an effect says what temperature it had, where that was not measured.
     """
@@ -53,10 +53,10 @@ def far_from_file(cell: Cell, data: Measurement, supposed: bool) -> bool:
 
 
 def energies_of(cell: Cell) -> Effect:
-    """The effect that gives the rates of a file that was fitted at one temperature other activation energies, its rates
-    there as they are; not those that do not change with temperature by the file.
+    """The effect that changes the activation energies of a file that was fitted at one temperature. The rates at that
+    temperature stay; rates that do not depend on temperature by the file stay everywhere.
 
-    The spread of each is the root mean square of what the file's is off by, if what is known of it is right.
+    The spread of each energy is the root mean square by which the file's is off, if what is known of it is right.
     """
     parameters, declared = {}, {}
     for (part, rate), known in energy_priors(cell).items():

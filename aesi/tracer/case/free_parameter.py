@@ -25,11 +25,12 @@ CAPACITY_SHARE = "capacity_share"
 OF_ONE_RECORD = (STATE_OF_CHARGE, CAPACITY_SHARE)
 """Owners of what is a record's and not the cell's; the name of the parameter is the number of the record."""
 OF_ALL_RECORDS = " of all records"
-"""Ends the owner of a declared parameter that good records and others share, beside an effect of the others alone."""
+"""Ending of an owner's name: a declared parameter that good records and others share, beside an effect that acts on
+the others alone."""
 FURTHEST_SDS = 4.0
 """An own parameter may not leave this many of its standard deviations."""
 TINY = 1e-6
-"""Of a standard deviation of the prior: what is closer to a bound counts as on it."""
+"""A coordinate counts as on a bound where it is nearer than this, in standard deviations of the prior."""
 
 
 @dataclass(frozen=True)
@@ -88,27 +89,27 @@ class FreeParameter:
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Of x."""
+        """(lower, upper) of x."""
         return self.coordinate(self.low), self.coordinate(self.high)
 
     @property
     def start(self) -> float:
-        """Of x, of an effect's parameter: a third of the way to its typical value where it is an amplitude."""
+        """Where x starts for an effect's parameter: an amplitude a third of the way to its typical value."""
         return (1.0 / 3.0 if self.amplitude else 1.0) * self.coordinate(self.typical)
 
     def ends(self, x: float) -> tuple[bool, bool]:
-        """Is x at its lower bound, and at its upper one?"""
+        """Whether x is on its lower bound, and whether it is on its upper one."""
         lowest, highest = at_ends(x, *self.bounds)
         return bool(lowest), bool(highest)
 
     def told(self, value: float) -> float:
-        """A value as it is written down: the bound itself where it counts as on it, without what round-off leaves."""
+        """A value as results state it: the bound itself where it counts as on it, free of round-off."""
         lowest, highest = self.ends(self.coordinate(value))
         return self.low if lowest else self.high if highest else value
 
     def on_bound(self, x: float) -> bool:
-        """True where an effect's parameter ended on the bound of what is plausible. Its neutral point is no such bound,
-        nor is the end of what can be meant at all (a share of 0 or 1)."""
+        """True where an effect's parameter ended on the bound of what is plausible. The neutral value is no such
+        bound, nor is a limit that no value can pass (a share of 0 or 1)."""
         if self.own or not (self.amplitude or self.log):
             return False
         (low, high), (lowest, highest) = self.bounds, self.ends(x)
@@ -117,13 +118,14 @@ class FreeParameter:
 
 
 def at_ends(x: Array | float, low: Array | float, high: Array | float) -> tuple[BoolArray, BoolArray]:
-    """Are coordinates at the lower ends of their ranges, and at the upper ones? Of the shape of x, as low and high."""
+    """Whether each coordinate is at the lower end of its range, and whether at the upper; two arrays of the shape of
+    x."""
     return np.asarray(x - low < TINY), np.asarray(high - x < TINY)
 
 
 def of_effect(effect: str, parameters: Mapping[str, Parameter], capacity_ah: float) -> list[FreeParameter]:
-    """The parameters of an effect under test in a cell of this capacity: as wide as is expected of it, or else as it
-    allows."""
+    """The parameters of an effect under test, in a cell of this capacity. Their priors are as wide as the effect's
+    usual size, where that is known, and otherwise as its range."""
     return [_of_effect(effect, name, p, capacity_ah) for name, p in parameters.items()]
 
 

@@ -39,5 +39,5 @@ def _seen_by_cell(data: Averaged, acting: tuple[ActiveEffect, ...]) -> Measureme
 
 @lru_cache(maxsize=64)
 def _elsewhere(effect: Effect) -> Effect:
-    """The effect with all but what it does to the record."""
+    """The effect without the part that acts on the record."""
     return replace(effect, on_record=None)

@@ -33,39 +33,40 @@ from aesi.tracer.case.records import PreparedRecord
 from aesi.tracer.case.trust import AGEING, MEASURED_CELL, Trust, own_sd, start_sd
 
 SHARE_SD = 0.027
-"""Of the logarithm of a record's capacity over the file's: root mean square of the shares that two files over
-temperatures, as calibrated when it was chosen, gave the twelve records that they were calibrated on, within weeks of
-each other (`Cell.capacity_shares`). It is 0.030 by the present ones, in which records with a load have the silicon of
-their day."""
+"""Standard deviation of the logarithm of a record's capacity over the file's: the root mean square of the shares
+that two files, calibrated over temperatures, gave to their twelve records, taken within weeks of each other
+(`Cell.capacity_shares`), when the number was chosen. The present files give 0.030, since a record with a load now
+has the silicon of its day."""
 INDEPENDENT_S, INDEPENDENT_CHARGE = 200.0, 0.05
-"""How long, and over how much charge, the error of a model of a measured cell lasts: its integral correlation time is
-45 to 670 s on eight development records of `aesi bench real`, geometric mean 140 s about the mean and 260 s about
-nought; over charge 1 to 18 %.
+"""How long (s), and over how much charge (share of the capacity), the error of a model of a measured cell lasts. Its
+integral correlation time is 45 to 670 s on eight development records of `aesi bench real` (geometric mean 140 s about
+the mean, 260 s about nought); in charge it is 1 to 18 %.
 
-What it errs by within seconds lasts 4 to 6 s, but is a wrong response to the current, which comes back with it, and so
-counts as no more samples: taken as independent after 8 s, effects that are not there say up to 290 nats of development
-controls. So counted, their sizes scatter by 1.06 of their standard deviations, with twice as many samples by 1.14, with
-four times by 1.38, and by 0.95 where nothing within seconds counts (`python -m aesi.bench.fast_error`)."""
+The part within seconds lasts 4 to 6 s. It is a wrong response to the current and comes back whenever the current does
+the same, so it adds no independent samples: taken as independent after 8 s, effects that are not there gain up to 290
+nats on development controls. As counted here, the fitted sizes of such effects scatter by 1.06 of their standard
+deviations; with twice as many samples by 1.14, with four times as many by 1.38, and by 0.95 where the part within
+seconds is left out (`python -m aesi.bench.fast_error`)."""
 BESIDE_TIMES = 2.0
-"""So many times as many samples of it are independent where good records show how large it is in this cell: with it the
-sizes of effects that 24 pairs of development records do not have scatter by 0.97 of their standard deviations, and one
-pair has one beyond 2.58 of them (`python -m aesi.bench.real.repeatability`)."""
+"""Factor on the number of independent samples of the model error where good records show its size in this cell. With
+it the sizes of effects that 24 pairs of development records do not have scatter by 0.97 of their standard
+deviations, and one pair has one beyond 2.58 of them (`python -m aesi.bench.real.repeatability`)."""
 OHMIC_SHARE = 0.03
-"""Of the resistance that a cell shows from row to row, what its file is off by: 0.7 to 4.0 % on five development
-records, 20 % (too much, which no contact is) on that of a published file, in the median 2.7 %
-(`python -m aesi.bench.fast_error`)."""
+"""Share by which a file is off in the resistance that a cell shows from row to row: 0.7 to 4.0 % on five development
+records, 2.7 % in the median. A published file is off by 20 %, too much for any contact (`python -m
+aesi.bench.fast_error`)."""
 STEP = 4e-3
-"""Of finite differences, in standard deviations of a parameter's prior: short against how well data can tell it. Ten
-rows a second tell a lag to a thousandth of its spread."""
+"""Step of finite differences, in standard deviations of a parameter's prior: short against the accuracy that data
+give. Ten rows a second tell a lag to a thousandth of its spread."""
 REMEMBERED = 64
-"""Voltages of good records: those of a dozen hypotheses that effects grow on, side by side."""
+"""How many voltages of good records are kept: those of a dozen hypotheses that effects grow on, side by side."""
 
 ValuesByOwner = Mapping[str, Mapping[str, float]]
 """owner -> name -> value."""
 
 
 def share_of(values: ValuesByOwner, record: int) -> float:
-    """Of the file's capacity that the cell had in a record."""
+    """Share of the file's capacity that the cell had in a record."""
     return values.get(CAPACITY_SHARE, {}).get(str(record), 1.0)
 
 
@@ -74,13 +75,14 @@ class InverseProblem:
     """One case.
 
     cell : as declared.  records : prepared, the good ones last.
-    effects : id -> Effect, all that may be tried or moved. Parameters of theirs that have a spread are own ones of the
-    declared model, which every hypothesis moves.  trust : by how much.
+    effects : id -> Effect, all that may be tried or moved. A parameter of theirs with a spread is an own parameter of
+    the declared model, and moves in every hypothesis.  trust : how far the declared values are believed.
     fixed : effects in every simulation.  model : that every hypothesis uses.
-    approximated_v : RMS, V, by which approximations of that model that were let stand move the voltage: no effect is
-    named for less.  reduced_v : RMS, V, by which the other model of the cell differs where it may be asked, too: what
-    is left may be that.  ages : whether the records say that they are of several ages.  energies : whether activation
-    energies that no record told the file of a measured cell are open.
+    approximated_v : RMS, V, by which approximations of that model that were kept move the voltage; no effect is named
+    for less.  reduced_v : RMS, V, by which the cell's other model differs, where that one may be searched too: what is
+    left may be this difference.
+    ages : whether the records say that they are of several ages.  energies : whether the activation energies are open
+    that no record told the file of a measured cell.
     """
 
     cell: Cell
@@ -140,8 +142,9 @@ class InverseProblem:
         return tuple(out)
 
     def _open_energies(self, hypothesis: Sequence[str]) -> list[FreeParameter]:
-        """Of a measured cell, the activation energies that its file does not know, where a record is further from the
-        temperature that it was fitted at than records have to be to tell them, or may be by the hypothesis."""
+        """The activation energies of a measured cell that its file does not know; empty unless a record is, or may
+        be by the hypothesis, further from the temperature that the file was fitted at than records must lie apart to
+        tell them."""
         if not self.energies or self.trust not in MEASURED_CELL:
             return []
         acting = (*(self.effects[name] for name in hypothesis), *(active.effect for active in self.fixed))
@@ -161,7 +164,7 @@ class InverseProblem:
         return {**self.effects, ACTIVATION_ENERGIES: energies_of(self.cell)}
 
     def parameters_of(self, effect: str) -> list[FreeParameter]:
-        """What an effect under test moves, by its id: all of its parameters, in order."""
+        """The parameters of an effect under test, by its id, in order."""
         return of_effect(effect, self.effects[effect].parameters, self.cell.nominal_capacity_ah)
 
     def active(self, values: ValuesByOwner, good: bool = False) -> tuple[ActiveEffect, ...]:
@@ -304,16 +307,17 @@ class InverseProblem:
         return np.concatenate([np.gradient(data.time_s) for data in self.seen])
 
     def off_at_seconds(self, hypothesis: Sequence[str]) -> Array:
-        """(n, k) V: what one standard deviation does to the voltage of the declared cell, of each parameter that a file
-        may be off by at the scale of seconds, less those that the hypothesis moves itself; none where there is one
-        scale. All of it: `model_error.off_within_seconds` takes off what lasts."""
+        """(n, k) V: how far one standard deviation of each parameter that may be wrong within seconds moves the
+        voltage of the declared cell. Parameters that the hypothesis itself moves are left out; k is 0 where the
+        model error has one scale. Lasting shifts are still in it: `model_error.off_within_seconds` takes them off."""
         off = self._off_at_seconds if self.two_scales else ()
         kept = [column for restating, column in off if restating.isdisjoint(hypothesis)]
         return np.column_stack([np.zeros((len(self.time_s), 0)), *kept])
 
     @cached_property
     def _off_at_seconds(self) -> tuple[tuple[frozenset[str], Array], ...]:
-        """(effects that restate the parameter, (n,) V for one standard deviation); the first is of the contacts."""
+        """(effects that restate the parameter, (n,) V for one standard deviation) of each parameter; the first is
+        the resistance of the contacts."""
         current = np.concatenate([data.current_a for data in self.seen])
         held = np.concatenate([run.voltage_v for run in self._declared])
         moves = np.concatenate([np.diff(data.current_a) for data in self.seen])
@@ -345,8 +349,8 @@ class InverseProblem:
 
     @cached_property
     def compared(self) -> BoolArray:
-        """(n,) True for the rows of records that are looked at, and those of good ones where the others have been: how
-        far a model errs depends on the state of charge."""
+        """(n,) True for the rows of the records in question, and for those rows of good records whose state of
+        charge the former reach: how far a model errs depends on the state of charge."""
         z, good = self.declared_soc, self.good_rows
         looked = z[~good]
         near = (z > looked.min() - INDEPENDENT_CHARGE) & (z < looked.max() + INDEPENDENT_CHARGE)

@@ -22,16 +22,19 @@ from aesi.records import Hold, Measurement, at_its_temperature, hold_sentence
 from aesi.tracer.case.thinned import ThinnedRecord, lost_v, thinned_record, thinned_together
 
 THINNED_SHARE = 0.5
-"""Of what thinning does to the declared model, what it may do to another one: with kinetics 1.4 times as fast 0.38 to
-0.48 of it are left on eight drives of blind cases at 10 Hz (seeds 13 and 18)."""
+"""Share of the voltage that thinning takes from the declared model that counts as noise, since it takes another
+amount from another model: with kinetics 1.4 times as fast 0.38 to 0.48 of it are left on eight drives of blind cases
+at 10 Hz (seeds 13 and 18)."""
 CONTINUATION_STEPS = 3.0
 """A file that starts within this many samples of another's end, on the same clock, continues it."""
 HOLD_OPTION = "--hold {0} (in an experiment discover.hold: {0})"
-"""What takes the current otherwise, by `hold_sentence`."""
+"""How a user declares another hold, for `hold_sentence`."""
 HALF_FULL = 0.5
-"""State of charge from which a smaller one is the safer to simulate: the middle, whatever the cell."""
+"""Above this state of charge a smaller one is safer to simulate, below it a larger one: the middle, whatever the
+cell."""
 SMALLEST_NOISE_V = 5e-5
-"""No cycler writes less: a virtual record without noise would count each microvolt."""
+"""Least noise that is assumed, V: no cycler writes less, and in a virtual record without noise each microvolt would
+count."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +44,7 @@ class PreparedRecord:
     data : as measured.  thin : what fits run on, fit and held-out part.  n_fit : rows of `thin` that fits may see.
     fit_until_s : the time where the fit part of `data` ends (inf for all).  start : the state at the first row.
     hold, thin_hold : how the current runs between the samples of either.  white_v : (n_thin,) V, standard deviation of
-    the white noise in each row of `thin`.  noise_full_v : of that in `data`.
+    the white noise in each row of `thin`.  noise_full_v : of that in the fit part of `data`.
     lead_rows : rows of `data` at the start that only lead to what is judged.
     good : known to be good: nothing is looked for in it, and what others have beside it is what is different there.
     continues : number of the record that fits have seen and that this one begins with, where it does.
@@ -73,8 +76,8 @@ class PreparedRecord:
 
     @property
     def soc0_sd(self) -> float:
-        """What it is uncertain by, standard deviation: at least the difference between what was given and what its
-        voltage reads as; of two that disagree neither is known better than that."""
+        """Standard deviation of `soc0`. It is at least the difference between a state that was given and the one
+        that the voltage reads as: of two that disagree neither is known better than that."""
         return max(self.start.sd, self.start.doubt)
 
     @property
@@ -154,7 +157,8 @@ def _prepared(
     duration = float(data.time_s[-1] - data.time_s[0])
     until = data.time_s[0] + (1.0 - holdout) * duration if holdout > 0 else np.inf
     n_fit = int(np.searchsorted(thin.time_s, until))
-    noise_full = noise_floor_v(data.voltage_v, data.current_a)
+    fitted = data.take(slice(0, int(np.searchsorted(data.time_s, until))))
+    noise_full = noise_floor_v(fitted.voltage_v, fitted.current_a)
     white = _white_v(record, thin.take(slice(0, n_fit)), noise_full)
     as_given = start.basis == "given" and not (start.contradicted or start.doubted)
     said = () if as_given else (start.sentence,)

@@ -14,8 +14,8 @@ from aesi.tracer.case.problem import InverseProblem, ValuesByOwner
 MODELS: tuple[ModelName, ModelName] = ("espm", "dfn")
 
 NOTABLE_SHARE = 0.1
-"""Of the noise: an approximation that moves the voltage by more than this is taken back in every hypothesis. A
-convention: what moves by less lifts an error by half a percent."""
+"""Share of the noise: an approximation that moves the voltage by more is undone in every hypothesis. A convention:
+one that moves it by less raises an error by half a percent at most."""
 LEAST_V = 1e-4
 """RMS by which two solvers of one model differ: 99 of 100 right hypotheses err by less
 (`python -m aesi.bench.solver_error`)."""
@@ -61,7 +61,7 @@ class Reduction:
 
     @property
     def sentence(self) -> str:
-        """By how much the two models differ, beside the noise that decides what is notable."""
+        """How far the two models differ, beside the noise that decides what is notable."""
         times = self.shift_v / self.noise_v
         return (
             f"the porous electrode (dfn) and the single particle (espm) of {self.of} differ by "
@@ -71,8 +71,8 @@ class Reduction:
 
 
 def reduction_of(problem: InverseProblem, values: ValuesByOwner | None = None) -> Reduction | None:
-    """By how much both models of a cell differ on its records; None where one of them cannot be simulated, or where the
-    declared model already holds an effect that takes the reduction back.
+    """How far the two models of a cell differ on its records. None where one of them cannot be simulated, or where the
+    declared model already holds an effect that undoes the reduction.
 
     values : owner -> name -> value where a hypothesis ended; None: the declared cell.
     """

@@ -37,9 +37,9 @@ def longer_steps(model: EspmModel, *, substep_s: float) -> EspmModel:
 EFFECT = Effect("longer_steps", "instrument", __doc__ or "", PARAMETERS, on_model=longer_steps)
 
 POINTS = 4
-"""Across each electrode. Against 14, on discharges of the shipped cells to 1C at 25 degC: 0.14 mV RMS at most for the
-NCA cell, 0.05 for the others, at 0.6 of the cost of the 6 that `simulate` takes. Where they move the voltage notably,
-finer numerics double them."""
+"""Points across each electrode. Against 14, on discharges of the shipped cells to 1C at 25 degC, the voltage is off
+by at most 0.14 mV RMS (NCA cell; 0.05 for the others), at 0.6 of the cost of the 6 that `simulate` takes. Where they
+move the voltage notably, finer numerics double them."""
 
 
 def fewer_points(model: EspmModel) -> EspmModel:
@@ -52,7 +52,7 @@ FEWER_POINTS = Effect("fewer_points", "instrument", __doc__ or "", on_model=fewe
 
 @lru_cache(maxsize=64)
 def stepping(data: Measurement) -> tuple[ActiveEffect, ...]:
-    """What a record is simulated with: nothing, or longer steps where samples are far apart."""
+    """The effect that a record is simulated with: longer steps where samples are far apart, else none."""
     gaps = np.diff(data.time_s)
     if float(gaps.max(initial=0.0)) <= STEPS_A_SAMPLE * DEFAULT_SUBSTEP_S:
         return ()

@@ -22,7 +22,7 @@ from aesi.tracer.case.fit_simulation import fit_simulation
 THIN_STEP_S = 1.0
 """Fits see at most one sample a second: nothing in the catalogue is faster than that and yet above the noise."""
 FIT_SAMPLES = 12_000
-"""Of all records together: above it windows are doubled, since the time of a fit grows with its rows."""
+"""Most rows of all records together: above it windows are doubled, since the time of a fit grows with its rows."""
 DOUBLED_UNTIL_S = 30.0
 """Longer windows are not doubled again: a drive would be averaged away."""
 STEADY_SAMPLES = 600

@@ -22,8 +22,8 @@ BESIDE_SOC0_SD = 5e-3
 """Least standard deviation of an initial state of charge beside good records: starts at a full charge are off by 0.33 %
 RMS on 24 pairs of development records (`python -m aesi.bench.real.repeatability`)."""
 EXACT_SHARE = 0.1
-"""Of the tight spread of a declared parameter, where the file is believed exactly. A convention: not nought, so that
-what the numerics round off is no evidence for an effect."""
+"""Share of the tight spread of a declared parameter that is left to it where the file is believed exactly. A
+convention: not nought, so that round-off of the numerics is no evidence for an effect."""
 
 
 def start_sd(trust: Trust, read_sd: float) -> float:

@@ -64,7 +64,7 @@ def _settled(path: Path, verdict: Verdict) -> Evidence:
 
 
 def _of_another_age(path: Path, archive: Archive) -> list[FittedHypothesis]:
-    """What the records would be left with if, instead of what is named, the cell had aged beside the good ones; the
+    """What would be left of the records if, instead of what is named, the cell had aged since the good ones; the
     best first."""
     names = [name for name, effect in path.problem.effects.items() if effect.of_age]
     grown = grown_with(Parent(path.problem, path.blocks, path.base), names, archive)
@@ -122,15 +122,15 @@ class Usual:
 
     @classmethod
     def of(cls, path: Path, thresholds: Thresholds) -> Usual:
-        """Of a search, by what it chose."""
+        """The usual error in a search, by the hypothesis that it chose."""
         problem, good = path.problem, path.problem.good_rows
         good_v = left_v(path, path.chosen, good & problem.compared)
         usual_v = float(np.hypot(good_v, tolerance_v(problem, thresholds)))
         return cls(good_v, usual_v, usual_v * (1.0 + NINETY * _relative_sd(problem, good)))
 
     def said_nats(self, path: Path, one: FittedHypothesis) -> float:
-        """What a hypothesis says more than none, by the error that these records show for themselves: nats count by
-        the ratio of the mean squares where more is left than may be."""
+        """Nats that a hypothesis gains over none, weighed by the error that these records show for themselves: where
+        more is left than may be, by the ratio of the two mean squares."""
         left = left_v(path, one, ~path.problem.good_rows)
         return path.gain(one) * (1.0 if left <= self.allowed_v else (self.usual_v / left) ** 2)
 
@@ -157,12 +157,12 @@ def judged_beside(path: Path, thresholds: Thresholds, usual: Usual) -> Verdict:
 
 
 def left_v(path: Path, one: FittedHypothesis, rows: BoolArray) -> float:
-    """What a hypothesis leaves beyond noise of some rows, in blocks that it has not seen, V RMS."""
+    """V RMS that a hypothesis leaves beyond noise on some rows, in blocks that it has not seen."""
     return beyond(rms(held_out_residual(path.blocks, one)[rows]), rms(path.problem.white_v[rows]))
 
 
 def _relative_sd(problem: InverseProblem, good: BoolArray) -> float:
-    """By how much the root mean squares of both kinds of record differ by chance, as a share: each of N independent
-    samples is uncertain by one over the root of 2 N."""
+    """Relative standard deviation of the difference between the root mean squares of both kinds of record: each of N
+    independent samples is uncertain by one over the root of 2 N."""
     many = [float(problem.independent[rows].sum()) for rows in (good, ~good)]
     return float(np.sqrt(sum(0.5 / n for n in many)))

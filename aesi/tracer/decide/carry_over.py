@@ -25,14 +25,15 @@ ORDINARY_C = (1.0, -0.5)
 FAST_C = (2.0, 3.0)
 """Full discharges and charges that a model has to be good for; fast ones can deplete the electrolyte of a real cell."""
 BY_CHANCE = 1.0 + (2.0 / RANGES / INDEPENDENT_CHARGE) ** -0.5
-"""Times an error over one range of charge, by which it may be off as the errors of measured cells last: an RMS of N
-independent samples has a relative standard deviation of one over the root of 2 N."""
+"""Factor by which an error over one range of charge may differ by chance, given how long the errors of measured
+cells last: an RMS of N independent samples has a relative standard deviation of one over the root of 2 N."""
 LEAST_SHARE = 0.8
-"""Of the time that the declared model takes: one that runs empty later than that does so with its voltage all but at
-its limit. On development records of `aesi bench real` without their temperature, models that ran empty at 85 and 90 %
-of it left 7.1 and 5.0 mV of the last part (declared 22.9), those at 68 and 3 % 152 and 94 (what was named alone 78)."""
+"""Least share of the declared model's time that a model has to run on a full discharge: one that runs empty later
+has its voltage all but at the limit. On development records of `aesi bench real` without their temperature, models
+that ran empty at 85 and 90 % of it left 7.1 and 5.0 mV of the last part (declared 22.9), those at 68 and 3 % left
+152 and 94 (what was named alone 78)."""
 STEP_S = 10.0
-"""Between rows of a full discharge or charge."""
+"""s between the rows of a full discharge or charge."""
 
 
 @dataclass(frozen=True)
@@ -52,15 +53,18 @@ class LeftOut:
         return rms(self.by_record)
 
     def harms(self, other: LeftOut) -> bool:
-        """Is the model worse than another one in a range of charge, by more than models of measured cells err by and
-        by more than chance?"""
+        """Whether the model is worse than another one in a range of charge, by more than models of measured cells
+        err by and by more than chance."""
         allowed = np.maximum(np.hypot(other.by_range, MOST_MEASURED_V), BY_CHANCE * np.array(other.by_range))
         return bool(np.any(np.array(self.by_range) > allowed))
 
 
 def left_out_errors(problem: InverseProblem, blocks: Blocks, one: FittedHypothesis | None) -> LeftOut:
-    """What a hypothesis leaves on each record where the others put it (of a single record: on its last third); None:
-    the model as declared."""
+    """What a hypothesis leaves on each record, fitted to the other records (of a single record: on its last third,
+    fitted to the rest).
+
+    None stands for the model as declared.
+    """
     folds = blocks.folds["record" if len(problem.records) > 1 else "end"]
     charges = [np.isin(blocks.of_row, charge) for charge in blocks.folds["charge"]]
     tells = np.sqrt(_tells(problem))
@@ -75,11 +79,11 @@ def left_out_errors(problem: InverseProblem, blocks: Blocks, one: FittedHypothes
 
 
 def _tells(problem: InverseProblem) -> Array:
-    """(n,) how far the error of a model in each row tells of a fault of the model where its record is left out.
+    """(n,) weight of each row as evidence of a fault of the model, where its record is left out.
 
     How such a record begins (`ModelState.simulated`) is uncertain. Where that is worth more than models of measured
-    cells are off by, as on the knee at the end of a discharge, an error is no evidence of harm. What is left out of a
-    single record begins where the rest of it ends.
+    cells are off by, as on the knee at the end of a discharge, an error is no evidence of harm. A left-out part of a
+    single record begins where the rest of it ends, which is known.
     """
     if len(problem.records) == 1:
         return np.ones(len(problem.measured))

@@ -26,10 +26,10 @@ from aesi.numerics.typing import Array
 
 FILE = "confidence.json"
 SLOPE_PRIOR = 0.1
-"""Of the slope, one over its variance: three a standard deviation of margin, which keeps a few cases from a step; a
-convention."""
+"""Prior precision (one over the variance) of the slope. Three per standard deviation of margin keeps a few cases
+from making a step; a convention."""
 HIGHEST = 0.99
-"""What some hundred cases can vouch for."""
+"""Highest confidence that some hundred cases can vouch for."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,8 @@ def frequency_maps() -> Mapping[str, FrequencyMap]:
 
 
 def fitted_map(margins: Sequence[float], right: Sequence[bool]) -> FrequencyMap:
-    """By maximum likelihood with a weak prior (one case right and one wrong in the middle), slope not below nought."""
+    """Fit by maximum likelihood, with a weak prior (one case right and one wrong in the middle) and a slope that is
+    not negative."""
     from scipy.optimize import minimize
     from scipy.special import expit, log_expit
 

@@ -33,21 +33,25 @@ from aesi.tracer.search.plausible import most_plausible, plausibility
 from aesi.tracer.search.wrong_parameters import beyond_spread, with_wrong_parameters
 
 MEASURED_EFFECTS = 1
-"""Named beside `unknown`: what is left after one is mostly no larger than what models of measured cells leave, and of
-eight second names on development records of `aesi bench real` one was right. From the written model one can look on."""
+"""Most names beside `unknown`. What is left after one is mostly no larger than what models of measured cells leave,
+and of eight second names on development records of `aesi bench real` one was right. Whoever wants more can search on
+from the written model."""
 STAND_INS = 1
-"""Written beside open own parameters without being named. On the NMC cell (C/20, C/2, 1C and 4,000 s of its drive
-fitted) the next 4,000 s are 15.1 mV off with none, 9.3 with one and 8.8 with two; with two a search on six records of
-the HG2 had not ended after 5 minutes of processor."""
+"""Most effects that are written, without being named, beside open own parameters. On the NMC cell (C/20, C/2, 1C and
+4,000 s of its drive fitted) the next 4,000 s are 15.1 mV off with none, 9.3 with one and 8.8 with two; with two a
+search on six records of the HG2 had not ended after 5 minutes of processor."""
 MOST_EFFECTS: dict[Trust, int] = {"measured": MEASURED_EFFECTS, "loose": STAND_INS}
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """path : the search that the verdict is about.  paths : all of them, by trust.  recalibrated : the declared model
-    with all of its own parameters open.  after : the model that is written.  fault : why the chosen hypothesis was not
-    adopted, or the recalibrated model where another one is written.  limits : where the written model stops short
-    of the declared one."""
+    """All that the verdict and the written model rest on.
+
+    path : the search that the verdict is about.  paths : all searches, by trust.  recalibrated : the declared model
+    with all of its own parameters open.  after : the model that is written.
+    fault : why the chosen hypothesis, or the recalibrated model, is not what is written.  limits : where the written
+    model stops short of the declared one.
+    """
 
     path: Path
     paths: dict[Trust, Path]
@@ -86,10 +90,10 @@ class _Searches:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What the searches with one model of the cell answer, before it is settled what to write.
+    """The answer of the searches with one model of the cell, before it is settled what to write.
 
     path : the search that is believed.  verdict : on it.  paths : all of them so far, by trust.
-    settled : of a verdict on that path, the evidence with the model that is written.
+    settled : gives, for a verdict on that path, the evidence with the model that is written.
     """
 
     path: Path
@@ -149,8 +153,8 @@ def _best_explanation(problem: InverseProblem, searches: _Searches) -> tuple[Pat
 
 
 def _unexplained(problem: InverseProblem, path: Path, verdict: Verdict, searches: _Searches) -> Evidence:
-    """Where nothing explains the data: what the coarsened search names beside `unknown`, and the model that carries
-    best.
+    """Evidence where nothing explains the data: the names of the coarsened search beside `unknown`, and the model that
+    carries over best.
 
     path, verdict : the search that is believed, and `unknown`.
     """
@@ -177,10 +181,10 @@ def _unexplained(problem: InverseProblem, path: Path, verdict: Verdict, searches
 
 
 def of_several_ages(problem: InverseProblem, archive: Archive) -> bool:
-    """Do the declared parameters say more of unseen data where each record has a capacity of its own?
+    """Whether the declared parameters gain on unseen data where each record has a capacity of its own.
 
-    Of the NMC cell's records, all of one age, they say 4 to 5 nats less then, of those of the LG M50T, the LG HG2 and
-    the Panasonic, which took weeks, 20, 3 to 5 and 2 to 3 more.
+    On the NMC cell's records, all of one age, they lose 4 to 5 nats. Those of the LG M50T, the LG HG2 and the
+    Panasonic, which took weeks, gain 20, 3 to 5 and 2 to 3.
     """
     if len(problem.records) == 1:
         return False
@@ -190,11 +194,11 @@ def of_several_ages(problem: InverseProblem, archive: Archive) -> bool:
 
 
 def believed(one: tuple[Path, Verdict], other: tuple[Path, Verdict]) -> bool:
-    """Is the second of two searches believed rather than the first?
+    """Whether the second of two searches is believed rather than the first.
 
-    One that explains the data is, before one that does not; then it goes by what they chose. The one with more names is
-    believed only where both kinds of evidence, unseen data and marginal likelihood, speak for it, as where a name is
-    admitted.
+    A search that explains the data is believed before one that does not; otherwise the hypotheses that they chose
+    decide. The one with more names is believed only where both kinds of evidence, unseen data and marginal likelihood,
+    speak for it, as where a name is admitted.
 
     A blind case that lacks nothing said 3.5 nats more of unseen data with another radius and a plating that made the
     data less likely by 17.
@@ -213,10 +217,12 @@ def believed(one: tuple[Path, Verdict], other: tuple[Path, Verdict]) -> bool:
 
 
 def consistent(path: Path, verdict: Verdict) -> Verdict:
-    """`unknown` in place of a verdict that rests on declared parameters further off than cell files are, unnamed.
+    """The verdict, or `unknown` in place of one that rests on declared parameters further off than cell files are
+    without naming them.
 
-    A smooth record can be fitted to the noise by what no cell has: the 1C discharge of the NMC cell by itself, a
-    development record, by another potential with conductivity, initial state and voltage offset four deviations off.
+    A smooth record can be fitted to the noise by a cell that does not exist: the 1C discharge of the NMC cell by
+    itself, a development record, by another potential with conductivity, initial state and voltage offset four
+    deviations off.
     """
     beyond = beyond_spread(path.problem, path.chosen) if path.problem.trust == "tight" else []
     if verdict.word == "unknown" or not beyond:
@@ -327,7 +333,7 @@ def _adopted(
     verdict: Verdict,
     recalibrated: ModelState,
 ) -> Evidence:
-    """What was found, or the bare model; not where it cannot be simulated over the declared range."""
+    """The model with what was found, or the bare model where that cannot be simulated over the declared range."""
     chosen = ModelState.of(path.problem, path.chosen)
     fault = range_fault(chosen, ORDINARY_C)
     if fault is not None:

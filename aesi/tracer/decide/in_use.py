@@ -28,9 +28,9 @@ from aesi.tracer.likelihood.model_error import PRIORS
 def foretold_in_use(
     problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis, allowed_v: float
 ) -> float:
-    """As `verdict.foretold_share`, of full discharges and charges at ordinary rates, between the limits of voltage and
-    at the temperatures of the records; nought where the fit cannot be simulated there, 1 where the declared model
-    cannot."""
+    """As `verdict.foretold_share`, of full discharges and charges at ordinary rates, within the limits of voltage
+    and at the temperatures of the records. Nought where the fit cannot be simulated there, 1 where the declared
+    model cannot."""
     most = PRIORS[problem.trust].median._replace(delta_v=allowed_v)
     covariance = covariance_at(problem, blocks, fit, most)
     told = []

@@ -86,7 +86,7 @@ def with_model(
 
 @dataclass(frozen=True, eq=False)
 class _Look:
-    """What the single particle answered.  whole : with all names that may be given."""
+    """The answer of the single particle.  whole : it was searched for all names that may be given."""
 
     answer: Answer
     whole: bool
@@ -119,8 +119,8 @@ class _Single:
         return _Look(first, False)
 
     def may_explain(self, answer: Answer) -> bool:
-        """Does an answer explain the data, or may what the two models differ by be all that it leaves? Where nothing
-        was tried since that is too much for all effects together, a search for what it leaves beside that tells."""
+        """Whether an answer explains the data, or leaves no more than what the two models may differ by. Where
+        nothing was tried, since all effects together leave too much, a search for what it leaves decides."""
         if not _explains(answer, self.declared):
             return False
         if answer.paths["tight"].beyond_reach_v is None or not _notable(self.declared):
@@ -166,14 +166,14 @@ def _fine(problem: InverseProblem, name: ModelName) -> InverseProblem:
 
 
 def _of_both(believed_one: Answer, other: Answer) -> Answer:
-    """What was searched with the model that is believed, with the look-alikes of both searches."""
+    """The answer of the model that is believed, with the look-alikes of both searches."""
     return replace(believed_one, verdict=across_models(believed_one.verdict, other.verdict))
 
 
 def _chosen(
     answer: Answer, name: ModelName, reduction: Reduction | None, why: str = ""
 ) -> tuple[Evidence, ModelChoice]:
-    """What was searched with a model, and the choice of that one."""
+    """The answer of a search with one model, and the choice of that model."""
     differ = "" if reduction is None else f"; {reduction.sentence}"
     words = f"all hypotheses use {MODEL_WORDS[name]}{why}{differ}."
     return answer.settled(answer.verdict), ModelChoice(name, words, reduction)
@@ -191,9 +191,9 @@ def _notable(reduction: Reduction | None) -> TypeGuard[Reduction]:
 
 
 def _larger(declared: Reduction | None, path: Path) -> Reduction | None:
-    """Of what both models differ by on the declared cell and on what the search with the single particle ended with: a
-    cell whose electrolyte or particles are not as declared may need the porous electrode where the declared one does
-    not."""
+    """The larger difference between the two models: on the declared cell, or on the one that the search with the
+    single particle ended with. A cell whose electrolyte or particles are not as declared may need the porous
+    electrode where the declared one does not."""
     ended = reduction_of(path.problem, path.chosen.values)
     known = [one for one in (declared, ended) if one is not None]
     return max(known, key=lambda one: one.shift_v, default=None)
@@ -212,8 +212,8 @@ def most_names(single: Answer, max_effects: int) -> int:
 
 
 def _explains(single: Answer, reduction: Reduction | None) -> bool:
-    """Does a search with the single particle explain the data, or could what the two models of the declared cell differ
-    by be all that it leaves beyond what a right hypothesis may?"""
+    """Whether a search with the single particle explains the data, or leaves no more beyond a right hypothesis than
+    what the two models of the declared cell differ by."""
     path = single.paths["tight"]
     if single.verdict.word != "unknown":
         return True

@@ -24,12 +24,12 @@ Word = Literal["found", "none", "unknown"]
 GROUP_SIZE = 3
 """Names that a group of look-alikes shows at most; the others are told in a note."""
 MOST_SDS = 50.0
-"""Where nothing comes close."""
+"""Standard deviations that are reported where nothing comes close."""
 RANGE_OF = {"rate": "current", "charge": "charge"}
-"""By what the blocks of a partition are left out together, in words."""
+"""Partition -> the quantity by whose ranges its blocks are left out together, in words."""
 FORETOLD_SHARE = 0.5
-"""Of the rows of conditions that are left out, that the others have to foretell. A convention, see `Thresholds` and
-`decide.written.Option` for what was seen on either side of it."""
+"""Least share of the rows of left-out conditions that the other rows have to foretell. A convention, see
+`Thresholds` and `decide.written.Option` for what was seen on either side of it."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def beyond(rmse_v: float, noise_v: float) -> float:
 
 
 def structured_v(path: Path, one: Explanation) -> float:
-    """What a hypothesis leaves beyond noise on blocks that it has not seen, V."""
+    """V RMS that a hypothesis leaves beyond noise on blocks that it has not seen."""
     return beyond(unseen_rmse_v(path.blocks, one), path.problem.noise_v)
 
 
@@ -144,7 +144,7 @@ def foretold_share(
 
 
 def tolerance_v(problem: InverseProblem, thresholds: Thresholds) -> float:
-    """What a right hypothesis may leave on unseen data beyond the noise, V."""
+    """V RMS that a right hypothesis may leave on unseen data beyond the noise."""
     return float(np.hypot(thresholds.noise_share * problem.noise_v, thresholds.solver_v))
 
 
@@ -263,13 +263,13 @@ def across_models(verdict: Verdict, other: Verdict) -> Verdict:
 
 
 def _as_adequate(path: Path, other: Explanation, anchor: Explanation, allowed_v: float) -> bool:
-    """Does a rival leave about as little of what it could tell as what it is held against?"""
+    """Whether a rival leaves about as little, of what it could tell, as the hypothesis that it is held against."""
     left_v = [unexplained_v(path.problem, path.blocks, one, allowed_v) for one in (other, anchor)]
     return left_v[0] <= 1.2 * max(allowed_v, left_v[1])
 
 
 def _weakest_sds(path: Path, tried: Mapping[frozenset[str], Explanation]) -> float:
-    """What the weakest of the effects that were chosen says more than the rest, as that many standard deviations."""
+    """Standard deviations by which the weakest of the chosen effects improves on the rest without it."""
     chosen = frozenset(path.chosen.hypothesis)
     rests = (tried.get(chosen - {name}) for name in chosen)
     gains = [path.chosen.score.total - rest.score.total for rest in rests if rest is not None]

@@ -18,7 +18,8 @@ from aesi.tracer.likelihood.model_error import MEASURED_V
 from aesi.tracer.likelihood.model_state import ModelState
 
 AS_GOOD = 1.05
-"""Times the error of another model: what is less does as well. A convention."""
+"""What was named, or else the declared model, is preferred where its worst ratio is at most this many times the
+least one. A convention."""
 HARM = "on data left out it is worse than the declared model in a range of charge"
 UNTESTED = "these data cannot bear it out, at other states of charge or currents it could be anything"
 LESS_ELSEWHERE = "another model leaves less on records left out"
@@ -55,10 +56,9 @@ class Option:
 
 
 def _tested(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis) -> bool:
-    """Could these data have spoken against a fit? Several records bear it out, or not, where it says something of
-    ordinary use. One record does as far as its ranges of charge foretell each other; where own parameters are open, as
-    they are known by how they answer to the current, also its ranges of current.
-    """
+    """Whether these data could have spoken against a fit. Several records could, where it foretells something of
+    ordinary use. A single record could, as far as its ranges of charge foretell each other; where own parameters are
+    open, which are known by how they answer to the current, its ranges of current have to as well."""
     if len(problem.records) > 1:
         return foretold_in_use(problem, blocks, fit, MEASURED_V) >= FORETOLD_SHARE
     conditions = ("charge",) if problem.trust in MEASURED_CELL else ("rate", "charge")
@@ -148,7 +148,7 @@ def stand_ins(state: ModelState, named: Sequence[str]) -> tuple[str, ...]:
 
 
 def limits_of(state: ModelState) -> tuple[str, ...]:
-    """Where a model that is written stops short of the declared one."""
+    """Sentences on where a model that is written stops short of the declared one."""
     fast = range_fault(state, FAST_C)
     return () if fast is None else (f"with what was found, {fast}; the declared model does not.",)
 

@@ -26,9 +26,11 @@ from aesi.tracer.likelihood.gaussian import (
     weighed,
 )
 from aesi.tracer.likelihood.model_error import PRIORS, Size, SplitTable, off_within_seconds, whitened
+from aesi.tracer.likelihood.size_sums import SizeSums
 
 GAIN_NATS = 0.05
-"""A descent stops when a step gains less than this, by an error as large as what is left (`beyond_expected`)."""
+"""A descent stops where a step gains less than this, in nats by an error as large as what is left
+(`beyond_expected`)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,15 +169,14 @@ def beyond_expected(white: Array) -> float:
 
 def scored(problem: InverseProblem, blocks: Blocks, point: Linearised) -> PredictiveScore:
     """The predictive score of a linear form, over sizes of the model error."""
-    prior, table = PRIORS[problem.trust], SplitTable(problem, blocks, point.table())
-    said = [said_at(table, point, size, prior.log_density(size)) for size in prior.sizes]
+    prior, sums = PRIORS[problem.trust], SizeSums(SplitTable(problem, blocks, point.table()))
+    said = [said_at(sums, point, size, prior.log_density(size)) for size in prior.sizes]
     return best_over_sizes(said, len(point.x))
 
 
-def said_at(table: SplitTable, point: Linearised, size: Size, log_prior: float = 0.0) -> Weighed:
-    """A linear form at one size of the model error.  table : that of the point."""
-    sums = block_sums(table.blocks, *table.whitened(size))
-    return weighed(table.blocks, sums, point.padded_x, point.padded_bounds, size, log_prior)
+def said_at(sums: SizeSums, point: Linearised, size: Size, log_prior: float = 0.0) -> Weighed:
+    """A linear form, scored at one size of the model error.  sums : of its table."""
+    return weighed(sums.table.blocks, sums.at(size), point.padded_x, point.padded_bounds, size, log_prior)
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,7 +242,8 @@ def _posterior(
     size: Size,
     folds: tuple[tuple[int, ...], ...] = (),
 ) -> Posterior:
-    """Of the parameters, and of what the file may be off by, where the model errs by as much as `size`."""
+    """Posterior of the parameters, and of what the file may be off by within seconds, at this size of the model
+    error."""
     white, log_det = whitened(problem, blocks, fit.point.table(), size)
     return Posterior(block_sums(blocks, white, log_det), fit.point.padded_x, folds)
 

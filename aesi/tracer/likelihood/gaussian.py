@@ -43,7 +43,7 @@ class BlockSums:
     rows: Array
 
     def take(self, columns: IntArray) -> BlockSums:
-        """The same with some of the parameters."""
+        """The sums of some of the parameters alone."""
         return BlockSums(
             self.square,
             self.moment[:, columns],
@@ -53,7 +53,7 @@ class BlockSums:
         )
 
     def moved(self, z: Array) -> BlockSums:
-        """The same about a point that lies z (m,) further."""
+        """The sums about a point that lies z (m,) further."""
         along = self.gram @ z
         square = self.square - 2.0 * self.moment @ z + along @ z
         return BlockSums(square, self.moment - along, self.gram, self.log_det, self.rows)
@@ -66,6 +66,11 @@ def block_sums(blocks: Blocks, table: Array, log_det: Array) -> BlockSums:
     products = np.empty((count, m, m))
     for k, rows in enumerate(blocks.rows):
         products[k] = table[rows].T @ table[rows]
+    return sums_of_products(blocks, products, log_det)
+
+
+def sums_of_products(blocks: Blocks, products: Array, log_det: Array) -> BlockSums:
+    """products : (b, 1 + m, 1 + m), of the whitened residual and sensitivities with each other.  log_det : (n,)."""
     return BlockSums(
         products[:, 0, 0],
         products[:, 1:, 0],
@@ -76,7 +81,7 @@ def block_sums(blocks: Blocks, table: Array, log_det: Array) -> BlockSums:
 
 
 class Solved(NamedTuple):
-    """A^-1 b of (2); each may stand for a stack of systems.
+    """The solution A^-1 b of (2); it may be that of a stack of systems.
 
     root : (m, m) lower triangular factor of A.  shift : (m,) A^-1 b.
     """
@@ -119,7 +124,7 @@ def _left_out(folds: tuple[tuple[int, ...], ...], blocks: int) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """Of (1), over all blocks and without each fold.
+    """Posterior of the parameters in (1), given all blocks, and given all but each fold.
 
     sums : of the hypothesis.  x : (m,) the point.  folds : sets of blocks left out in turn.
     """
@@ -135,7 +140,7 @@ class Posterior:
 
     @cached_property
     def solved(self) -> Solved:
-        """From all data."""
+        """(2) solved with all blocks."""
         return Solved.of(self.sums.gram.sum(axis=0), self.sums.moment.sum(axis=0), self.x)
 
     @cached_property
@@ -146,7 +151,7 @@ class Posterior:
 
     @cached_property
     def _solved_without(self) -> Solved:
-        """(f,) without each fold."""
+        """(f,) (2) solved without each fold."""
         return Solved.of(*self._without, self.x)
 
     @cached_property
@@ -256,7 +261,7 @@ class PredictiveScore:
         return self.size.delta_v
 
     def of(self, columns: IntArray) -> PredictiveScore:
-        """The same with the shifts and the covariance of some of the parameters; the others are marginalised."""
+        """The score with the shifts and the covariance of some of the parameters; the others are marginalised."""
         shifts = {name: shift[:, columns] for name, shift in self.shifts.items()}
         covariance = self.covariance[np.ix_(columns, columns)]
         return replace(self, shifts=shifts, shift=self.shift[columns], covariance=covariance)

@@ -36,19 +36,19 @@ MEASURED_V = 9e-3
 """What calibrated and published files leave of a measured drive at the temperature that they are of: 4 to 13 mV on
 eight development records of `aesi bench real`, geometric mean 9 mV. Less is no evidence of anything missing."""
 BESIDE_V = 4.5e-3
-"""The same where good records of the cell show it, of rows at the states of charge of the others: 2 to 13 mV on 24
-pairs of development records (`python -m aesi.bench.real.repeatability`), geometric mean 4.6 mV with the cell files that
-it was chosen with and 5.0 mV with the present ones."""
+"""V, as MEASURED_V, where good records of the cell show it on rows at the states of charge of the others: 2 to 13 mV
+on 24 pairs of development records (`python -m aesi.bench.real.repeatability`). The geometric mean is 4.6 mV with the
+cell files that the number was chosen with and 5.0 mV with the present ones."""
 FAST_V = 3e-3
-"""What they leave within 20 s: 2.0 to 6.0 mV on six development records, geometric mean 2.8 mV
+"""V, as MEASURED_V, of the part within 20 s: 2.0 to 6.0 mV on six development records, geometric mean 2.8 mV
 (`python -m aesi.bench.fast_error`). Less is no evidence either."""
 MOST_MEASURED_V = 13e-3
-"""The most of those eight: what is worse by less is no evidence of a worse model."""
+"""V, the largest error of those eight records: a model that is worse by less is not shown to be worse."""
 
 
 class Size(NamedTuple):
-    """Of the model error, V.  delta_v : of what lasts.  fast_v : of what is gone within seconds, nought where it is not
-    told apart."""
+    """Size of the model error, V.  delta_v : of the lasting part.  fast_v : of the part within seconds, nought where
+    the two are not told apart."""
 
     delta_v: float
     fast_v: float = 0.0
@@ -61,8 +61,11 @@ def replace_fast(size: Size, by: Size) -> Size:
 
 @dataclass(frozen=True)
 class SizePrior:
-    """median_v : V.  sd : of the natural logarithm.  sizes_v : those that are tried, V.  fast : the same of what is
-    gone within seconds, where it is told apart."""
+    """Prior of the size of the model error.
+
+    median_v : V.  sd : of the natural logarithm.  sizes_v : those that are tried, V.  fast : the same of the part
+    within seconds, where it is told apart.
+    """
 
     median_v: float
     sd: float
@@ -77,11 +80,11 @@ class SizePrior:
 
     @property
     def median(self) -> Size:
-        """The size of the median of each."""
+        """The size at the median of each part."""
         return Size(self.median_v, 0.0 if self.fast is None else self.fast.median_v)
 
     def log_density(self, size: Size) -> float:
-        """Up to a constant that all sizes share."""
+        """Log density of a size, up to a constant that all sizes share."""
         fast = 0.0 if self.fast is None else self.fast.log_density(Size(size.fast_v))
         off = float(np.log(size.delta_v / self.median_v)) / self.sd
         return fast - 0.5 * off**2 - float(np.log(self.sd))
@@ -117,10 +120,11 @@ right hypotheses of 40 development cases of `aesi bench blind` (`python -m aesi.
 loose, measured, lasting : what files of measured cells leave; less where all their parameters are open, no less where
 they are as declared."""
 LOOSE_CHARGE = 2e-4
-"""What is open wide may err by of the charge, as a share: little, since the balance of the electrodes is open as well.
-A convention."""
+"""Share of the charge by which a model with all parameters open may err: little, since the balance of the electrodes
+is open as well. A convention."""
 CHARGE_PER_V = 0.4
-"""Of a measured cell: error of charge over that of the voltage; the same records are off by 0.1 to 0.6 % of charge."""
+"""Error of a measured cell's model in charge (share) over its error in voltage (V): the same records are off by 0.1
+to 0.6 % of charge."""
 
 
 def amplitude_v(steepness: Array, delta_v: float, trust: Trust) -> Array:
@@ -149,28 +153,41 @@ class SplitTable:
         slow = self.blocks.windows.means(self.table)
         return slow, self.table - slow
 
+    @cached_property
+    def at_one_volt(self) -> tuple[Array, Array]:
+        """Where both are told apart, what lasts and what is gone within seconds, each whitened at a size of 1 V: (n, m)
+        each, which another size divides, since the amplitude of a measured cell's error is proportional to it."""
+        slow, rest = self._parts
+        root = np.sqrt(self.problem.independent)[:, None]
+        return slow * root / self._amplitude(Size(1.0))[:, None], rest * root
+
     def whitened(self, size: Size) -> tuple[Array, Array]:
         """The columns (n, m), whitened at a size, and log|C| by rows (n,).
 
         By the noise and an error that wanders, block by block; or, of a measured cell, with rows that count as many
         samples as are independent, over the size of the error alone.
         """
-        problem = self.problem
-        amplitude = amplitude_v(problem.steepness, size.delta_v, problem.trust)
-        if problem.coarse:
-            return self._coarsened(amplitude, size.fast_v)
-        return whiten(self.table, problem.time_s, self.blocks.starts[:-1], amplitude, problem.white_v)
-
-    def _coarsened(self, amplitude: Array, fast_v: float) -> tuple[Array, Array]:
-        """amplitude : (n,) V of what lasts.  fast_v : V of what is gone within seconds, where it is told apart."""
-        share, windows = self.problem.independent, self.blocks.windows
-        log_det = share * (2.0 * np.log(amplitude) + LOG_2PI) - LOG_2PI  # of so many samples, not of a row
-        if windows is None:
-            return self.table * (np.sqrt(share) / amplitude)[:, None], log_det
+        problem, amplitude = self.problem, self._amplitude(size)
+        if not problem.coarse:
+            return whiten(self.table, problem.time_s, self.blocks.starts[:-1], amplitude, problem.white_v)
+        root = np.sqrt(problem.independent)
+        if self.blocks.windows is None:
+            return self.table * (root / amplitude)[:, None], self.log_det(size)
         slow, rest = self._parts
-        over = slow / amplitude[:, None] + rest / fast_v
-        of_fast = share * windows.fast_dof * (2.0 * np.log(fast_v) + LOG_2PI)
-        return over * np.sqrt(share)[:, None], log_det + of_fast
+        over = slow / amplitude[:, None] + rest / size.fast_v
+        return over * root[:, None], self.log_det(size)
+
+    def log_det(self, size: Size) -> Array:
+        """(n,) log|C| by rows of a coarsened likelihood: of so many samples, not of a row."""
+        share, windows = self.problem.independent, self.blocks.windows
+        of_lasting = share * (2.0 * np.log(self._amplitude(size)) + LOG_2PI) - LOG_2PI
+        if windows is None:
+            return np.asarray(of_lasting)
+        return np.asarray(of_lasting + share * windows.fast_dof * (2.0 * np.log(size.fast_v) + LOG_2PI))
+
+    def _amplitude(self, size: Size) -> Array:
+        """(n,) V of what lasts."""
+        return amplitude_v(self.problem.steepness, size.delta_v, self.problem.trust)
 
 
 def whitened(problem: InverseProblem, blocks: Blocks, table: Array, size: Size) -> tuple[Array, Array]:

@@ -29,11 +29,11 @@ class ModelState:
 
     @classmethod
     def of(cls, problem: InverseProblem, one: Explanation) -> ModelState:
-        """Where a fit ended."""
+        """The model where a fit ended."""
         return cls(problem, one.values, one.hypothesis)
 
     def effects(self, good: bool = False) -> tuple[ActiveEffect, ...]:
-        """What is simulated on top of the declared cell.  good : of a record that is known to be good."""
+        """The effects that are simulated on top of the declared cell.  good : of a record that is known to be good."""
         if self.values is None:
             return self.problem.fixed
         return self.problem.active(self.values, good)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,10 @@ from aesi.tracer.likelihood.model_error import whitened
 from aesi.tracer.search.path import Path
 
 SHARE = 0.9
-"""Of the posterior density of a parameter, that its interval covers."""
+"""Share of the posterior density of a parameter that its interval covers."""
+DIGITS = 6
+"""After the point, of scores that are told apart. Round-off of a simulation, 4e-15 V, is carried on by fits: it moved
+scores of four discoveries by 1e-10 to 7e-8 nats, and those of what says nothing by 1e-14."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +74,12 @@ def ranking(
                 remark,
             )
         )
-    return tuple(sorted(rows, key=lambda row: -row.score))
+    return best_first(rows)
+
+
+def best_first(rows: Sequence[CandidateEffect]) -> tuple[CandidateEffect, ...]:
+    """Those that say the same stay in the order given."""
+    return tuple(sorted(rows, key=lambda row: -round(row.score, DIGITS)))
 
 
 def _remark(path: Path, one: Explanation) -> str:
@@ -99,7 +107,7 @@ def estimates(path: Path, one: Explanation, effect: str) -> dict[str, Estimate]:
 
 
 def _parent(path: Path, one: Explanation) -> FittedHypothesis:
-    """What a hypothesis grew from."""
+    """The hypothesis that another one grew from."""
     steps = (step for step in path.steps if any(grown is one for grown in step.grown))
     return next(fit for step in steps for fit in step.parents if fit.hypothesis == one.hypothesis[:-1])
 

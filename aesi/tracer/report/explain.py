@@ -16,11 +16,11 @@ MEMORIES_S = (10.0, 60.0, 300.0, 1800.0)
 TURNS_S = (120.0, 900.0)
 """Low-passes of the sign of the current that stand for hysteresis."""
 REST_SHARE = 0.02
-"""Of the current's RMS: less has no sign."""
+"""Share of the current's RMS below which a current has no sign."""
 FOLDS = 5
 """Sets of blocks, each left out in turn."""
 BLOCKS = 25
-"""Contiguous ones, dealt out to the folds in turn; long against the correlation of neighbours."""
+"""Contiguous blocks of rows, dealt out to the folds in turn; long against the correlation of neighbours."""
 RIDGES = (1e-4, 1e-2, 1.0, 1e2, 1e4)
 """The one that predicts left-out blocks best is taken."""
 SATURATION = 0.5

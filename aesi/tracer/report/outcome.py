@@ -26,14 +26,14 @@ NAMES: Mapping[State, str] = {
 }
 
 RESAMPLES = 400
-"""The ends of a 95 % interval are then known to about a percentile."""
+"""Bootstrap resamples: the ends of a 95 % interval are then known to about a percentile."""
 BOOTSTRAP_BLOCK_S = 300.0
-"""Long against the correlation of a model error, short against a drive."""
+"""Length of a bootstrap block, s: long against the correlation of a model error, short against a drive."""
 
 
 @dataclass(frozen=True)
 class Errors:
-    """Of a voltage, V: root mean square, mean absolute, largest."""
+    """Errors of a voltage, V: root mean square, mean absolute, largest."""
 
     rmse_v: float
     mae_v: float

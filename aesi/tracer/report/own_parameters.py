@@ -9,7 +9,7 @@ from aesi.tracer.case.free_parameter import CAPACITY_SHARE, FreeParameter
 from aesi.tracer.likelihood.model_state import ModelState
 
 LIMIT_SHARE = 0.01
-"""Share of the range next to its end that counts as the end."""
+"""Share of the range, at either end of it, within which a parameter counts as on its limit."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,8 @@ def own_parameters(state: ModelState) -> tuple[OwnParameter, ...]:
 
 
 def ages_told(states: Sequence[ModelState]) -> str:
-    """For a reader, the capacity that the cell had in each record, of the first state that has them; '' of none."""
+    """A sentence on the capacity that the cell had in each record, by the first state that has one; '' where none
+    has."""
     for state in states:
         shares = (state.values or {}).get(CAPACITY_SHARE)
         if shares:

@@ -29,8 +29,8 @@ def contradicted_by_v(files: Sequence[FileOutcome], verdict: Verdict) -> float |
 
 
 def warnings(files: Sequence[FileOutcome], verdict: Verdict, rest_a: float = 0.0) -> tuple[str, ...]:
-    """Where the test part contradicts a verdict that explains the data, where the written model does worse there, or on
-    what was fitted, than another one, and where the test part has no load.
+    """Sentences on where the test part contradicts a verdict that explains the data, where the written model does worse
+    than another one there or on what was fitted, and where the test part has no load.
 
     rest_a : A, below which the cell rests.
     """
@@ -55,7 +55,10 @@ def _of_contradiction(files: Sequence[FileOutcome], verdict: Verdict) -> str | N
 
 
 def _of_worse_on_tests(tests: Sequence[FileOutcome], named: bool) -> str | None:
-    """named : whether the verdict names an effect, which the written model has where it is none of the others."""
+    """A sentence on the other models that do better than the written one on the test part.
+
+    named : whether the verdict names an effect, which the written model has where it is none of the others.
+    """
     after_mv = _left_mv(tests, "after")
     less = _less_than(tests, after_mv)
     if not less:
@@ -114,7 +117,7 @@ def _less_than(files: Sequence[FileOutcome], after_mv: float) -> dict[str, float
 
 
 def _left_mv(files: Sequence[FileOutcome], state: State) -> float:
-    """To the hundredth of a mV that is shown; 0 where there are none."""
+    """RMS that a model leaves, mV, to the hundredth that is shown; 0 where there are no rows."""
     if not files:
         return 0.0
     return round(MV_PER_V * rms(np.concatenate([f.residual_v(state) for f in files])), 2)

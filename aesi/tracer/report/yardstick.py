@@ -36,7 +36,7 @@ PIECES = 10
 RIDGES = (1.0, 100.0)
 """Weights tried, in the units of the scaled library."""
 THRESHOLD = 1e-3
-"""Coefficients below are dropped."""
+"""Coefficients below this are dropped."""
 SHOWN = 4
 """Terms that are named for each of POINTS_TO."""
 
@@ -112,18 +112,7 @@ def _at(series: ErrorSeries, dt_s: float) -> ErrorSeries:
 
 
 def _measured(records: Sequence[ErrorSeries]) -> Yardstick:
-    rows = sum(map(len, records))
-    block = max(int(BLOCK_S / records[0].dt_s), 10)
-    options = Options(
-        inputs=INPUTS,
-        p_c=ORDER,
-        d=DEGREE,
-        mixed=False,
-        resamples=RESAMPLES,
-        block=block,
-        fold=max(rows // PIECES, block),
-        balance=False,
-    )
+    options = _options(records)
     try:
         problem = Problem.build(Split(tuple(records), (), ()), options)
     except DataError:  # too few samples, or nothing that varies
@@ -148,6 +137,21 @@ def _measured(records: Sequence[ErrorSeries]) -> Yardstick:
     return Yardstick(float(np.sqrt(_share(best) * square)), pointers)
 
 
+def _options(records: Sequence[ErrorSeries]) -> Options:
+    rows = sum(map(len, records))
+    block = max(int(BLOCK_S / records[0].dt_s), 10)
+    return Options(
+        inputs=INPUTS,
+        p_c=ORDER,
+        d=DEGREE,
+        mixed=False,
+        resamples=RESAMPLES,
+        block=block,
+        fold=max(rows // PIECES, block),
+        balance=False,
+    )
+
+
 def _candidate(problem: Problem, terms: BoolArray, ridge: float, feedback: bool) -> Candidate | None:
     genome = Genome.of(terms, ridge, THRESHOLD, 0.5, ORDER, DEGREE, feedback)
     outcome = evaluate(problem, genome)
@@ -155,12 +159,12 @@ def _candidate(problem: Problem, terms: BoolArray, ridge: float, feedback: bool)
 
 
 def _share(candidate: Candidate | None) -> float:
-    """Of the mean square error, what the candidate explains of pieces that it has not seen, in free run."""
+    """Share of the mean square error that the candidate explains of pieces that it has not seen, in free run."""
     return 0.0 if candidate is None else max(0.0, 1.0 - candidate.loss_valid)
 
 
 def _of(library: Library, names: Sequence[str]) -> BoolArray:
-    """(m,) the constant and the terms that hold no other variables than these."""
+    """(m,) the constant, and the terms that hold no variables but these."""
     wanted = {library.variables.index(name) for name in names if name in library.variables}
     return np.array([{variable for variable, _ in term.factors} <= wanted for term in library.terms])
 

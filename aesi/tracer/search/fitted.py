@@ -17,11 +17,12 @@ from aesi.tracer.likelihood.model_error import PRIORS, SizePrior, replace_fast
 from aesi.tracer.search.archive import Archive, fit_name
 
 FIT_ROUNDS = 8
-"""Slopes are taken so many times at most; a fit that gains nothing more ends before. Measured on a blind case
+"""Most times that a fit takes slopes anew; one that gains nothing more ends before. Measured on a blind case
 (asymmetric kinetics, seed 12): after three steps a parameter was on its bound, after six it was where the truth is."""
 MOVED_SDS = 1.0
-"""Of its spread: what is to first order about a declared parameter that moved further may be far off where it is not.
-Measured on a blind case (leakage and a contact, seed 0): growth of the contact said 1 nat more, its fit 52."""
+"""Spreads from its declared value beyond which a parameter counts as moved: effects grown to first order about it
+may then be far off, and are grown about the declared value as well. Measured on a blind case (leakage and a contact,
+seed 0): growth of the contact said 1 nat more, its fit 52."""
 
 
 def base_of(problem: InverseProblem, blocks: Blocks, archive: Archive) -> FittedHypothesis | None:
@@ -63,8 +64,8 @@ def fitted_hypothesis(
 def from_within(
     problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis, archive: Archive
 ) -> FittedHypothesis:
-    """A fit that ended on bounds, or, where that says more, one begun with those parameters where they start: two of an
-    effect can hold each other where neither alone would end."""
+    """The fit, or a better one that was begun away from the bounds on which it ended: two parameters of an effect
+    can hold each other where neither alone would end."""
     fitter = HypothesisFitter(problem, blocks, fit.hypothesis)
     name = fit_name(problem, "fit from within", fit.hypothesis)
     x = archive.get(name, len(fitter.free))
@@ -106,7 +107,7 @@ def _slopes_v(near: Explanation, free: Sequence[FreeParameter]) -> Array | None:
 
 
 def as_declared(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis) -> FittedHypothesis | None:
-    """The same hypothesis about the declared values of its own parameters, as a place to grow from: one that lacks an
+    """The hypothesis about the declared values of its own parameters, as a place to grow from: one that lacks an
     effect moves them to make up for it. None where none of them moved far, or where it cannot be simulated there."""
     own = np.array([f.own and f.record is None for f in fit.free])
     if not np.any(own & (np.abs(fit.point.x) > MOVED_SDS)):

@@ -25,18 +25,18 @@ from aesi.tracer.search.plausible import most_plausible, plausibility
 from aesi.tracer.search.reach import REACH, within_reach
 
 FINALISTS = 6
-"""Effects that are fitted with the whole model: so many of the best. Growth is to first order in all that was there
-before, so that what it says of a right effect can be too little. On a blind development case (leakage and a resistance
-on the LG M50) the right second effect stood fifth to first order, with 10 nats, and first with 61 when fitted: three
-fits left 1.36 mV with a wrong name, six 1.006 of a noise of 1.01, in 30 instead of 22 s of processor."""
+"""Most effects that are fitted with the whole model in a step, the best ones. Growth is to first order in all that
+was there before, so that a right effect can gain too little in it. On a blind development case (leakage and a
+resistance on the LG M50) the right second effect stood fifth to first order, with 10 nats, and first with 61 when
+fitted: three fits left 1.36 mV with a wrong name, six 1.006 of a noise of 1.01, in 30 instead of 22 s of processor."""
 FINALIST_SHARE = 0.5
-"""Of what the best of them says more when it is grown. On six blind cases of seeds 0 and 12 those that said less ended
-at 2 to 27 % of the best one's full fit."""
+"""Least share of the best gain to first order that an effect needs in order to be fitted. On six blind cases of
+seeds 0 and 12 those below ended at 2 to 27 % of the best one's full fit."""
 HOPELESS_SHARE = 0.7
-"""Of the mean square beyond noise on unseen data without any effect: where two effects leave more, a third is not tried
-and none is exchanged. A convention that saves time: on a measured cell, which no two effects explain, each further
-round takes minutes. One effect may leave all of it: on a blind case (a contact, hysteresis and heat, seed 13) the first
-of three said 256 nats and did not lower the error, and the three were found."""
+"""Share of the mean square beyond noise on unseen data without any effect: where two effects leave more than this,
+no third is tried and none is exchanged. A convention that saves time: on a measured cell, which no two effects
+explain, each further round takes minutes. One effect may leave all of it: on a blind case (a contact, hysteresis and
+heat, seed 13) the first of three said 256 nats and did not lower the error, and the three were found."""
 
 
 def searched(
@@ -153,7 +153,7 @@ class _ForwardSearch:
             chosen = best
 
     def hopeless(self, chosen: FittedHypothesis) -> bool:
-        """Does the hypothesis leave so much that another effect more will not do?"""
+        """Whether the hypothesis leaves so much that one more effect will not do."""
         left, without = (excess_mean_square_v2(self.problem, self.blocks, fit) for fit in (chosen, self.base))
         return left > HOPELESS_SHARE * without
 
@@ -183,7 +183,7 @@ class _ForwardSearch:
         return Step(tuple(parents), tuple(ranked), tuple(fitted), admitted, least_nats), refused
 
     def _finalists_fitted(self, ranked: Sequence[Grown], best: FittedHypothesis) -> list[FittedHypothesis]:
-        """What is worth it of what was grown, fitted with the whole model; the best first."""
+        """The most promising of what was grown, fitted with the whole model; the best first."""
         fitted = []
         for one in _finalists(ranked, best):
             fit = self._fitted(one.hypothesis, one)
@@ -245,7 +245,7 @@ def refitted(problem: InverseProblem, path: Path, archive: Archive) -> Path | No
 
 
 def _grown(growths: Sequence[EffectGrowth], archive: Archive) -> tuple[list[Grown], list[str]]:
-    """Where they end, and why some of them could not be simulated."""
+    """Where the growths end, and why some of them could not be simulated."""
     grown, refused = [], []
     for growth, one in zip(growths, ended(growths, archive), strict=True):
         if one is None:
@@ -257,7 +257,7 @@ def _grown(growths: Sequence[EffectGrowth], archive: Archive) -> tuple[list[Grow
 
 
 def _ranked(grown: Sequence[Grown]) -> list[Grown]:
-    """Each hypothesis once, where it says most; the best first."""
+    """Each hypothesis once, where it gains most; the best first."""
     best: dict[frozenset[str], Grown] = {}
     for one in sorted(grown, key=lambda g: -g.score.total):
         best.setdefault(frozenset(one.hypothesis), one)
@@ -265,7 +265,7 @@ def _ranked(grown: Sequence[Grown]) -> list[Grown]:
 
 
 def _finalists(ranked: Sequence[Grown], best: FittedHypothesis) -> list[Grown]:
-    """What is worth a fit with the whole model."""
+    """The growths that are worth a fit with the whole model."""
     gains = [one.score.total - best.score.total for one in ranked[:FINALISTS]]
     least = max(FINALIST_SHARE * max(gains, default=0.0), 0.0)
     return [one for one, gain in zip(ranked, gains, strict=False) if gain > least]
@@ -278,9 +278,9 @@ def admissible(
     fit: FittedHypothesis,
     least_nats: float,
 ) -> bool:
-    """Does the effect say enough of unseen data, is the hypothesis more plausible with it, does it move the voltage by
-    more than approximations of the model do, and does it end on no bound? By how much it lowers the error is not asked:
-    the first of several may not lower it at all."""
+    """Whether an effect is admitted: it gains enough on unseen data, makes the hypothesis more plausible, moves the
+    voltage by more than approximations of the model do, and ends on no bound. By how much it lowers the error is not
+    asked: the first of several effects may not lower it at all."""
     competing = len(problem.competing())
     moved_v = held_out_residual(blocks, without) - held_out_residual(blocks, fit)
     return (
@@ -298,6 +298,6 @@ def needed(
     fit: FittedHypothesis,
     least_nats: float,
 ) -> bool:
-    """Would the effect be admitted on top of all the others, and does it lower the error of unseen data?"""
+    """Whether the effect would be admitted on top of all the others, and lowers the error on unseen data."""
     lowers = unseen_rmse_v(blocks, fit) < unseen_rmse_v(blocks, without)
     return lowers and admissible(problem, blocks, without, fit, least_nats)

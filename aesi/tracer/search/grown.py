@@ -24,8 +24,8 @@ another one 18 end as 12 do."""
 def growths_on(
     parents: Sequence[Parent], slopes: Mapping[str, Array], archive: Archive
 ) -> list[EffectGrowth]:
-    """What is worth growing: every effect on the bare model, later the hypotheses that promise most to first order,
-    whichever parent they come from.
+    """The growths that are worth a descent: every effect on the bare model, later the hypotheses that promise most to
+    first order, whichever parent they come from.
 
     slopes : of each effect on a parent before, (n, k) V; none for the bare model.
     """
@@ -63,9 +63,9 @@ def _put_promises(pairs: Sequence[tuple[Parent, str]], slopes: Mapping[str, Arra
 def promising_first(
     growths: Sequence[EffectGrowth], archive: Archive
 ) -> tuple[list[EffectGrowth], dict[str, Array]]:
-    """Of what grows on the bare model, that which says most with the other model of the cell, or promises most to first
-    order with this one, and the slopes (n, k) V of the others; all of it, and no slopes, where the other model did not
-    grow the same."""
+    """Of the growths on the bare model, those that gain most with the other model of the cell, or promise most to
+    first order with this one, and the slopes (n, k) V of the others. Where the other model did not grow the same,
+    all of them, and no slopes."""
     near = [archive.near(_key(growth.parent, growth.effect, "said"), 1) for growth in growths]
     if any(gain is None for gain in near):
         return list(growths), {}
@@ -90,9 +90,9 @@ def promising_first(
 
 
 def _first_slopes(growths: Mapping[str, EffectGrowth]) -> dict[str, Array]:
-    """Of each effect where its descent begins: that shows far better what it will say beside what was found than where
-    it ended as a stand-in for all that was missing. Only for the model that is searched first: the other one goes by
-    what was promised there."""
+    """Slopes of each effect where its descent begins: these show far better what it will gain beside what was found
+    than its slopes where it ended, as a stand-in for all that was missing. Only for the model that is searched
+    first; the other one goes by what was promised there."""
     found = side_by_side(EffectGrowth.first_slopes, growths.values())
     return {name: slopes for name, slopes in zip(growths, found, strict=True) if slopes is not None}
 
@@ -115,14 +115,16 @@ def addable(parent: Parent) -> list[str]:
 
 
 def grown_with(parent: Parent, names: Sequence[str], archive: Archive) -> list[Grown]:
-    """Where these effects end on a hypothesis, whether or not they compete in a search; without those that fail."""
+    """The ends of the growth of these effects on a hypothesis, whether or not they compete in a search, without
+    those that fail."""
     growths = [_growth(parent, name, archive) for name in names]
     return [one for one in ended(growths, archive) if one is not None]
 
 
 def _has_something_to_say(problem: InverseProblem, name: str) -> bool:
-    """Not what infers a quantity that every record holds, nor what a file has right that was fitted to this very
-    cell, nor, where good records stand beside the others, what all records of a cell share."""
+    """Whether an effect may compete: not one that infers a quantity that every record holds, nor one that restates
+    what a file that was fitted to this very cell has right, nor, beside good records, one that all records of a cell
+    share."""
     effect = problem.effects[name]
     if effect.infers is not None and all(r.data.temperature_degc is not None for r in problem.records):
         return False
@@ -137,7 +139,7 @@ def _growth(parent: Parent, name: str, archive: Archive) -> EffectGrowth:
 
 
 def ended(growths: Sequence[EffectGrowth], archive: Archive) -> Iterable[Grown | None]:
-    """Where they end, in the order given."""
+    """The ends of the descents, in the order given."""
 
     def one(growth: EffectGrowth) -> Grown | None:
         found = growth.ended()
@@ -155,7 +157,7 @@ def _promise_key(parent: Parent, name: str) -> str:
 
 
 def _key(parent: Parent, name: str, what: str = "grown") -> str:
-    """Of a growth, or of what it promised or said, in the archive."""
+    """Name in the archive of a growth, of its promise or of its gain."""
     kind = f"{what} as declared" if parent.fit.as_declared else what
     return fit_name(parent.problem, kind, (*parent.fit.hypothesis, name))
 

@@ -56,7 +56,7 @@ class Path:
 
     @property
     def admission_nats(self) -> float:
-        """What an effect had to say more of unseen data at the strictest step."""
+        """Nats that an effect had to gain at the strictest step."""
         return max((step.admission_nats for step in self.steps), default=0.0)
 
     def gain(self, one: Explanation) -> float:
@@ -65,7 +65,7 @@ class Path:
 
 
 def _best(tried: Sequence[Explanation]) -> dict[frozenset[str], Explanation]:
-    """Of each set of effects, whatever their order, the one that says most of unseen data."""
+    """The hypothesis of each set of effects, in whatever order, that gains most on unseen data."""
     best: dict[frozenset[str], Explanation] = {}
     for one in tried:
         known = best.setdefault(frozenset(one.hypothesis), one)
@@ -75,7 +75,7 @@ def _best(tried: Sequence[Explanation]) -> dict[frozenset[str], Explanation]:
 
 
 Report = Callable[[InverseProblem, Explanation, float], None]
-"""Called with each hypothesis and what it says more than its parent, nats."""
+"""Called with the problem, each hypothesis and the nats that it gains over its parent."""
 
 
 def unseen_rmse_v(blocks: Blocks, one: Explanation) -> float:

@@ -36,7 +36,7 @@ def sds_behind(nats: float, deviation: float, least_nats: float = ALIKE_NATS) ->
 
 
 def alike(better: Explanation, other: Explanation, sds: float = ALIKE_SDS, nats: float = ALIKE_NATS) -> bool:
-    """Do the data not tell the second hypothesis from the first?"""
+    """Whether the data do not tell the second hypothesis from the first."""
     behind, deviation = lag(better, other)
     return behind < max(nats, sds * deviation)
 

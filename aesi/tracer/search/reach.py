@@ -15,13 +15,14 @@ from aesi.tracer.search.archive import Archive, fit_name
 from aesi.tracer.search.grown import ended
 
 REACH = 2.0
-"""Times what a right hypothesis may leave: where the marks of all effects together leave more, whatever their sizes, no
-few of them leave so little, as far as they are linear. With marks where the effects end, they left at most 0.47 times
-that on ten blind cases of seed 13, and 3.5 (M50T), 5.4 (NMC) and 11 times (HG2) on measured records. With marks
-where their fits begin, which cost a fifth, 0.29 instead of 0.44 times on the hardest of five blind cases, and 2.5
-instead of 2.9 and 2.6 times on one drive of the HG2 and of the Panasonic. Few marks are no such span: four effects
-tried on a check-up of a cell that lost a tenth of its lithium, two of which explain it, left 4.4 times that (0.5 with
-marks where they end, with which five measured cases took 1.4 times as long)."""
+"""Factor on what a right hypothesis may leave. Where the marks of all effects together (the changes of voltage that
+each can make) leave more, in whatever sizes, no few of them leave little enough, as far as they are linear. With
+marks where the effects end, they left at most 0.47 times that on ten blind cases of seed 13, and 3.5 (M50T), 5.4
+(NMC) and 11 times (HG2) on measured records. With marks where their fits begin, which cost a fifth, 0.29 instead of
+0.44 times on the hardest of five blind cases, and 2.5 instead of 2.9 and 2.6 times on one drive of the HG2 and of
+the Panasonic. The marks of few effects prove nothing: four effects tried on a check-up of a cell that lost a tenth
+of its lithium, two of which explain it, left 4.4 times that (0.5 with marks where they end, with which five measured
+cases took 1.4 times as long)."""
 
 
 def within_reach(

@@ -58,7 +58,7 @@ def with_wrong_parameters(path: Path, most: int, archive: Archive) -> Path:
 
 
 def _with_another(path: Path, chosen: FittedHypothesis) -> list[FittedHypothesis]:
-    """What the search fitted with one effect more than the chosen hypothesis."""
+    """The fits of the search that hold one effect more than the chosen hypothesis."""
     names = set(chosen.hypothesis)
     fits = [fit for step in path.steps for fit in step.fitted]
     return [fit for fit in fits if names < set(fit.hypothesis) and len(fit.hypothesis) == len(names) + 1]

@@ -26,7 +26,7 @@ SIMULATE = ("simulate", "--cell", LG_M50, "--current", "i.csv", "--out", "o.csv"
 CALIBRATE = ("calibrate", "--cell", LG_M50, "--data", "d.csv", "--out", "n.json")
 
 
-def test_version(call):
+def test_the_version_is_printed(call):
     assert call("--version")[:2] == (0, "aesi 0.1.0\n")
 
 

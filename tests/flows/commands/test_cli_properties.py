@@ -136,12 +136,12 @@ def check(call, arguments):
 
 @QUICK
 @given(ARGUMENTS)
-def test_absurd_arguments(call, place, arguments):
+def test_absurd_arguments_end_in_one_sentence(call, place, arguments):
     check(call, arguments)
 
 
 @pytest.mark.slow
 @THOROUGH
 @given(ARGUMENTS)
-def test_ten_thousand_absurd_arguments(call, place, arguments):
+def test_ten_thousand_absurd_arguments_end_in_one_sentence(call, place, arguments):
     check(call, arguments)

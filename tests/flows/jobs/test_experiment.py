@@ -77,7 +77,7 @@ def test_the_figures_of_the_paper_are_drawn(finished, page):
         assert f'"{figure}":' in content
 
 
-def test_everything_is_tracked(finished):
+def test_settings_records_and_every_candidate_of_a_run_are_tracked(finished):
     store, parent, children = tracked_runs(workspace=finished)
     assert parent.info.status == "FINISHED"
     assert {"seed", "search.candidates", "versions", "chosen_candidate"} <= parent.data.params.keys()

@@ -13,7 +13,9 @@ LEVELS = np.array([0.05, 0.25, 0.75, 0.95])
     "options",
     [{"n_estimators": 10, "max_depth": 2}, {"n_estimators": 8, "min_samples_leaf": 20, "max_samples": 0.4}],
 )
-def test_same_quantiles(rng: np.random.Generator, options: dict[str, float]) -> None:
+def test_the_forest_gives_the_quantiles_of_quantile_forest(
+    rng: np.random.Generator, options: dict[str, float]
+) -> None:
     from quantile_forest import RandomForestQuantileRegressor
 
     rows = rng.standard_normal((1500, 6))

@@ -18,7 +18,7 @@ def zero():
     return DummyRegressor(strategy="constant", constant=0.0).fit(np.zeros((2, 1)), np.zeros(2))
 
 
-def test_split_conformal_quantiles(zero, rng: np.random.Generator) -> None:
+def test_split_conformal_bounds_are_those_of_mapie(zero, rng: np.random.Generator) -> None:
     from mapie.conformity_scores import AbsoluteConformityScore
     from mapie.regression import SplitConformalRegressor
 
@@ -34,7 +34,7 @@ def test_split_conformal_quantiles(zero, rng: np.random.Generator) -> None:
         assert abs(np.searchsorted(ordered, bound) - np.searchsorted(ordered, peer_bound)) <= 1
 
 
-def test_rolling_quantiles(zero, rng: np.random.Generator) -> None:
+def test_rolling_bounds_are_those_of_mapie(zero, rng: np.random.Generator) -> None:
     from mapie.regression import TimeSeriesRegressor
 
     past, future = rng.standard_normal(500), 3 * rng.standard_normal(80)

@@ -72,7 +72,7 @@ def test_faults_beside_good_records_are_the_same_faults():
         assert by_name[case.matched].fault is None
 
 
-def test_faults_by_hand():
+def test_each_fault_changes_a_record_as_worked_out_by_hand():
     data = Measurement(np.arange(4.0), np.array([0.0, 2.0, 2.0, 0.0]), np.array([4.0, 3.9, 3.8, 3.9]))
     assert with_fault(data, "current_offset", 0.1).current_a == pytest.approx([0.1, 2.1, 2.1, 0.1])
     assert with_fault(data, "current_gain", 1.02).current_a == pytest.approx([0, 2.04, 2.04, 0])

@@ -17,7 +17,7 @@ def answer(verdict, *effects, groups=()):
     return {"verdict": verdict, "effects": list(effects), "indistinguishable": [list(g) for g in groups]}
 
 
-def test_the_exact_name():
+def test_the_exact_name_is_right_by_every_measure():
     given = judge("self_heating", (), (), answer("found", "self_heating"))
     assert given.exact
     assert given.grouped
@@ -83,7 +83,7 @@ def test_intervals_are_those_of_clopper_and_pearson():
     assert rate([{"exact": True}, {"exact": False}], "exact").named("exact")["exact_pct"] == 50.0
 
 
-def test_calibration_by_tenths():
+def test_confidence_is_held_against_right_answers_by_tenths():
     rows = [{"confidence": 0.95, "grouped": k < 9} for k in range(10)] + [
         {"confidence": 0.0, "grouped": False}
     ]

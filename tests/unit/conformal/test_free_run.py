@@ -82,7 +82,7 @@ def test_a_piece_is_judged_by_a_scale_that_has_not_seen_it() -> None:
     np.testing.assert_allclose(band.scales[-1](np.array([[1.0, 0.0, 0.0]])), 1e-3)
 
 
-def test_survives_json() -> None:
+def test_bands_read_back_from_json_have_the_same_edges() -> None:
     bands = replace(fitted(), root=np.tri(3))
     text = json.dumps(bands.to_dict(), default=lambda a: a.tolist(), allow_nan=False)
     restored = FreeRunBands.from_dict(json.loads(text))

@@ -9,7 +9,7 @@ def band(low: list[float], high: list[float]) -> Intervals:
     return Intervals(np.array(low), np.array(high), np.ones(len(low), dtype=bool))
 
 
-def test_hand_worked_case() -> None:
+def test_coverage_width_and_score_of_a_case_worked_by_hand() -> None:
     # Widths 2; one residual 1 below its band at alpha = 0.1 costs 20: (2 + 2 + 22 + 2) / 4 = 7.
     residuals = np.array([0.0, 0.5, -2.0, 1.0])
     scores = scores_of(band([-1] * 4, [1] * 4), residuals, 0.1)
@@ -56,7 +56,7 @@ def test_bins_separate_state_of_charge() -> None:
     assert worst_bin_coverage(covered, np.zeros(500), soc) == 0.5
 
 
-def test_low_minutes() -> None:
+def test_low_minutes_are_the_windows_that_cover_too_little() -> None:
     # Three minutes at 1 Hz; the middle one is missed altogether. A window of 60 is under 70 % where it holds
     # 19 or more of the misses: starts 19 - 60 + 60 = 19 to 119 - 18 = 101, 83 of the 121 windows.
     covered = np.ones(180)

@@ -42,7 +42,7 @@ def test_infinity_counts_as_missing(calibrated) -> None:
     assert stream.interval() == calibrated.marginal_v
 
 
-def test_memory_is_bounded(calibrated) -> None:
+def test_a_stream_takes_no_more_memory_as_it_goes_on(calibrated) -> None:
     stream = calibrated.stream()
     for _ in range(1000):
         stream.update(1e-4)

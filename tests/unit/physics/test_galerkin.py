@@ -63,7 +63,7 @@ def test_the_steady_profile_of_the_stack_is_the_closed_form(regions):
     assert modes.salt @ profile == pytest.approx(0.0, abs=1e-12)
 
 
-def test_salt_is_kept():
+def test_the_modes_of_the_electrolyte_keep_salt():
     modes = stack_modes(*LAYERS, 4, 3)
     both = modes.gain[:3].sum(axis=0) - modes.gain[3:].sum(axis=0)
     assert both[0] == pytest.approx(0.0, abs=1e-9 * abs(modes.gain[0, 0]))

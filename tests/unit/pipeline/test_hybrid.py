@@ -10,6 +10,7 @@ import pytest
 from small_experiment import SOC0, experiment, fitted, write_record
 
 import aesi
+from aesi.data.resample import to_even
 from aesi.errors import DataError, InputError, SimulationError
 from aesi.physics.effects import CATALOGUE, activated
 from aesi.physics.folded import folded
@@ -92,9 +93,15 @@ def test_both_regimes_beat_the_physics_and_carry_bands(model, data):
 
 def test_another_sampling_is_brought_to_the_models_own_and_back(model, data):
     rows = np.r_[0:1000:2, 1000 : len(data) : 5]
-    prediction = model.predict(data.time_s[rows], data.current_a[rows], SOC0)
-    assert len(prediction.voltage_v) == len(rows)
-    assert np.isfinite(prediction.voltage_v).all()
+    time_s, current_a = data.time_s[rows], data.current_a[rows]
+    prediction = model.predict(time_s, current_a, SOC0)
+    own = aesi.simulate(model.cell, time_s, current_a, SOC0, model.effects, hold=model.hold)
+    np.testing.assert_allclose(prediction.physics_v, own.voltage_v, atol=1e-12)
+    even = to_even(aesi.Measurement(time_s, current_a, data.voltage_v[rows]), model.dt_s, model.hold)
+    stepped = model.predict(even.time_s, even.current_a, SOC0)
+    correction = np.interp(time_s, even.time_s, stepped.voltage_v - stepped.physics_v)
+    assert np.abs(correction).max() > 1e-3
+    np.testing.assert_allclose(prediction.voltage_v - prediction.physics_v, correction, atol=1e-12)
 
 
 def test_the_band_of_physics_alone_counted_rows_of_any_length_as_steps(model, record):
@@ -286,6 +293,21 @@ def test_self_heating_that_a_measured_temperature_leaves_idle_was_told_as_simula
     assert "self_heating has nothing to add" in said[True]
     assert "with self_heating(" not in said[True]
     assert "with self_heating(" in said[False]
+
+
+@pytest.mark.parametrize("use", [simulate_file, predict_file])
+@pytest.mark.parametrize(("column_degc", "told"), [(0.0, True), (25.0, False), (None, False)])
+def test_a_dead_temperature_was_simulated_at_without_a_word(model, data, tmp_path, use, column_degc, told):
+    physics, record, said = HybridModel(model.cell, hold="linear"), tmp_path / "drive.csv", []
+    run = aesi.simulate(model.cell, data.time_s, data.current_a, SOC0, temperature_degc=25.0)
+    columns = {"time_s": data.time_s, "current_a": data.current_a, "voltage_v": run.voltage_v}
+    degc = {} if column_degc is None else {"temperature_degc": column_degc}
+    pd.DataFrame(columns | degc).to_csv(record, index=False)
+    asked = ProfileRequest(soc0=SOC0)
+    use(physics.save(tmp_path / "physics"), record, tmp_path / "out.csv", asked, say_notes=said.extend)
+    found = [note for note in said if "its voltage contradicts its temperature" in note]
+    assert bool(found) == told
+    assert not found or found[0].startswith("drive: its voltage contradicts its temperature. At 0 degC")
 
 
 def test_physics_with_effects_alone_is_a_model_too(model, data, tmp_path):

@@ -10,6 +10,7 @@ from aesi.records import Failed, Split
 from aesi.sparse import Candidate, FitnessWeights, Genome, Options, Problem, evaluate, fitness
 from aesi.sparse.ranking import svd_ranking, svd_scores
 from aesi.sparse.search.fold_models import fold_models
+from aesi.sparse.search.judge import fold_runs
 from aesi.sparse.stridge import STRidge
 from aesi.sparse.terms.library import Library, Term
 
@@ -31,7 +32,7 @@ def test_a_known_error_is_recovered(problem, split):
     assert candidate.pearson_train > 0.98
 
 
-def test_evaluation_is_pure(problem):
+def test_a_candidate_evaluated_twice_is_the_same(problem):
     one, other = (evaluate(problem, whole(problem)) for _ in range(2))
     assert one.losses == other.losses
     np.testing.assert_array_equal(one.bagging.coefficients, other.bagging.coefficients)
@@ -55,9 +56,6 @@ def test_a_model_without_feedback_learns_a_memory(feedback_problem):
 
 def test_free_runs_of_the_search_equal_those_of_the_model(feedback_problem):
     # The fold's fit, run by the vectorised loop over a piece, against the model's own loop.
-    from aesi.sparse.search.evaluate import sparse_model
-    from aesi.sparse.search.judge import fold_runs
-
     problem = feedback_problem
     genome = whole(problem, 1e-3, 1e-3)
     candidate = evaluate(problem, genome)
@@ -71,7 +69,6 @@ def test_free_runs_of_the_search_equal_those_of_the_model(feedback_problem):
     model = replace(candidate.bagging, memory=0.0)
     expected = problem.scaling.error_to_scaled(model.free_run(first).error_v[1:])
     np.testing.assert_allclose(runs.free_run[: len(expected), 2], expected, atol=1e-10)
-    assert callable(sparse_model)
 
 
 def test_residuals_are_out_of_fold_and_complete(problem, split):

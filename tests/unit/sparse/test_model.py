@@ -27,7 +27,7 @@ def record(error, current) -> ErrorSeries:
     )  # fmt: skip
 
 
-def test_hand_worked_recursion():
+def test_a_free_run_feeds_back_as_worked_by_hand():
     run = linear(0.5, 0.1).free_run(record([0.8, 9, 9, 9], [1, 0, -1, 0]))
     np.testing.assert_allclose(run.error_v, [0.8, 0.5, 0.25, 0.025])
     assert run.diverged_at is None
@@ -91,7 +91,7 @@ def test_tan_past_its_pole_is_a_divergence_not_a_nan():
     assert run.diverged_at == 2
 
 
-def test_json_round_trip():
+def test_a_model_read_back_from_json_runs_the_same():
     model = linear(0.5, 0.1)
     again = SparseModel.from_dict(json.loads(json.dumps(model.to_dict())))
     series = make_record(50)

@@ -6,7 +6,7 @@ from aesi.sparse import STRidge
 from aesi.sparse.stridge import triangle
 
 
-def test_hand_worked_case():
+def test_coefficients_of_a_case_worked_by_hand():
     # Orthogonal columns of squared length 2: ridge divides x'y by 2 + lambda1; then 0.05 falls below 0.1.
     theta = np.array([[1.0, 1.0], [1.0, -1.0]])
     y = theta @ [3.0, 0.05]

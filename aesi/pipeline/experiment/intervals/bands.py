@@ -23,12 +23,12 @@ from aesi.sparse.yardsticks import Bare
 Unseen = tuple[ErrorModel, ErrorSeries, slice]
 """A model, a record, and the samples of it that the model was not fitted to."""
 WHOLE = slice(1, None)
-"""All but the first sample, which is given."""
+"""All samples but the first, which is given."""
 
 
 @dataclass(frozen=True, eq=False)
 class OutOfSampleErrors:
-    """What predictions left of the error on samples their models had not seen, one (n_i,) array a record.
+    """Errors left by predictions on samples that their models had not seen, one (n_i,) array a record.
 
     records : their names; a record is here once for each part of it that was left out.
     by_horizon : s (WHOLE_DRIVE: from the first sample) -> V, NaN where there is no prediction, or a seen one.
@@ -78,9 +78,11 @@ class OutOfSampleErrors:
         )
 
     def bands(self, alpha: float, stretches: int | None = None) -> FreeRunBands:
-        """Calibrated on these; `stretches` of them err independently over a whole drive, by default all their pieces.
+        """Bands calibrated on these errors.  stretches : how many stretches err independently over a whole drive; by
+        default as many as there are pieces.
 
-        Raises FitError where they are too few, or zero."""
+        Raises FitError where they are too few, or zero.
+        """
         return FreeRunBands.fit(
             self.by_horizon,
             self.dt_s,
@@ -123,11 +125,11 @@ def error_of_free_run(series: ErrorSeries, run: FreeRun) -> Array:
 def _inside(model: ErrorModel, series: ErrorSeries, rows: slice, train: Sequence[ErrorSeries]) -> BoolArray:
     """(n,) True where the model had been trained at such temperatures, and on such inputs.
 
-    The models behind left-out pieces share the scaling of the whole training set and cannot tell by themselves:
-    for a piece of a training record, the range is that of the training rows outside it. Of inputs beyond it physics
-    makes what it does in use, and so does a correction that fades into it: all of their rows count there. At other
-    temperatures none does, of any model: a band adds there what the fitted rows cannot tell (`FreeRunBands.thermal`),
-    so an error there is not one of the calibrated width alone.
+    The models behind left-out pieces share the scaling of the whole training set and cannot tell by themselves: for a
+    piece of a training record, the range is that of the training rows outside it.
+    Inputs beyond that range do not count as outside for physics, or for a correction that fades into it: there these do
+    what they will do in use. Temperatures beyond it do, for every model: the band adds there what the fitted rows
+    cannot tell (`FreeRunBands.thermal`), so an error there is not one of the calibrated width alone.
     """
     # The first sample of a record is predicted by none: it is left out with the one after it.
     held = slice(0, rows.stop) if rows.start == 1 else rows
@@ -146,7 +148,7 @@ def _inside(model: ErrorModel, series: ErrorSeries, rows: slice, train: Sequence
 
 
 def _seen(train: Sequence[ErrorSeries], rows: Sequence[BoolArray]) -> Visited:
-    """By those rows of each record."""
+    """Charges and temperatures visited by those rows of each record."""
     pairs = list(zip(train, rows, strict=True))
     return Visited.of(
         np.concatenate([record.soc[kept] for record, kept in pairs]),
@@ -160,10 +162,11 @@ def _root(
     left_out: ErrorSeries | None = None,
     rows: slice = WHOLE,
 ) -> Array | None:
-    """Of the parameters, by the training records without the given rows of one of them, where that is one; None without
-    slopes.
+    """Root of the parameters' covariance by the training records, without the given rows of one of them where that is
+    one; None without slopes.
 
-    missed_v : what a fit to these rows allowed for; None where none was made, which would begin with the least."""
+    missed_v : what a fit to these rows allowed for; None where none was made, which would begin with the least.
+    """
     slopes = []
     for record in train:
         if record.slopes_v is not None:

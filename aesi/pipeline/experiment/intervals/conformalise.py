@@ -32,10 +32,10 @@ def conformalise(
 ) -> tuple[Fitted, ...]:
     """The models with intervals and bands, calibrated on residuals of records they were not fitted to.
 
-    All: the validation records. The ensembles also each training piece, by a model fitted without it. Physics models
-    also the training records.
-    left_out : training drives under physics fitted without some rows of them; by default the drives as they are.
-    Bands are calibrated on parts of them and on whole ones.
+    For every model these are the validation records; for the ensembles also each training piece, by a model fitted
+    without it; for physics models also the training records.
+    left_out : training drives under physics fitted without some rows of them; by default the drives as they are. Bands
+    are calibrated on parts of them and on whole ones.
     """
     return tuple(_conformalised(one, problem, chosen, config, left_out or LeftOutDrives()) for one in models)
 
@@ -78,7 +78,7 @@ def _unseen_predictions(
 def _calibrated(
     one: Fitted, pairs: Sequence[Unseen], drives: Sequence[Unseen], problem: Problem, config: ExperimentConfig
 ) -> Fitted:
-    """With what can be calibrated on them, and a note of what cannot."""
+    """The model with the intervals and bands that can be calibrated, and a note on those that cannot."""
     intervals, bands, notes = None, None, []
     compared: dict[str, Calibrated | RefittedIntervals] = {}
     try:
@@ -105,7 +105,7 @@ def _calibrated(
 def _bands(
     unseen: Sequence[Unseen], stretches: int, problem: Problem, config: ExperimentConfig
 ) -> FreeRunBands:
-    """stretches : how many err independently; whole drives are the same rows as their parts."""
+    """stretches : how many stretches err independently; whole drives are the same rows as their parts."""
     errors = OutOfSampleErrors.of(unseen, problem.split.train, config.conformal.horizons_s)
     return errors.bands(config.conformal.alpha, stretches)
 

@@ -29,7 +29,7 @@ from aesi.records import ROLES, ErrorSeries, FreeRun, Role, Split
 from aesi.sparse import SparseModel
 
 HORIZONS_S = (1.0, 10.0, 60.0)
-"""A sample, a manoeuvre, a minute: those of the tables."""
+"""Horizons of the tables, s: a sample, a manoeuvre, a minute."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +102,7 @@ def _judge(one: Fitted, series: ErrorSeries, role: Role) -> _Judged:
 
 
 def _row(one: Fitted, judged: Mapping[Role, Sequence[_Judged]], seconds: float) -> dict[str, Any]:
-    """A model's row in summary.json: each regime on every part, and all else on the test part alone."""
+    """A model's row in summary.json: each regime on every part, all else on the test part alone."""
     test = judged["test"]
     ahead = _ahead(one, test)
     return {
@@ -122,8 +122,8 @@ def _row(one: Fitted, judged: Mapping[Role, Sequence[_Judged]], seconds: float) 
 
 
 def _free_run(judged: Mapping[Role, Sequence[_Judged]]) -> dict[str, float]:
-    """By part, per cent of the squared error of each physics that is taken off, and what is left, of the rows before a
-    simulation ran out by itself; how the test went."""
+    """Figures in free run, by part: per cent taken off the squared error of each physics, and the error left, over
+    the rows before a simulation ran out by itself; and how the test went."""
     figures: dict[str, float] = {}
     for role, records in judged.items():
         if records:
@@ -144,7 +144,7 @@ def _free_run(judged: Mapping[Role, Sequence[_Judged]]) -> dict[str, float]:
 
 
 def _one_step(judged: Mapping[Role, Sequence[_Judged]]) -> dict[str, float]:
-    """By part, what is left one step ahead; and what holding the last error leaves of the test part."""
+    """Figures one step ahead, by part: the error left; and the error of holding the last one, on the test part."""
     figures = {}
     for role, records in judged.items():
         if records:
@@ -188,7 +188,7 @@ def _free_run_intervals(
 
 
 def _record_figures(one: Fitted, record: _Judged) -> dict[str, float | None]:
-    """Of one record in free run, and how far it lies from what a correction was trained on."""
+    """Figures of one record in free run, and how far it lies from what a correction was trained on."""
     series, model = record.series, one.model
     left, declared = series.error_v - record.free.error_v, series.left_by(DECLARED)
     kept = model.kept(series) if isinstance(model, SparseModel) else np.ones(len(series))
@@ -243,7 +243,7 @@ def _inside_coverage(intervals: Sequence[Intervals | None], residuals: Sequence[
 
 
 def _left_out(band: HorizonBand) -> dict[str, float]:
-    """How the calibration pieces fared, each with the scale of the others: what to expect of one drive."""
+    """Scores of the calibration pieces, each with the scale of the others: what to expect of one drive."""
     return {
         "pieces": len(band.by_piece),
         "worst_piece_coverage_pct": 100.0 * min(band.by_piece),

@@ -20,7 +20,7 @@ from aesi.sparse.search.fold_models import fold_samples
 from aesi.sparse.search.unseen import refits_physics_per_fold
 
 AGAINST = {"mser_pct": DECLARED, "mser_recalibrated_pct": RECALIBRATED}
-"""How a reduction is called -> the physics whose error it is of, in the rows of models and of candidates alike."""
+"""Name of a reduction -> the physics whose error it is taken off, in the rows of models and of candidates alike."""
 
 
 def valid_shares(problem: Problem, left_out: LeftOutDrives) -> dict[str, float]:

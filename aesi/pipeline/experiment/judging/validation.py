@@ -50,8 +50,8 @@ def validation_mser(loaded: Loaded, problem: Problem, candidates: Sequence[Candi
 
 
 def _parts(loaded: Loaded, problem: Problem, candidates: Sequence[Candidate]) -> Iterator[SquaresLeft]:
-    """The folds of the search; what the ensembles leave of the error of physics that saw a fold is taken for what they
-    leave of the error of physics that did not."""
+    """Squares left on the folds of the search. What the ensembles leave of the error of physics that saw a fold
+    stands for what they leave of the error of physics that did not."""
     shares = [nested_shares(problem, candidates, number) for number in range(len(ENSEMBLES))]
     for d, ((a, b), out) in enumerate(zip(problem.folds, loaded.left_out.parts, strict=True)):
         rows = fold_samples(problem, a, b)[1]
@@ -77,7 +77,8 @@ def _drives(loaded: Loaded, problem: Problem, candidates: Sequence[Candidate]) -
 def _without(
     problem: Problem, candidates: Sequence[Candidate], ensemble: int, out: HeldOutDrive, span: Span
 ) -> Array:
-    """(n,) V in free run by what the other drives choose, fitted to them; nought where they cannot."""
+    """(n,) V in free run by the model that the other drives choose, fitted to them; nought where they cannot choose
+    one."""
     apart = np.array([not span[0] <= a < span[1] for a, _ in problem.folds])
     pick = picked(problem, candidates, ensemble, apart)
     if pick is None:

@@ -27,6 +27,11 @@ VARIABLES = {
     "soc": "state of charge",
 }
 """Inputs of the sparse model -> what a caption calls them."""
+ENSEMBLE_LOOKS = {
+    "bagging": ("circle", style.BLUE, "AESI I, bagging"),
+    "stability": ("diamond-open", style.GREEN, "AESI II, stability selection"),
+}
+"""Column of a term -> symbol, colour and name in the legend of the coefficients."""
 VARIABLE, FILTERED = re.compile(r"\(([\w.]+)\)"), re.compile(r"I_[\d.]+s")
 POWERS_FROM = 30.0
 """From this ratio of the largest to the smallest loss on, an axis shows enough powers of ten to be read by."""
@@ -45,26 +50,9 @@ def front_figure(candidates: Sequence[Row]) -> Figure:
         ("Pareto front", "diamond", 9, [c for c in candidates if c.get("front") and not c.get("chosen")]),
         ("chosen", "star", 16, [c for c in candidates if c.get("chosen")]),
     )
-    scale = {"coloraxis": "coloraxis"}
     for name, symbol, size, rows in groups:
         if rows:
-            fig.add_scatter(
-                x=[c["oob"] for c in rows],
-                y=[c["valid"] for c in rows],
-                mode="markers",
-                name=name,
-                showlegend=False,
-                customdata=[[c.get("number", ""), c["terms"], _fitness(c)] for c in rows],
-                hovertemplate="candidate %{customdata[0]}: %{customdata[1]} terms, fitness %{customdata[2]}"
-                "<br>out of bag %{x:.4g}, validation %{y:.4g}<extra></extra>",
-                marker={
-                    "symbol": symbol,
-                    "size": size,
-                    "color": [c["terms"] for c in rows],
-                    "line": {"width": 1, "color": style.INK if symbol in ("star", "x-thin") else style.GREY},
-                    **scale,
-                },
-            )
+            _add_candidates(fig, name, symbol, size, rows)
             _legend_entry(fig, name, symbol)
     bar = {"title": {"text": "terms"}, "thickness": 12}
     fig.update_layout(coloraxis={"colorscale": style.SEQUENTIAL, "colorbar": bar})
@@ -77,6 +65,27 @@ def front_figure(candidates: Sequence[Row]) -> Figure:
         **_log_axis([c["valid"] for c in candidates]),
     )
     return fig
+
+
+def _add_candidates(fig: Figure, name: str, symbol: str, size: int, rows: Sequence[Row]) -> None:
+    """One group of candidates, coloured by their terms."""
+    fig.add_scatter(
+        x=[c["oob"] for c in rows],
+        y=[c["valid"] for c in rows],
+        mode="markers",
+        name=name,
+        showlegend=False,
+        customdata=[[c.get("number", ""), c["terms"], _fitness(c)] for c in rows],
+        hovertemplate="candidate %{customdata[0]}: %{customdata[1]} terms, fitness %{customdata[2]}"
+        "<br>out of bag %{x:.4g}, validation %{y:.4g}<extra></extra>",
+        marker={
+            "symbol": symbol,
+            "size": size,
+            "color": [c["terms"] for c in rows],
+            "line": {"width": 1, "color": style.INK if symbol in ("star", "x-thin") else style.GREY},
+            "coloraxis": "coloraxis",
+        },
+    )
 
 
 def importance_figure(terms: Sequence[Row]) -> Figure | None:
@@ -106,31 +115,31 @@ def coefficient_figure(terms: Sequence[Row]) -> Figure | None:
     )
     rows = rows[:MOST_TERMS][::-1]
     fig = style.figure("Coefficients", caption, _tall(len(rows)))
-    looks = {
-        "bagging": ("circle", style.BLUE, "AESI I, bagging"),
-        "stability": ("diamond-open", style.GREEN, "AESI II, stability selection"),
-    }
-    for key, (symbol, colour, label) in looks.items():
+    for key, (symbol, colour, label) in ENSEMBLE_LOOKS.items():
         shown = [row for row in rows if row.get(key) is not None]
-        marker: dict[str, Any] = {"symbol": symbol, "size": 9, "color": colour}
-        if key == "bagging" and all(row.get("inclusion") is not None for row in shown):
-            marker |= {"color": [row["inclusion"] for row in shown], "coloraxis": "coloraxis"}
-        fig.add_scatter(
-            x=[row[key] for row in shown],
-            y=[row["term"] for row in shown],
-            mode="markers",
-            name=label,
-            showlegend=False,
-            marker=marker,
-            customdata=[row.get("inclusion", float("nan")) for row in shown],
-            hovertemplate="%{y}: %{x:.4g}, kept by %{customdata:.0%}<extra></extra>",
-        )
+        _add_coefficients(fig, shown, key, {"symbol": symbol, "size": 9, "color": colour}, label)
         if shown:
             _legend_entry(fig, label, symbol)
     bar = {"title": {"text": "kept by<br> "}, "thickness": 12, "tickformat": ".0%"}
     fig.update_layout(coloraxis={"colorscale": style.SEQUENTIAL, "cmin": 0, "cmax": 1, "colorbar": bar})
     fig.update_xaxes(title_text="coefficient, -", zeroline=True)
     return fig
+
+
+def _add_coefficients(fig: Figure, rows: Sequence[Row], key: str, marker: dict[str, Any], label: str) -> None:
+    """Those of one ensemble; of bagging coloured by inclusion, where all rows have one."""
+    if key == "bagging" and all(row.get("inclusion") is not None for row in rows):
+        marker = marker | {"color": [row["inclusion"] for row in rows], "coloraxis": "coloraxis"}
+    fig.add_scatter(
+        x=[row[key] for row in rows],
+        y=[row["term"] for row in rows],
+        mode="markers",
+        name=label,
+        showlegend=False,
+        marker=marker,
+        customdata=[row.get("inclusion", float("nan")) for row in rows],
+        hovertemplate="%{y}: %{x:.4g}, kept by %{customdata:.0%}<extra></extra>",
+    )
 
 
 def bootstrap_figure(bootstrap: BootstrapView) -> Figure:
@@ -207,7 +216,7 @@ def _tall(bars: int) -> int:
 
 
 def _symbols(terms: Sequence[Row]) -> str:
-    """What the names of these terms are made of, in sentences; empty where nothing has to be said."""
+    """Sentences on what the names of these terms mean; empty where nothing has to be said."""
     text = " ".join(row["term"] for row in terms)
     used = dict.fromkeys(VARIABLE.findall(text))
     words = [f"{name}, {VARIABLES[name]}" for name in VARIABLES if name in used]

@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
 MOST_HYPOTHESES = 30
-"""Rows beyond are too narrow to read."""
+"""Most rows: beyond, they are too narrow to read."""
 LEAST_NATS = 0.1
-"""Behind the best: what is less is drawn here, on an axis that has no nought."""
+"""Least distance behind the best hypothesis that is drawn, in nats, since a logarithmic axis has no nought."""
 
 
 def ranking_figure(candidates: Sequence[Row], titles: Mapping[str, str], chosen: Sequence[str]) -> Figure:
-    """By how much less than the best one each hypothesis, and the declared model, says; a star marks what was added."""
+    """How far each hypothesis, and the declared model, is behind the best; a star marks what was added."""
     rows = sorted(candidates, key=lambda row: -row["score"])[:MOST_HYPOTHESES]
     best = max(rows[0]["score"], 0.0)
     caption = (
@@ -93,7 +93,7 @@ def files_figure(files: Sequence[Row], labels: Mapping[str, str]) -> Figure:
 
 
 def dependence_bars(rows: Sequence[Row], labels: Mapping[str, str]) -> Figure:
-    """What the residual depends on as declared and, where another model is written, with that."""
+    """Bars of what the residual depends on, as declared and, where another model is written, with that."""
     caption = "Share of the residual's variance on the fit part that each variable explains by itself."
     fig = style.figure(
         "What the residual depends on", caption, max(220, 110 + 34 * len(rows)), barmode="group"

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
 BESIDE_MEASURED = 0.1
-"""Of the span of the measured voltage: room on its axis above and below."""
+"""Room above and below the measured voltage on its axis, as a share of its span."""
 ROLE_NAMES = {"train": "I training", "valid": "II validation", "test": "III test"}
 
 
@@ -92,10 +92,11 @@ def residual_figure(traces: Sequence[DiscoveryTrace], labels: Mapping[str, str])
     """Voltage measured and in the first and last state of the model, current, and the residuals, over time."""
     fig = stack(3, (0.3, 0.2, 0.5))
     placed, unit = end_to_end(traces)
+    first_and_last = list(dict.fromkeys((next(iter(labels)), list(labels)[-1])))
     for i, item in enumerate(placed):
         trace = item.trace
         assert isinstance(trace, DiscoveryTrace)
-        for state in dict.fromkeys((next(iter(labels)), list(labels)[-1])):
+        for state in first_and_last:
             voltage = getattr(trace, f"{state}_v")
             line(fig, item.x, voltage, labels[state], style.STATE_COLOURS[state], 1, first=False)
         line(fig, item.x, trace.measured_v, "measured", style.MEASURED, 1, i == 0, 1.0)
@@ -111,11 +112,11 @@ def residual_figure(traces: Sequence[DiscoveryTrace], labels: Mapping[str, str])
     fig.update_xaxes(title_text=time_title(placed, unit), row=3)
     part = "data that chose nothing" if traces[0].part == "test" else "the data the loop was fitted on"
     caption = (
-        f"Voltage measured, {' and '.join(dict.fromkeys((next(iter(labels.values())), list(labels.values())[-1])))}; "
+        f"Voltage measured, {' and '.join(dict.fromkeys(labels[state] for state in first_and_last))}; "
         f"current, positive on discharge; residual (measured minus model), on {part}."
     )
-    ends = [getattr(t, f"{state}_v") for t in traces for state in (next(iter(labels)), list(labels)[-1])]
-    if any(np.nanmin(v) < low or np.nanmax(v) > high for v in ends):
+    drawn = [getattr(t, f"{state}_v") for t in traces for state in first_and_last]
+    if any(np.nanmin(v) < low or np.nanmax(v) > high for v in drawn):
         fig.update_yaxes(range=(low, high), row=1)
         caption += " The axis of the voltage spans what was measured: a double click shows the rest."
     return style.framed(
@@ -124,7 +125,7 @@ def residual_figure(traces: Sequence[DiscoveryTrace], labels: Mapping[str, str])
 
 
 def _measured_range(traces: Sequence[DiscoveryTrace]) -> tuple[float, float]:
-    """V, of an axis on which a simulation that runs empty does not flatten what was measured."""
+    """(low, high), V, of an axis on which a simulation that runs empty does not flatten what was measured."""
     low = min(float(np.nanmin(t.measured_v)) for t in traces)
     high = max(float(np.nanmax(t.measured_v)) for t in traces)
     room = BESIDE_MEASURED * (high - low)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 OUTSIDE = "outside the trained range"
 WHOLE_S = 10.0
-"""From here on the start of a part is told to the second."""
+"""Seconds from which on the start of a part is told to the second."""
 SHARE_A_LETTER = 0.008
 """Width of a letter of a record's name, as a share of the axis of a wide page."""
 
@@ -141,7 +141,8 @@ def mark_outside(fig: Figure, placed: Sequence[Placed], model: str) -> None:
 
 
 def time_title(placed: Sequence[Placed], unit: str) -> str:
-    """Title of the time axis, which starts at nought: with where that is in a record of which a part is shown."""
+    """Title of the time axis, which starts at nought; where a part of a record is shown, with the time at which it
+    starts there."""
     if len(placed) > 1:
         return f"time, records end to end, {unit}"
     first = float(placed[0].trace.time_s[0])

@@ -26,7 +26,7 @@ def _no_pairs(view: RunView) -> Mapping[str, Any]:
 
 @dataclass(frozen=True)
 class ReportSection:
-    """What stands under one heading.
+    """The content under one heading.
 
     id : anchor of the page.  shows : names of figures in order, of its own or of the paper's; those a run has not are
     left out.  figures : further figures by name.  sentences, pairs : text above the figures.

@@ -16,7 +16,7 @@ NAMED_OPEN = 3
 
 
 def open_line(content: Mapping[str, Any]) -> str:
-    """What the records leave open, in one sentence; empty where they tell every parameter."""
+    """One sentence on what the records leave open; empty where they tell every parameter."""
     left = content["undetermined"]
     if not left:
         return ""

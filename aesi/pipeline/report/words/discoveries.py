@@ -14,9 +14,10 @@ from aesi.pipeline.report.words.sizes import finding_line, refit_does_as_well, u
 from aesi.tracer.decide.written import AS_GOOD
 
 LARGE_SHARE = 0.5
-"""Of the remaining error: where a sparse correction could still explain more, a sentence says so. A convention."""
+"""Share of the remaining error from which on a sentence says that a sparse correction could still explain more. A
+convention."""
 CERTAIN = 0.99
-"""A confidence above it is not told to the per cent: the noise model behind it is itself a model."""
+"""A confidence above this is not told to the per cent: the noise model behind it is itself a model."""
 
 
 def discovery_finding(view: DiscoveryView) -> str:
@@ -27,7 +28,7 @@ def discovery_finding(view: DiscoveryView) -> str:
 
 
 def short_finding(discovery: Mapping[str, Any], sure: bool = False) -> str:
-    """The verdict in one line, with what speaks against it: of a terminal, a row of a table, a tracked run.
+    """The verdict in one line, with what speaks against it, for a terminal, a row of a table or a tracked run.
 
     sure : whether the confidence in the names stands behind them.
     """
@@ -47,8 +48,8 @@ def _against(discovery: Mapping[str, Any]) -> list[str]:
 
 
 def _worse_on_fit(discovery: Mapping[str, Any]) -> str:
-    """Where the written model, another one than the declared, leaves notably more of what it was fitted to than the
-    recalibrated one, with the figures; '' where it does not."""
+    """Clause for a written model, other than the declared one, that leaves notably more of what it was fitted to
+    than the recalibrated one, with the figures; '' where it does not."""
     states = {state: discovery.get(state, {}).get("fit", {}) for state in ("recalibrated", "after")}
     if not all(states.values()) or _written_as(discovery) == "before":
         return ""
@@ -60,8 +61,8 @@ def _worse_on_fit(discovery: Mapping[str, Any]) -> str:
 
 
 def _worse_on_test(discovery: Mapping[str, Any]) -> str:
-    """Where the written model leaves more of the test part than the declared or the recalibrated one, with the figures,
-    to the hundredth of a mV; '' where it does not."""
+    """Clause for a written model that leaves more of the test part than the declared or the recalibrated one, with
+    the figures to the hundredth of a mV; '' where it does not."""
     left = {
         state: round(discovery[state]["test"]["rmse_mv"], 2)
         for state in ("before", "recalibrated", "after")
@@ -117,7 +118,7 @@ def name_confidence(discovery: Mapping[str, Any]) -> str:
 
 
 WITH_FINDING = "with the finding added"
-"""Said of the last state where what was found is what is written."""
+"""Name of the last state where what was found is what is written."""
 
 
 def states_of(discovery: Mapping[str, Any]) -> dict[str, str]:
@@ -130,19 +131,20 @@ def states_of(discovery: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _written_as(discovery: Mapping[str, Any]) -> str | None:
-    """The state that the written model is, where it is none of its own: it errs by the same on every part."""
+    """The other state that the written model is equal to, erring by the same on every part; None where there is
+    none."""
     return next((s for s in ("before", "recalibrated") if discovery.get(s) == discovery.get("after")), None)
 
 
 def written_model(discovery: Mapping[str, Any]) -> str:
-    """What `model/` holds, as the subject of a sentence."""
+    """Words for the content of `model/`, as the subject of a sentence."""
     if (state := _written_as(discovery)) is not None:
         return {"before": "the declared model, unchanged,", "recalibrated": "the recalibrated model"}[state]
     return f"the model {states_of(discovery)['after']}"
 
 
 def unchanged_finding(discovery: Mapping[str, Any]) -> str:
-    """Where all that is written is the declared model, that and why; '' where something came of it."""
+    """A sentence that all that is written is the declared model, and why; '' where something came of it."""
     if _written_as(discovery) != "before":
         return ""
     text = "The model that is written is the declared one, unchanged"
@@ -154,11 +156,12 @@ def unchanged_finding(discovery: Mapping[str, Any]) -> str:
 
 
 UNSEEN = "pieces of the data that were left out of the fit in turn"
-"""By which hypotheses are judged: their errors are larger than those of the fit."""
+"""Words for the data by which hypotheses are judged: their errors are larger than those of the fit."""
 
 
 def reason_finding(discovery: Mapping[str, Any]) -> str:
-    """What the verdict rests on: the error left beyond the noise against what any such model may leave."""
+    """A sentence on what the verdict rests on: the error left beyond the noise against what any such model may
+    leave."""
     left, allowed = discovery["structured_mv"], discovery["tolerance_mv"]
     amount = f"{left:.2f} mV of voltage error beyond the noise of the sensors are left on {UNSEEN}"
     if discovery["verdict"] == "none":
@@ -181,7 +184,7 @@ def reason_finding(discovery: Mapping[str, Any]) -> str:
 
 
 def span_finding(view: DiscoveryView) -> str:
-    """What the data cover, so that nobody reads the verdict as one about more."""
+    """A sentence on the range of the data, so that nobody reads the verdict as one about more."""
     if not view.traces:
         return ""
     hours = sum(float(t.time_s[-1] - t.time_s[0]) for t in view.traces) / SECONDS_PER_HOUR
@@ -198,7 +201,7 @@ def _range(columns: Iterable[Array]) -> tuple[float, float]:
 
 
 def _named(view: DiscoveryView, effects: Sequence[str]) -> str:
-    """What was found, each kind in its own words."""
+    """The effects that were found, each kind in its own words."""
     kinds = {row["effect"]: row["kind"] for row in view.discovery["candidates"]}
     groups: dict[str, list[str]] = {}
     for effect in effects:
@@ -226,8 +229,8 @@ def _verb(names: Sequence[str]) -> str:
 
 
 def discovery_consequence(view: DiscoveryView) -> str:
-    """What that brings on data that chose nothing, apart from what any refit brings; '' where it brings less than
-    nothing, which a warning says with the same figures."""
+    """A sentence on what the finding gains on data that chose nothing, apart from what any refit gains; '' where it
+    loses, which a warning says with the same figures."""
     if _worse_on_test(view.discovery):
         return ""
     values = {
@@ -252,7 +255,7 @@ def discovery_consequence(view: DiscoveryView) -> str:
 
 
 def look_alike_finding(view: DiscoveryView) -> str:
-    """What else fits as well, said next to the verdict."""
+    """A sentence on what else fits as well, beside the verdict."""
     groups = [
         [_title(view.titles, e) for e in group] for group in view.discovery.get("indistinguishable", [])
     ]
@@ -262,7 +265,7 @@ def look_alike_finding(view: DiscoveryView) -> str:
 
 
 def closest_finding(view: DiscoveryView) -> str:
-    """Which hypothesis without the finding comes closest to it, and by how much."""
+    """A sentence on the hypothesis without the finding that comes closest to it, and on the distance."""
     effects = set(view.discovery["effects"])
     rows = view.discovery["candidates"]
     without = [row for row in rows if not effects <= {row["effect"], *row.get("hypothesis", ())}]
@@ -280,7 +283,7 @@ def closest_finding(view: DiscoveryView) -> str:
 
 
 def rest_finding(discovery: Mapping[str, Any]) -> str:
-    """What a data-driven correction could still explain of the data that were fitted, from which it is learnt."""
+    """A sentence on what a data-driven correction could still explain of the fitted data, from which it is learnt."""
     rest, after = discovery["explainable_mv"], discovery.get("after", {}).get("fit", {}).get("rmse_mv")
     if rest is None:
         return "What a flexible correction could still explain is not known: these data are too few for one."

@@ -12,12 +12,12 @@ from aesi.pipeline.report.words.sizes import TELLING, name_words, resized, round
 MOST_NAMED = 3
 """Parameters that one sentence names."""
 MOST_DIGITS = 6
-"""A state of charge is known to a ten-thousandth at best."""
+"""Most digits: a state of charge is known to a ten-thousandth at best."""
 OF_A_RECORD = {
     "soc0": "the initial state of charge of {}",
     "capacity_share": "the share of its capacity that the cell had in {}",
 }
-"""What stands for the effect of a row where something moved that is a record's, in words."""
+"""Owner of a parameter that belongs to a record -> words in place of an effect."""
 RECALIBRATING, BESIDE, WRITTEN = "Recalibrating", "Beside the finding the fit", "The model that is written"
 
 
@@ -33,7 +33,7 @@ def moved_findings(discovery: Mapping[str, Any]) -> list[str]:
 
 
 def resized_finding(discovery: Mapping[str, Any]) -> str:
-    """Where the model that is written has what was found at another size, both of them; '' where it has not."""
+    """A sentence with both sizes where the written model has what was found at another size; '' where it has not."""
     sizes = [one for effect in discovery["effects"] for one in resized(effect, discovery)]
     if not sizes:
         return ""
@@ -66,7 +66,7 @@ def _moved(row: Row) -> str:
 
 
 def moved_value(row: Row) -> str:
-    """Where a parameter went: '0.42 times declared', '0.97 (declared 1)', '3.1 mohm'."""
+    """Words for where a parameter went: '0.42 times declared', '0.97 (declared 1)', '3.1 mohm'."""
     if row["unit"] == "dimensionless" and row["declared"] == 1.0:
         return f"{_apart(row['value'], 1.0, least=2)[0]} times declared"
     if row["unit"] in ("dimensionless", "1"):

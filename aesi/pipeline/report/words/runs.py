@@ -12,20 +12,20 @@ from aesi.pipeline.report.words.discoveries import listed
 NEARLY = 0.98
 """A one-step error above this share of persistence's is called no better than it."""
 HUNDREDTHS = 2
-"""Digits of a mV in which an error has to be less to be called less."""
+"""Decimals of a mV to which an error has to be less to be called less."""
 MOST_DIGITS = 3
-"""Behind the point, of an error in mV."""
+"""Most decimals of an error in mV."""
 
 
 def run_finding(view: RunView) -> str:
-    """What the correction buys on the test records in free run, where a mere refit does better, and what is left before
-    a simulation ran out, where one did."""
+    """A sentence on what the correction gains on the test records in free run, on where a mere refit does better,
+    and on the error before a simulation ran out, where one did."""
     return f"{_bought(view).removesuffix('.')}{_refit_better(view)}{_ran_out(view)}."
 
 
 def _refit_better(view: RunView) -> str:
-    """That the physics with its own parameters refitted errs less, where that is not what is corrected; from '; ' on,
-    '' where it does not."""
+    """Clause, from '; ' on, that the physics with its own parameters refitted errs less, where the correction is not
+    on that; '' where it does not."""
     ours, refitted = _figure(view.model(view.chosen), "free_run", "test_rmse_mv"), _refitted_mv(view)
     if ours is None or refitted is None or round(refitted, HUNDREDTHS) >= round(ours, HUNDREDTHS):
         return ""
@@ -36,7 +36,8 @@ def _refit_better(view: RunView) -> str:
 
 
 def _refitted_mv(view: RunView) -> float | None:
-    """What the refitted physics leaves of the test records, mV, where the model is held against it and not of it."""
+    """RMSE of the refitted physics on the test records, mV; None where the correction is learnt on that physics, or
+    there is no such figure."""
     model = view.model(view.chosen)
     after, beyond = (
         _figure(model, "free_run", key) for key in ("test_rmse_mv", "test_mser_recalibrated_pct")
@@ -47,8 +48,8 @@ def _refitted_mv(view: RunView) -> float | None:
 
 
 def _ran_out(view: RunView) -> str:
-    """From when on the errors of test records say no more than that a model ran out, and what is left before that; from
-    '; ' on, '' where none did."""
+    """Clause, from '; ' on, on when a model ran out, from where on the errors of test records say no more than that,
+    and on the error before; '' where none did."""
     model = view.model(view.chosen) or {}
     records = {
         name: figures["ran_out_s"]
@@ -109,8 +110,8 @@ def _bought(view: RunView) -> str:
 
 
 def corrected_finding(view: RunView) -> str:
-    """What the correction brings beyond the physics that it was learned on, in words; where that is as declared, beyond
-    a mere refit of its parameters, or what to do where that does better."""
+    """A sentence on what the correction gains beyond the physics that it was learned on. Where that is as declared,
+    beyond a mere refit of its parameters, or on what to do where the refit does better."""
     corrected, model = view.model(view.corrected), view.model(view.chosen)
     before, after = (_figure(row, "free_run", "test_rmse_mv") for row in (corrected, model))
     if before is None or after is None:
@@ -138,8 +139,8 @@ def corrected_finding(view: RunView) -> str:
 
 
 def validation_finding(view: RunView) -> str:
-    """Where the physics refitted to the training records does worse than as declared: on these, else on the validation
-    records."""
+    """A sentence where the physics refitted to the training records does worse than as declared: on these, else on
+    the validation records."""
     if (worse := _worse_refitted(view, "train_rmse_mv")) is not None:
         first, last = worse
         return (
@@ -168,8 +169,8 @@ def _worse_refitted(view: RunView, figure: str) -> tuple[str, str] | None:
 
 
 def constant_finding(view: RunView) -> str:
-    """What the mean error of the training records, the least that a correction has to beat, leaves of the test ones;
-    '' where it was not asked for, or was chosen."""
+    """A sentence on what is left of the test records by the mean error of the training records, the least that a
+    correction has to beat; '' where it was not asked for, or was chosen."""
     rows = (view.model(f"{physics} + constant") for physics in (view.corrected, view.physics))
     row = next((row for row in rows if row is not None), None)
     error = _figure(row, "free_run", "test_rmse_mv")

@@ -13,16 +13,16 @@ from aesi.physics.effects import CATALOGUE
 SAME_SHARE = 0.98
 """A finding that leaves more than this share of the error of a refit is no better than the refit."""
 TELLING = 1.0
-"""Standard deviations of its tolerance: a parameter that a refit moved by less counts as declared."""
+"""Standard deviations of its tolerance that a refit has to move a parameter by; moved by less it counts as declared."""
 MOST_PARAMETERS = 3
-"""Of an effect, in one sentence."""
+"""Most parameters of an effect in one sentence."""
 PREFIXES = {"ohm": ("mohm", 1e3), "V": ("mV", 1e3), "A": ("mA", 1e3), "m": ("um", 1e6)}
 """Unit -> that of its thousandths or millionths, and how many make one."""
 PERCENT = 100.0
 SMALL = 0.5
-"""In its own unit; what is less is written in thousandths."""
+"""Values below this, in their own unit, are written in thousandths."""
 ENDINGS = {"ohm/(A*hour)": "_ohm_ah", "ohm/hour**0.5": "_ohm"}
-"""Of names that do not spell their unit out."""
+"""Unit -> ending of a name that does not spell it out."""
 
 
 def with_size(effect: str, discovery: Mapping[str, Any], title: str | None = None) -> str:
@@ -47,8 +47,8 @@ def with_size(effect: str, discovery: Mapping[str, Any], title: str | None = Non
 
 
 def resized(effect: str, discovery: Mapping[str, Any]) -> list[tuple[str, str, str]]:
-    """What the written model has of an effect at another size than the finding, as far as one sees it: the parameter in
-    words, its value there, and the finding's; ('ambient temperature', '14.0 degC', '11.8 degC')."""
+    """The parameter of an effect that the written model has at another size than the finding, as far as one sees it:
+    in words, its value there, and the finding's; ('ambient temperature', '14.0 degC', '11.8 degC')."""
     written = discovery.get("written_parameters", {}).get(effect, {})
     name, told, out = effect.replace("_", " "), _told(effect, discovery), []
     for key, value in list(told.items())[:MOST_PARAMETERS]:
@@ -69,7 +69,7 @@ def resized(effect: str, discovery: Mapping[str, Any]) -> list[tuple[str, str, s
 
 
 def _row(effect: str, discovery: Mapping[str, Any]) -> Mapping[str, Any]:
-    """What is known of an effect, empty where it could not be tried."""
+    """The candidate's row of an effect; empty where it could not be tried."""
     return next((c for c in discovery.get("candidates", ()) if c["effect"] == effect), {})
 
 
@@ -84,7 +84,7 @@ def _told(effect: str, discovery: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _declared_of(parameter: Parameter | None, discovery: Mapping[str, Any]) -> tuple[float, str] | None:
-    """What a parameter is a shift of, as it was declared, with its unit; None of one that is no shift."""
+    """The declared value that a parameter shifts, with its unit; None for a parameter that is no shift."""
     key = parameter.shift_of if parameter else ""
     if parameter is None or key not in discovery:
         return None
@@ -141,7 +141,7 @@ def finding_line(discovery: Mapping[str, Any]) -> str:
 
 
 def unexplained_by(discovery: Mapping[str, Any]) -> str:
-    """What goes on after 'something real': ' that no effect of the catalogue explains', or which of them were tried, or
+    """Words after 'something real': ' that no effect of the catalogue explains', or which of them were tried, or
     that the good records beside the others seem to be of another age."""
     aged = discovery.get("of_another_age", ())
     if aged:
@@ -157,8 +157,8 @@ def unexplained_by(discovery: Mapping[str, Any]) -> str:
 
 
 def refit_does_as_well(discovery: Mapping[str, Any]) -> bool:
-    """Whether the declared model with its own parameters refitted leaves as little of unseen data as the finding, and
-    by other means: a refit that moved what was found, and nothing else, is the same explanation."""
+    """Whether the declared model with its own parameters refitted leaves as little of unseen data as the finding,
+    and by other means: a refit that moved nothing but what was found is the same explanation."""
     own, after = (
         discovery.get(state, {}).get("test", {}).get("rmse_mv") for state in ("recalibrated", "after")
     )

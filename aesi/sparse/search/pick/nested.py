@@ -21,7 +21,7 @@ from aesi.sparse.search.problem import Problem
 
 @dataclass(frozen=True, eq=False)
 class NestedPick:
-    """What some folds choose: a candidate, and the amplitude of its correction."""
+    """The choice of some folds: a candidate, and the amplitude of its correction."""
 
     candidate: Candidate
     amplitude: float
@@ -30,7 +30,8 @@ class NestedPick:
 def picked(
     problem: Problem, candidates: Sequence[Candidate], ensemble: int, folds: BoolArray
 ) -> NestedPick | None:
-    """By the given folds alone, (n_folds,); ensemble : 0 for AESI I, 1 for AESI II, as in `Candidate.fold_sums`.
+    """The choice of the given folds, (n_folds,), alone.  ensemble : 0 for AESI I, 1 for AESI II, as in
+    `Candidate.fold_sums`.
 
     None where no fold, or no candidate, is left to choose by.
     """
