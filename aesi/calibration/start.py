@@ -11,7 +11,7 @@ from aesi.constants import SECONDS_PER_HOUR
 from aesi.numerics.typing import Array, BoolArray
 from aesi.over_time import stamp
 from aesi.physics.cell import Cell
-from aesi.records import Measurement
+from aesi.records import Hold, Measurement
 
 TYPICAL_SOLID_EA_J_MOL = 30e3
 TYPICAL_RATE_EA_J_MOL = 35e3
@@ -151,7 +151,7 @@ def _full_discharge_ah(cell: Cell, data: Measurement) -> float | None:
     """Charge from full to empty: the most that a stretch of the record takes from one to the other, None where none
     does. A stretch begins where the cell is full, and ends where it has been charged to there again."""
     full = data.voltage_v >= cell.upper_voltage_v - FULL_WINDOW_V
-    taken_ah = data.discharged_ah("backward")
+    taken_ah = data.discharged_ah(_counted(data))
     most: float | None = None
     position = 0
     while full[position:].any():
@@ -189,5 +189,10 @@ def _emptied_ah(cell: Cell, data: Measurement, taken_ah: Array, start: int, stop
     if taken_ah[end] - taken_ah[start] < ALL_OF_IT * (taken_ah[start:stop].max() - taken_ah[start]):
         return None
     # One sum, not the last of running ones: where a descent ends moves by millivolts with the last digit of this.
-    steps = data.current_a[start + 1 : end + 1] * np.diff(data.time_s[start : end + 1])
-    return float(steps.sum()) / SECONDS_PER_HOUR
+    return float(data.steps_as(_counted(data))[start:end].sum()) / SECONDS_PER_HOUR
+
+
+def _counted(data: Measurement) -> Hold:
+    """How the charge of a record is counted: as declared; undeclared rows are a logger's, or so close that either will
+    do."""
+    return data.hold or "backward"

@@ -77,9 +77,12 @@ def to_even(measurement: Measurement, dt_s: float, hold: Hold = "backward") -> M
 
     Voltage and temperature: interval averages where the rows are denser than dt_s, values at the stamps elsewhere.
     Current: of hold "backward" interval averages (the charge is kept), of "linear" as the voltage. Raises DataError
-    for a step that is not positive, that is longer than the record, or that would make more than 20 million rows.
+    for a record without rows, and a step that is not positive, that is longer than the record, or that would make more
+    than 20 million rows.
     """
     time = measurement.time_s
+    if not len(time):
+        raise DataError(f"{measurement.name} has no row to resample; give one that has.")
     length = float(time[-1] - time[0])
     if not dt_s > 0:
         raise DataError(f"{measurement.name}: a step of {dt_s:g} s is not possible; give one above 0.")

@@ -89,6 +89,8 @@ class Effect:
     of_design : True for what a cell is made with and keeps (potentials, geometry, transport, kinetics); a file that was
     fitted to this very cell has it right, as far as the model goes.
     of_every_record : True for physics by constants of the cell: what no record is without where another one has it.
+    of_material : True for what is laid over the stoichiometry window of an electrode and belongs to its material, as
+    U(x) and D(x): it acts on the windows that the file declares, before what moves these.
     of_age : True for what a cell loses or gains as it ages: all records of the same days have it.
     ohmic : True for a drop that follows the current at once, as the declared resistance of contacts does: beside such
     an effect nothing else says that the file is off in it.
@@ -108,6 +110,7 @@ class Effect:
     refines: Refinement | None = None
     of_design: bool = False
     of_every_record: bool = False
+    of_material: bool = False
     of_age: bool = False
     ohmic: bool = False
     experiment: str = ""
@@ -219,6 +222,16 @@ class ActiveEffect:
         if self.effect.file is not None:
             out["file"] = self.effect.file
         return out
+
+
+def instruments_first(effects: Iterable[ActiveEffect]) -> tuple[ActiveEffect, ...]:
+    """What was recorded has to be set right before the cell can answer to it."""
+    return tuple(sorted(effects, key=lambda e: e.effect.kind != "instrument"))
+
+
+def materials_first(effects: Iterable[ActiveEffect]) -> tuple[ActiveEffect, ...]:
+    """What a material answers at a stoichiometry does not depend on how electrodes of it are balanced."""
+    return tuple(sorted(effects, key=lambda e: not e.effect.of_material))
 
 
 def as_cell_saw(record: Record, effects: Iterable[ActiveEffect]) -> Record:

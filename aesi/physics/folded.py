@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 from aesi.physics.cell import Cell
-from aesi.physics.effect import ActiveEffect
+from aesi.physics.effect import ActiveEffect, materials_first
 from aesi.physics.model import EspmModel
 
 
@@ -37,7 +37,7 @@ def folded(
     """
     held: list[ActiveEffect] = []
     left: list[ActiveEffect] = []
-    for active in effects:
+    for active in materials_first(effects):
         changed = None if stays(active) else _on_cell_alone(cell, active)
         if changed is None:
             left.append(active)

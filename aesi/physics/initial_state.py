@@ -10,6 +10,9 @@ One rule for every command. In this order:
     load          the open-circuit voltage after the drop of the model under that current; the current may have begun
                   with the record or long before it, and the first minutes tell how likely either is
 
+The current, time and temperature are those that the cell saw: where the effects of its model say that the record has
+others, as by the offset of a sensor or a leak, a rest is a rest and a load a load by theirs, as in `simulate`.
+
 A voltage is as good as the open-circuit potentials, so that a flat potential gives a wide state of charge.
 """
 
@@ -20,11 +23,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError
 from aesi.physics.arguments import check_soc
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
-from aesi.physics.effect import ActiveEffect
+from aesi.physics.effect import ActiveEffect, Record, as_cell_saw, instruments_first
 from aesi.physics.rest.open_circuit import CHARGED_V, GIVEN_SD, GOOD_READING_V, READING_V, OpenCircuit
 from aesi.physics.rest.voltage import first_rows_v, freed_of_instruments, freed_of_series
 from aesi.physics.simulation import ModelName, model_with
@@ -78,9 +82,9 @@ def initial_state(
 
     record : its temperature is used where it was measured.  soc0 : given by the user, for this record, or (`shared`)
     for several, so that one whose voltage contradicts it starts where its voltage says.
-    hold : how the current runs between rows.  effects : what the cell has beyond its file.  model : that a
-    loaded start is simulated with.  potentials_v : V, how far the potentials of the file are off, one standard
-    deviation; a fit that moves them takes `GOOD_READING_V`.
+    hold : how the current runs between rows.  effects : what the cell and its instruments have beyond the file, as in
+    `simulate`.  model : that a loaded start is simulated with.  potentials_v : V, how far the potentials of the file
+    are off, one standard deviation; a fit that moves them takes `GOOD_READING_V`.
     Where the voltage is not known from some row on, the rows before it say where the record starts.
     Raises DataError where the voltage belongs to no state of this cell, or there is neither voltage nor `soc0`;
     InputError for what is no state of charge.
@@ -88,15 +92,16 @@ def initial_state(
     check_soc(soc0)
     if not len(record):
         raise DataError(f"{record.name} has no row to start from.")
-    active = tuple(effects)
+    active = instruments_first(effects)
     unknown = ~np.isfinite(record.voltage_v)
     if unknown[0]:
         if soc0 is None:
             raise DataError(f"{record.name} has no voltage to start from; give --soc0.")
         return _given(record, soc0, None)
+    seen = _as_cell_saw(record, active)
     if unknown.any():
-        record = record.take(slice(0, int(np.argmax(unknown))))
-    start = _Start(cell, record, hold, active, model, potentials_v)
+        seen = seen.take(slice(0, int(np.argmax(unknown))))
+    start = _Start(cell, seen, hold, active, model, potentials_v)
     if soc0 is not None:
         try:
             read = start.read()
@@ -115,6 +120,21 @@ def initial_state(
     return start.read()
 
 
+def _as_cell_saw(record: Measurement, effects: tuple[ActiveEffect, ...]) -> Measurement:
+    """Each row's voltage beside what the cell saw there; the record itself where no effect acts on it."""
+    if all(active.effect.on_record is None for active in effects):
+        return record
+    degc = record.temperature_degc
+    kelvin = None if degc is None else degc + ZERO_CELSIUS_K
+    seen = as_cell_saw(Record(record.time_s, record.current_a, kelvin), effects)
+    return replace(
+        record,
+        time_s=seen.time_s,
+        current_a=seen.current_a,
+        temperature_degc=None if seen.temperature_k is None else seen.temperature_k - ZERO_CELSIUS_K,
+    )
+
+
 def _read_instead(read: InitialState, soc0: float) -> InitialState:
     """The reading, with a sentence that says why what was given for several records is not believed for this one."""
     words = f"{read.sentence[:-1]}; not the {soc0:.4g} that was given, which its voltage contradicts."
@@ -129,7 +149,7 @@ def _given(record: Measurement, soc0: float, other: InitialState | None) -> Init
 
 
 class _Start:
-    """The start of one record, against one cell."""
+    """The start of one record, as the cell saw it, against one cell."""
 
     def __init__(
         self,

@@ -25,7 +25,15 @@ from aesi.physics import depletion
 from aesi.physics.arguments import check_cell, check_choice, check_soc, check_temperature, checked_effects
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
-from aesi.physics.effect import ActiveEffect, Record, Trace, as_cell_saw, check_states
+from aesi.physics.effect import (
+    ActiveEffect,
+    Record,
+    Trace,
+    as_cell_saw,
+    check_states,
+    instruments_first,
+    materials_first,
+)
 from aesi.physics.espm.plain import run_plain
 from aesi.physics.model import EspmModel
 from aesi.physics.rest.open_circuit import OpenCircuit
@@ -69,7 +77,8 @@ def simulate(
     soc0 : state of charge at rest before the first sample, by the declared windows; where an effect moved these,
     the cell starts from the same rest voltage in the new ones. None takes it from `rest_voltage_v`, as `initial_state`
     reads that of a cell at rest: within `CHARGED_V` below the upper cut-off voltage it is a full charge.
-    effects : what the cell has beyond its file; instrument faults act first, the others in the order given.
+    effects : what the cell has beyond its file; instrument faults act first, then what belongs to a material by its
+    stoichiometry (U(x), D(x)), which no loss moves, the others in the order given.
     temperature_degc : (n,) or one value: the measured temperature of the cell's case, which the winding follows (see
     `aesi.physics.model.of_record`); None leaves it to the cell file's initial temperature, or to the heat balance where
     an effect brings one.
@@ -93,7 +102,7 @@ def simulate(
     if on_depletion == "raise":  # a search may pass by states that no cell has
         check_soc(soc0)
     time, current = _checked_record(time_s, current_a)
-    active = _instruments_first(checked_effects(effects))
+    active = instruments_first(checked_effects(effects))
     across: dict[str, Array] | None = {} if profiles else None
     solve = solver(model, across)
     changed = model_with(cell, active)
@@ -122,8 +131,8 @@ def simulate(
 
 
 def model_with(cell: Cell, effects: Iterable[ActiveEffect]) -> EspmModel:
-    """The model of `cell` after what the effects do to it."""
-    return _model_with(cell, tuple(effects))
+    """The model of `cell` after what the effects do to it, in their order but for `materials_first`."""
+    return _model_with(cell, materials_first(effects))
 
 
 @lru_cache(maxsize=128)
@@ -140,11 +149,6 @@ def _changed(model: EspmModel, active: ActiveEffect) -> EspmModel:
     """One effect's change; the records of a case share all but the last of them."""
     assert active.effect.on_model is not None
     return active.act(active.effect.on_model, model)
-
-
-def _instruments_first(effects: Iterable[ActiveEffect]) -> tuple[ActiveEffect, ...]:
-    """What was recorded has to be set right before the cell can answer to it."""
-    return tuple(sorted(effects, key=lambda e: e.effect.kind != "instrument"))
 
 
 Solver = Callable[[EspmModel, Array, Array, Array | None, float, Hold], Solution]

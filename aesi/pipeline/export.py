@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -20,6 +20,13 @@ from aesi.pipeline.product.declared import declared_model
 
 Target = Literal["bpx", "pybamm"]
 SUFFIX = {"bpx": ".json", "pybamm": ".py"}
+OWN_FIELDS: Mapping[str, Mapping[str, Any]] = {
+    "resistance of films": {"film_ohm_m2": NO_FILM},
+    "rates over stoichiometry": {"rate_factor": UNITY},
+    "double layers": {"double_layer_f_m2": 0.0},
+}
+"""What a calibrated cell holds in its section User-defined that no other tool takes over: fields of its electrodes, and
+what they are where it has none."""
 
 
 @dataclass(frozen=True)
@@ -104,25 +111,36 @@ def _keep_unnamed(script: Path, bpx: Path, text: str) -> None:
 
 def _beyond_bpx(cell: Cell) -> list[str]:
     """Sentences on what a calibrated cell holds in its section User-defined that neither target takes over."""
+    return [f"{name}: in the section User-defined, which they do not read." for name in own_to_us(cell)]
+
+
+def own_to_us(cell: Cell) -> tuple[str, ...]:
+    """Which of `OWN_FIELDS` the cell has."""
     both = (cell.negative, cell.positive)
-    own = {
-        "resistance of films": any(x.film_ohm_m2 != NO_FILM for x in both),
-        "rates over stoichiometry": any(x.rate_factor != UNITY for x in both),
-        "double layers": any(x.double_layer_f_m2 for x in both),
-    }
-    return [
-        f"{name}: in the section User-defined, which they do not read." for name, has in own.items() if has
-    ]
+    return tuple(
+        name
+        for name, none in OWN_FIELDS.items()
+        if any(getattr(side, field) != value for side in both for field, value in none.items())
+    )
+
+
+def as_others_read(cell: Cell) -> Cell:
+    """The cell without `OWN_FIELDS`."""
+    none = {field: value for fields in OWN_FIELDS.values() for field, value in fields.items()}
+    return cell.with_negative(**none).with_positive(**none)
+
+
+def pybamm_contacts(cell: Cell) -> tuple[dict[str, Any], dict[str, float]]:
+    """Options and values of PyBaMM for the contacts of a cell, which BPX has no field for."""
+    if not cell.contact_resistance_ohm:
+        return {}, {}
+    return {"contact resistance": "true"}, {"Contact resistance [Ohm]": cell.contact_resistance_ohm}
 
 
 def _for_pybamm(cell: Cell, effects: tuple[ActiveEffect, ...]) -> tuple[_Pybamm, list[ActiveEffect]]:
     """Options and values of PyBaMM for what BPX does not hold, and the effects that have none."""
-    options: dict[str, Any] = {}
-    values: dict[str, float] = {}
+    options, values = pybamm_contacts(cell)
     unknown = []
-    if cell.contact_resistance_ohm:
-        options["contact resistance"] = "true"
-        values["Contact resistance [Ohm]"] = cell.contact_resistance_ohm
     for effect in effects:
         known = _options_of(cell, effect)
         if known is None:

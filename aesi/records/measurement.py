@@ -151,8 +151,12 @@ class Measurement:
         Exact for a current that runs as `hold` says: where rows are minutes apart, straight lines make a triangle of a
         pulse.
         """
+        return np.concatenate([[0.0], np.cumsum(self.steps_as(hold))]) / SECONDS_PER_HOUR
+
+    def steps_as(self, hold: Hold) -> Array:
+        """(n - 1,) A s taken out between rows, as `discharged_ah` sums them."""
         mean = self.current_a[1:] if hold == "backward" else 0.5 * (self.current_a[1:] + self.current_a[:-1])
-        return np.concatenate([[0.0], np.cumsum(mean * np.diff(self.time_s))]) / SECONDS_PER_HOUR
+        return mean * np.diff(self.time_s)
 
     def __repr__(self) -> str:
         warm = "" if self.temperature_degc is None else ", with temperature"

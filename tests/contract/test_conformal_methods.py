@@ -165,6 +165,19 @@ def test_a_constant_stretch_never_gets_a_band_of_width_zero(calibrated: Calibrat
     assert widths.min() >= calibrated.floor_v > 0
 
 
+@pytest.mark.parametrize("name", METHODS)
+def test_the_interval_that_stands_in_had_no_width_where_most_residuals_are_alike(name: str) -> None:
+    some = np.arange(4000) % 40 == 0
+    residuals = np.where(some, 1e-3 * np.random.default_rng(0).standard_normal(4000), 0.0)
+    calibrated = METHODS[name].fit([residuals], current_a=[np.where(some, 5.0, 0.0)])
+    found = calibrated.intervals(residuals[:300], current_a=np.where(some, 5.0, 0.0)[:300])
+    assert calibrated.floor_v > 0.0
+    assert found.width_v.min() >= calibrated.floor_v * (1.0 - 1e-9)
+    stream = calibrated.stream()
+    low, high = stream.interval(5.0 if calibrated.needs_current else None)
+    assert high - low >= calibrated.floor_v * (1.0 - 1e-9)
+
+
 def test_a_missing_residual_brings_back_the_marginal_interval(calibrated: Calibrated) -> None:
     record = series(400, 7)
     record[200] = np.nan

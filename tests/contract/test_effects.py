@@ -15,6 +15,8 @@ from aesi.errors import CellError, InputError, ParameterError, SimulationError
 from aesi.physics import Cell, impedance, simulate
 from aesi.physics.effect import Contribution, Effect, Record, Trace
 from aesi.physics.effects import CATALOGUE, active_effect, describe, find_effect, load_effect
+from aesi.physics.folded import folded
+from aesi.physics.simulation import model_with
 from aesi.tracer.case.free_parameter import of_effect
 from aesi.tracer.case.problem import STEP
 
@@ -52,6 +54,48 @@ def skip_what_the_model_holds(effect, model):
 
 BASES = {model: run(model=model) for model in ("espm", "dfn")}
 BASE = BASES["espm"]
+
+
+MATERIAL = [effect for effect in CATALOGUE.values() if effect.of_material]
+LOSSES = [
+    CATALOGUE["lithium_inventory_loss"],
+    *(CATALOGUE[f"active_material_loss_{s}"] for s in ("negative", "positive")),
+]
+
+
+@pytest.mark.parametrize("aged", LOSSES, ids=lambda effect: effect.id)
+@pytest.mark.parametrize("material", MATERIAL, ids=lambda effect: effect.id)
+def test_a_loss_moved_what_a_material_answers_at_a_stoichiometry(material, aged):
+    """By 5.5 mV, as the one or the other was given first."""
+    shaped, lost = material.activate(), aged.activate()
+    alone, after = model_with(CELL, [shaped]).cell, model_with(CELL, [lost, shaped]).cell
+    for side in ("negative", "positive"):
+        mine, declared = getattr(after, side), getattr(alone, side)
+        assert (mine.ocp, mine.diffusivity) == (declared.ocp, declared.diffusivity)
+    windows = [(cell.balance.window_n, cell.balance.window_p) for cell in (alone, after)]
+    assert windows[0] != windows[1]
+    np.testing.assert_array_equal(run(lost, shaped).voltage_v, run(shaped, lost).voltage_v)
+    assert folded(CELL, [lost, shaped]).cell == folded(CELL, [shaped, lost]).cell
+
+
+@each
+def test_what_is_laid_over_a_window_is_known_to_belong_to_a_material(effect):
+    if effect.on_model is None:
+        return
+    n, p = CELL.negative, CELL.positive
+    other = CELL.with_negative(theta_max=n.theta_max - 0.05).with_positive(theta_max=p.theta_max - 0.05)
+    active = effect.activate()
+    try:
+        there, here = (model_with(cell, [active]).cell for cell in (other, CELL))
+    except CellError:  # it needs what this file does not declare
+        return
+    relations = ("ocp", "diffusivity", "entropic", "rate_factor", "film_ohm_m2")
+    moved = [
+        getattr(getattr(there, side), name) != getattr(getattr(here, side), name)
+        for side in ("negative", "positive")
+        for name in relations
+    ]
+    assert any(moved) == effect.of_material
 
 
 def test_the_catalogue_holds_what_was_promised():

@@ -66,6 +66,7 @@ class Method(ABC):
         records = checked_records(residuals)
         marginal = marginal_interval(records, alpha)
         floor = width_floor(records, marginal)
+        marginal = _at_least(floor, marginal)
         currents = checked_currents(current_a, records)
         rng = rng or np.random.default_rng(0)
         band, scale = self.band(CalibrationData(records, currents, alpha, window, marginal, floor, rng))
@@ -112,6 +113,15 @@ def width_floor(records: Sequence[Array], marginal_v: tuple[float, float]) -> fl
     steps = steps[np.isfinite(steps) & (steps > 0)]
     resolution = float(np.quantile(steps, 0.01)) if steps.size else 0.0
     return max(RELATIVE_FLOOR * (marginal_v[1] - marginal_v[0]), resolution)
+
+
+def _at_least(width_v: float, interval_v: tuple[float, float]) -> tuple[float, float]:
+    """The interval, V, V; widened about its middle where it is narrower, as that of residuals mostly alike is."""
+    low, high = interval_v
+    if high - low >= width_v:
+        return interval_v
+    middle = 0.5 * (low + high)
+    return middle - 0.5 * width_v, middle + 0.5 * width_v
 
 
 @dataclass(frozen=True)

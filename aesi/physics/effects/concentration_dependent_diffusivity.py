@@ -77,6 +77,7 @@ EFFECT = Effect(
     __doc__,
     PARAMETERS,
     on_model=vary_diffusivities,
+    of_material=True,
     of_every_record=True,
     experiment="GITT over the whole range of state of charge",
 )

@@ -96,5 +96,6 @@ EFFECT = Effect(
     PARAMETERS,
     on_model=reshape,
     of_design=True,
+    of_material=True,
     experiment="C/50 discharge and charge, or GITT",
 )

@@ -133,8 +133,10 @@ class HybridModel:
         """`predict` of a record, under its name: one step ahead of its voltage, or in free run, which sees none.
 
         soc0_sd : standard deviation of soc0, by what it is worth the band of a free run is wider. Raises InputError
-        for one that is no number from 0 to 1.
+        for one that is no number from 0 to 1, and for an error0_v that is no voltage.
         """
+        if not np.isfinite(error0_v):
+            raise InputError(f"error0_v = {error0_v!r} is no voltage error to start from; give volts.")
         if not 0.0 <= soc0_sd <= 1.0:  # this way round, NaN fails too
             raise InputError(
                 f"soc0_sd = {soc0_sd!r} is no standard deviation of a state of charge; give 0 to 1."

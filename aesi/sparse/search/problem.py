@@ -194,7 +194,13 @@ class Problem(TrainingRows, Factors):
 
 
 def _checked_pieces(cut: tuple[Span, ...], fold: int | None) -> tuple[Span, ...]:
-    """What is left out in turn.  Raises DataError for pieces so long that there is but one."""
+    """What is left out in turn.  Raises DataError for pieces so long, or a record so short, that there is but one."""
+    if len(cut) < 2 and fold is None:
+        rows = sum(stop - start for start, stop in cut)
+        raise DataError(
+            f"{rows} rows of one training record are too few to leave a part of them out in turn; give a longer "
+            "record, or several."
+        )
     if len(cut) < 2:
         raise DataError(
             f"pieces of {fold} rows to leave out in turn leave no other training row to fit; lower search.fold, or "

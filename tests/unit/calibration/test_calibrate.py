@@ -362,6 +362,16 @@ def test_a_pulse_that_touched_the_lower_limit_half_way_was_taken_for_a_full_disc
     assert sized(start, [whole])[0].capacity_ah == pytest.approx(whole.discharged_ah("backward")[-1])
 
 
+@pytest.mark.parametrize("hold", ["linear", "backward", None])
+def test_the_charge_of_a_full_discharge_was_held_since_the_row_before_whatever_was_declared(start, hold):
+    time = np.arange(0.0, 19.0 * 3600.0, 600.0)
+    current = np.where(time > 0.0, start.nominal_capacity_ah / 20.0, 0.0)
+    voltage = np.linspace(start.upper_voltage_v, start.lower_voltage_v, len(time))
+    slow = Measurement(time, current, voltage, name="slow", hold=hold)
+    taken = slow.discharged_ah(hold or "backward")[-1]
+    assert sized(start, [slow])[0].capacity_ah == pytest.approx(taken, rel=1e-9)
+
+
 def test_a_long_fit_said_nothing_until_its_end(start, records):
     told = []
     calibrate(start, records[:1], evaluations=3, on_step=lambda steps, left: told.append((steps, left)))

@@ -63,6 +63,11 @@ def test_impossible_steps_are_refused(step):
         to_even(measurement(np.arange(10.0), np.ones(10)), step)
 
 
+def test_a_record_without_rows_ended_in_an_index_error():
+    with pytest.raises(DataError, match="has no row to resample"):
+        to_even(Measurement([], [], []), 1.0)
+
+
 @given(n=st.integers(3, 400), most=st.integers(2, 50))
 def test_decimation_is_never_longer_than_asked(n, most):
     record = measurement(np.arange(float(n)), np.sin(np.arange(n)))

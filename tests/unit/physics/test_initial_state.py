@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import DataError, InputError
 from aesi.physics import Cell, initial_state, simulate
+from aesi.physics.effect import Effect, Record, as_cell_saw
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.rest.open_circuit import GOOD_READING_V, READING_V, OpenCircuit
 from aesi.records import Measurement
@@ -364,3 +365,70 @@ def test_an_effect_in_series_was_taken_for_a_drop_of_the_load():
     run = simulate(LG_M50, time, current, 0.6, effects)
     found = initial_state(LG_M50, record(time, current, run.voltage_v), effects=effects)
     assert (found.basis, found.soc) == ("load", pytest.approx(0.6, abs=0.005))
+
+
+ON_RECORD = {
+    "current_sensor_offset": {"offset_a": 0.3},
+    "current_sensor_gain": {"gain": 1.2},
+    "clock_skew": {"skew": 0.1, "lag_s": 2.0},
+    "leakage_current": {"leakage_a": 0.3},
+}
+
+
+@pytest.mark.parametrize("name", [name for name, effect in CATALOGUE.items() if effect.on_record is not None])
+@pytest.mark.parametrize("rests_s", [0.0, 300.0])
+def test_a_start_was_read_by_the_current_as_it_was_written_where_the_cell_is_known_to_have_seen_another(
+    name, rests_s
+):
+    """Of 5 Ah at rest, 0.3 A of a sensor's offset made a load, and 28.6 mV of the drive after it."""
+    effects = [CATALOGUE[name].activate(**ON_RECORD[name])]
+    time = np.arange(1200.0)
+    written = np.where(time < rests_s, 0.3 if name == "current_sensor_offset" else 0.0, 5.0)
+    run = simulate(LG_M50, time, written, 0.9, effects, hold="backward")
+    saw = as_cell_saw(Record(time, written), effects)
+    found = initial_state(LG_M50, record(time, written, run.voltage_v), effects=effects)
+    seen = initial_state(LG_M50, record(saw.time_s, saw.current_a, run.voltage_v))
+    assert found == seen
+    assert abs(found.soc - 0.9) < found.sd
+    assert found.basis == ("rest" if rests_s and name != "leakage_current" else "load")
+
+
+def test_a_start_was_read_with_effects_on_the_current_in_another_order_than_it_is_simulated():
+    gain, leak = (
+        CATALOGUE[name].activate(**ON_RECORD[name]) for name in ("current_sensor_gain", "leakage_current")
+    )
+    time, current = np.arange(600.0), np.full(600, 5.0)
+    data = record(
+        time, current, simulate(LG_M50, time, current, 0.6, [gain, leak], hold="backward").voltage_v
+    )
+    assert initial_state(LG_M50, data, effects=[leak, gain]) == initial_state(
+        LG_M50, data, effects=[gain, leak]
+    )
+
+
+def test_a_temperature_that_an_effect_sets_right_is_the_one_a_start_is_read_at():
+    cold = Effect(
+        "too_warm", "instrument", "", on_record=lambda r: replace(r, temperature_k=r.temperature_k - 30.0)
+    )
+    nmc = Cell.from_bpx(CELLS / "nmc_30ah.bpx.json")
+    current = np.full(20, 10.0)
+    written, true = (
+        record(np.arange(20.0), current, np.full(20, 3.6), np.full(20, degc)) for degc in (25.0, -5.0)
+    )
+    assert initial_state(nmc, written, effects=[cold.activate()]).soc == pytest.approx(
+        initial_state(nmc, true).soc
+    )
+
+
+def test_a_voltage_lost_before_the_end_leaves_what_the_cell_saw_until_then():
+    """A voltage that is read 5 s early has the current of 5 s later, also beside its last row."""
+    early = [CATALOGUE["clock_skew"].activate(skew=0.0, lag_s=-5.0)]
+    time = np.arange(100.0)
+    current = np.where(time < 43.0, 0.0, 5.0)
+    voltage = simulate(LG_M50, time, current, 0.6, early, hold="backward").voltage_v
+    saw = as_cell_saw(Record(time, current), early)
+    found = initial_state(
+        LG_M50, record(time, current, np.where(time < 40.0, voltage, np.nan)), effects=early
+    )
+    seen = record(saw.time_s[:40], saw.current_a[:40], voltage[:40])
+    assert found == initial_state(LG_M50, seen)

@@ -1,5 +1,6 @@
 """The same cell here and in PyBaMM: one call, and no comparison with a run that went wrong."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ def test_a_changed_cell_agrees_with_pybamm_through_pulses(cell):
     # PyBaMM keeps the concentration dependence of the electrolyte; the current bends within 5 s at each pulse.
     assert check.rmse_mv < 1.0
     assert check.max_mv < 5.0
+    assert check.left_out == ()
     assert repr(check).startswith("CrossCheck(241 rows over 1,200 s, ")
     assert list(check.to_frame().columns) == ["time_s", "ours_v", "pybamm_v"]
     assert [line.name for line in check.plot().data] == ["ours", "PyBaMM", "ours minus PyBaMM"]
@@ -52,3 +54,19 @@ def test_another_model_is_refused(cell):
 def test_a_single_row_is_refused(cell):
     with pytest.raises(DataError, match="at least two rows"):
         cross_check(cell, np.zeros(1), np.ones(1), soc0=0.5)
+
+
+def test_a_calibrated_cell_was_compared_with_another_that_had_no_contacts_no_films_and_another_temperature():
+    """Of the LG 18650HG2 at 2 A 11.5 mV, without a word; at another initial than ambient temperature 43 mV."""
+    calibrated = aesi.Cell.from_bpx(CELLS / "lg_18650hg2.bpx.json")
+    assert calibrated.contact_resistance_ohm > 0.0
+    time_s = np.arange(0.0, 601.0, 10.0)
+    current_a = np.where(time_s < 60.0, 0.0, 2.0)
+    cold = replace(calibrated, initial_temperature_k=calibrated.initial_temperature_k - 15.0)
+    for cell in (calibrated, cold):
+        check = cross_check(cell, time_s, current_a, soc0=0.8)
+        assert check.max_mv < 2.0
+        assert check.left_out == ("resistance of films", "rates over stoichiometry", "double layers")
+        assert repr(check).endswith(
+            " at most, without resistance of films, rates over stoichiometry, double layers)"
+        )

@@ -64,6 +64,11 @@ def test_the_band_of_a_free_run_is_wider_by_what_the_start_is_uncertain_by(model
         model.predict_record(data, SOC0, soc0_sd=float("nan"))
 
 
+def test_an_error_at_the_start_that_is_no_number_made_a_voltage_of_none(model, data):
+    with pytest.raises(InputError, match="error0_v = nan is no voltage error"):
+        model.predict(data.time_s, data.current_a, SOC0, error0_v=float("nan"))
+
+
 def test_the_folder_holds_no_pickle_and_predicts_the_same(model, data, tmp_path):
     folder = model.save(tmp_path / "model")
     assert {path.suffix for path in folder.iterdir()} == {".json", ".npz"}

@@ -296,3 +296,11 @@ def test_pieces_so_long_that_nothing_is_left_to_fit_are_refused(split):
     alone = Split(split.train[:1], split.valid, split.test)
     with pytest.raises(DataError, match=r"leave no other training row to fit; lower search\.fold"):
         Problem.build(alone, Options(p_c=1, d=2, mixed=False, resamples=5, block=60, fold=longest))
+
+
+def test_a_record_too_short_to_be_cut_was_told_to_lower_a_fold_that_nobody_gave():
+    alone = Split((make_record(12),), (), ())
+    with pytest.raises(
+        DataError, match=r"\d+ rows of one training record are too few .* give a longer record"
+    ):
+        Problem.build(alone, Options(p_c=1, d=1, special=False, mixed=False, resamples=5, feedback=False))
