@@ -161,7 +161,7 @@ def _full_discharge_ah(cell: Cell, data: Measurement) -> float | None:
             break
         # Of the rows at the top, that to which it was charged; the first, where the record begins up there.
         top = slice(position, position + int(left[0]))
-        start = position + int(np.argmin(taken_ah[top])) if position else 0
+        start = position + int(np.argmin(taken_ah[top]))
         stop = top.stop + _recharged(taken_ah[top.stop :] - taken_ah[start], full[top.stop :])
         most = max(filter(None, (most, _emptied_ah(cell, data, taken_ah, start, stop))), default=None)
         position = stop
