@@ -15,7 +15,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from aesi.conformal import Calibrated, FreeRunBands, calibrated_from_dict
+from aesi.conformal import WHOLE_DRIVE, Calibrated, FreeRunBands, calibrated_from_dict
 from aesi.data.resample import is_even, to_even
 from aesi.errors import CellError, DataError, InputError, SimulationError
 from aesi.numerics.typing import Array, BoolArray, Numbers
@@ -100,13 +100,14 @@ class HybridModel:
         soc0: float | None = None,
         voltage_v: Numbers | None = None,
         temperature_degc: Numbers | None = None,
-        error0_v: float = 0.0,
+        error0_v: float | None = None,
     ) -> Prediction:
         """Voltage under a current, with its band.
 
         time_s, current_a : (n,) s, A (discharge positive).  voltage_v : (n,) V measured: one step ahead, each
-        sample predicted from those before it, the first by the physics alone and without a band; None: free run, from
-        the voltage error `error0_v` at the start.
+        sample predicted from those before it, the first by the physics alone and without a band; None: free run.
+        error0_v : V, measured minus physics at the first sample, that a free run begins with. Where it is not known
+        (None), it begins with what the inputs give, and the band is that of a whole drive from the first sample on.
         soc0 : state of charge at the first sample; None takes it from the first measured voltage at rest, else
         the model's own.  temperature_degc : as in `simulate`.
 
@@ -125,14 +126,19 @@ class HybridModel:
         soc0: float | None = None,
         *,
         one_step: bool = False,
-        error0_v: float = 0.0,
+        error0_v: float | None = None,
         soc0_sd: float = 0.0,
     ) -> Prediction:
-        """`predict` of a record, under its name: one step ahead of its voltage, or in free run, which sees none.
+        """`predict` of a record, under its name: one step ahead of its voltage, or in free run, which sees none after
+        the first.
 
+        error0_v : that a free run begins with; None takes it from the first voltage, as an experiment does that judges
+        a model, or where that is missing as `predict` does.
         soc0_sd : standard deviation of soc0, by what it is worth the band of a free run is wider. Raises InputError
-        for one that is no number from 0 to 1.
+        for one that is no number from 0 to 1, and for an error0_v that is not finite.
         """
+        if error0_v is not None and not np.isfinite(error0_v):
+            raise InputError(f"error0_v = {error0_v!r} is no voltage; give volts, or leave it out.")
         if not 0.0 <= soc0_sd <= 1.0:  # this way round, NaN fails too
             raise InputError(
                 f"soc0_sd = {soc0_sd!r} is no standard deviation of a state of charge; give 0 to 1."
@@ -144,11 +150,14 @@ class HybridModel:
                 f"voltage_v has no value at {record.time_s[row]:g} s ({row_words(row)}); predict the parts before "
                 "and after the gap as records of their own, or leave voltage_v out for a free run."
             )
-        if one_step:
+        from_first = error0_v is None and np.isfinite(measured[:1]).any()
+        if one_step or from_first:
             check_voltage(self.cell, record.take(slice(0, 1)))  # from which state and error start
+        if one_step:
             self._check_dense(record)
         else:
-            record = replace(record, voltage_v=np.full(len(record), np.nan))
+            seen = np.arange(len(record)) < (1 if from_first else 0)
+            record = replace(record, voltage_v=np.where(seen, measured, np.nan))
         soc0 = self._soc0(record, soc0, one_step)
         even = self._even(record)
         series = self._series(even, soc0)
@@ -272,8 +281,9 @@ class HybridModel:
         slopes = slopes_v(self.cell, self.effects, record, soc0, self.hold, self.model, series.model_v)
         return replace(series, slopes_v=slopes)
 
-    def _free_run(self, series: ErrorSeries, error0_v: float) -> Prediction:
+    def _free_run(self, series: ErrorSeries, error0_v: float | None) -> Prediction:
         n = len(series)
+        measured = error0_v is not None or np.isfinite(series.error_v[:1]).any()
         run, weight = FreeRun(np.zeros(n), None, np.zeros(n, dtype=bool)), np.full(n, np.nan)
         if self.correction is not None:
             run, weight = self.correction.free_run(series, error0_v), self.correction.kept(series)
@@ -281,7 +291,7 @@ class HybridModel:
         low = high = np.full(n, np.nan)
         if self.bands is not None:
             reach = 0.0 if self.correction is None else self.correction.reach(series, error0_v=error0_v)
-            band = self.bands.intervals(series, run, reach)
+            band = self.bands.intervals(series, run, reach, None if measured else WHOLE_DRIVE)
             low, high = band.lower_v, band.upper_v
         alpha = None if self.bands is None else self.bands.alpha
         return Prediction.of(series, run.error_v, low, high, run.outside, weight, alpha)

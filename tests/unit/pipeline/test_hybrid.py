@@ -63,6 +63,39 @@ def test_the_band_of_a_free_run_is_wider_by_what_the_start_is_uncertain_by(model
         model.predict_record(data, SOC0, soc0_sd=float("nan"))
 
 
+def test_a_free_run_without_a_measurement_began_as_if_the_error_were_measured_to_be_nought(model, data):
+    correction = replace(model.correction, memory=0.999)  # what it begins with lasts
+    lasting = replace(model, correction=correction)
+    under_load = data.take(slice(100, None))  # at rest the correction says nothing
+    drive = under_load.time_s, under_load.current_a, SOC0
+    free = lasting.predict(*drive)
+    given = free.voltage_v - free.physics_v
+    # By the inputs alone, from the first row on: an error that is measured to be that moves nothing.
+    told = lasting.predict(*drive, error0_v=float(given[0]))
+    np.testing.assert_allclose(told.voltage_v, free.voltage_v, atol=1e-12)
+    nought = lasting.predict(*drive, error0_v=0.0)
+    assert np.abs(nought.voltage_v - free.voltage_v).max() > 5e-3
+    # The first row has the band of a whole drive, as where a measurement lies long before.
+    width, known = (each.upper_v - each.lower_v for each in (free, told))
+    assert width[0] > 1.1 * known[0]
+    np.testing.assert_allclose(width[700:], known[700:], rtol=1e-9)
+    with pytest.raises(InputError, match="error0_v = nan is no voltage"):
+        lasting.predict(*drive, error0_v=float("nan"))
+
+
+def test_a_free_run_of_a_record_begins_with_its_first_voltage_and_sees_no_other(model, data):
+    record = replace(data, voltage_v=data.voltage_v + 0.004)
+    run = model.predict_record(record, SOC0)
+    assert run.voltage_v[0] == pytest.approx(record.voltage_v[0])
+    alone = replace(record, voltage_v=np.r_[record.voltage_v[0], np.full(len(data) - 1, np.nan)])
+    np.testing.assert_array_equal(model.predict_record(alone, SOC0).voltage_v, run.voltage_v)
+    between = record.take(slice(0, None, 5))  # brought to the model's step and back
+    alone = replace(between, voltage_v=np.r_[between.voltage_v[0], np.full(len(between) - 1, np.nan)])
+    run = model.predict_record(between, SOC0)
+    np.testing.assert_array_equal(model.predict_record(alone, SOC0).voltage_v, run.voltage_v)
+    assert np.isfinite(run.voltage_v).all()
+
+
 def test_the_folder_holds_no_pickle_and_predicts_the_same(model, data, tmp_path):
     folder = model.save(tmp_path / "model")
     assert {path.suffix for path in folder.iterdir()} == {".json", ".npz"}
@@ -224,7 +257,9 @@ def test_a_cold_record_had_no_correction_and_nothing_said_so(fading, data, tmp_p
     )
     assert table["outside"].all()
     assert table["weight"].max() < 1e-3
-    np.testing.assert_allclose(table["voltage_v"], table["physics_v"], atol=1e-4)
+    np.testing.assert_allclose(
+        table["voltage_v"][1:], table["physics_v"][1:], atol=1e-4
+    )  # the first is measured
     assert "0 % of itself: this is the physics model and its last measured error." in predicted(0.0, True)[1]
 
     table, said = predicted(18.0)
