@@ -335,7 +335,7 @@ def _of_observed(record: Measurement, model: HybridModel, apart: BoolArray) -> l
     if np.any(gaps := model.after_gap(record.time_s)):
         said.append(
             f"{record.name}: {_percent(gaps)} of the rows are more than a step of {model.dt_s:g} s after the one "
-            "before; what is filled in between holds some of their own voltage, so that they are no predictions."
+            "before, from which they are predicted; the band is of a step."
         )
     return said
 

@@ -175,6 +175,20 @@ def test_one_step_of_rows_further_apart_than_a_step_saw_the_row_that_it_predicts
         predict_file(folder, tmp_path / "sparse.csv", tmp_path / "out.csv", measured=True)
 
 
+@pytest.mark.parametrize("every_s", [0.3, 0.76, 1.1, 1.49])
+def test_one_step_of_rows_near_a_step_apart_saw_the_row_that_it_predicts(model, every_s):
+    time_s, current_a, voltage_v = linear_drive(model, every_s, seconds=200.0)
+    before = model.predict(time_s, current_a, SOC0, voltage_v)
+    for row in range(60, 70):
+        moved = voltage_v.copy()
+        moved[row] += 0.01
+        after = model.predict(time_s, current_a, SOC0, moved)
+        for name in ("voltage_v", "lower_v", "upper_v"):
+            was, now = (getattr(each, name)[: row + 1] for each in (before, after))
+            np.testing.assert_allclose(now, was, atol=1e-12)
+        assert np.abs(after.voltage_v - before.voltage_v).max() > 1e-5  # but later ones do
+
+
 def test_the_first_row_had_the_band_of_one_step_though_nothing_was_measured_before_it(model, data):
     prediction = model.predict(data.time_s, data.current_a, SOC0, data.voltage_v)
     assert np.isnan(prediction.lower_v[0])
