@@ -83,7 +83,7 @@ def after_gap(time_s: Array, dt_s: float) -> BoolArray:
 
 def is_sparse(time_s: Array, dt_s: float) -> bool:
     """Whether most rows have none a step of dt_s before them, so that most steps would be filled in."""
-    return 2 * np.count_nonzero(after_gap(time_s, dt_s)) > len(time_s)
+    return bool(2 * np.count_nonzero(after_gap(time_s, dt_s)) > len(time_s))
 
 
 def known_by(time_s: Array, values: Array, stamps_s: Array) -> Array:

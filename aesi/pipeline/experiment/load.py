@@ -11,7 +11,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from aesi.data.resample import to_even
+import numpy as np
+
+from aesi.data.resample import DENSE, is_even, is_sparse, to_even
 from aesi.data.virtual import DEFAULT_MIX
 from aesi.errors import ConfigError, DataAway, DataError, InputError, SimulationError
 from aesi.numerics.files.contents import contents
@@ -35,7 +37,7 @@ from aesi.pipeline.experiment.sources import (
 from aesi.pipeline.notes import of_day, on_temperatures, temperature_sentence
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
-from aesi.records import ErrorSeries, Hold, LeftOutDrives, Role, Split, hold_sentence
+from aesi.records import ErrorSeries, Hold, LeftOutDrives, Measurement, Role, Split, hold_sentence
 
 DFN_NOTE = "The physics is the porous electrode: DFN in tables and figures, where others have ESPM."
 
@@ -244,15 +246,39 @@ def _on_grid(
         begins = Beginning(measurement, declared, shared)
         start = starts[name] = begins.under(cell, given.effects, data.hold, given.model)
         held = hold_sentence(measurement.name, data.hold, "hold" in data.model_fields_set, "data.hold: {}")
+        sampled = _of_sampling(measurement, data.dt_s)
         even = to_even(measurement, data.dt_s, data.hold)
         notes += [
             held,
+            *sampled,
             temperature_sentence(cell, measurement, given.effects),
             *map(with_keys, even.notes),
         ]
         records[name] = no_rows(even, start.soc, start.read_sd, begins)
     notes += on_temperatures(cell, (m.temperature_degc for m, _ in sources.records.values()), given.effects)
     return records, starts, notes
+
+
+def _of_sampling(measurement: Measurement, dt_s: float) -> list[str]:
+    """A sentence on a record whose figures one step ahead know something of the row that they predict.
+
+    Raises DataError for one whose rows are so far apart that most of them would be filled in.
+    """
+    time_s = measurement.time_s
+    apart_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else dt_s
+    if is_sparse(time_s, dt_s):
+        raise DataError(
+            f"{measurement.name}: its rows are {apart_s:g} s apart and data.dt_s is {dt_s:g} s, so that most of what "
+            f"is fitted and judged would be filled in between rows; give data.dt_s: {apart_s:g}, or a record of "
+            "denser rows."
+        )
+    if is_even(time_s, dt_s) or apart_s < DENSE * dt_s:
+        return []
+    return [
+        f"{measurement.name}: its rows are not just {dt_s:g} s apart, and what is filled in between holds some of the "
+        "row that comes next: figures and intervals one step ahead come out too good; a data.dt_s of several rows, "
+        "over which they are averaged, avoids it."
+    ]
 
 
 def _refuse(physics: PhysicsModels, name: str, record: FitRecord, hold: Hold) -> None:
