@@ -136,11 +136,15 @@ class TrainingDrives:
         )
 
     def _slope(self, physics: PhysicsModels, piece: Piece) -> float:
-        """`slope_on` the piece; only the one record, under the two models that it takes, is simulated."""
+        """`slope_on` the piece; only the one record, under the two models that it takes, is simulated.
+
+        Both start by the declared cell's reading: what parameters take off is asked, not what a better start does.
+        """
         name, rows = self._rows(piece)
-        record, hold = self._without(piece)[name], self.config.data.hold
+        record, hold = self.records[name], self.config.data.hold
         declared_v, recalibrated_v = (
-            physics.run(model, record, hold).voltage_v[rows] for model in (DECLARED, RECALIBRATED)
+            physics.by_name[model].simulate(record.measurement, record.soc0, hold).voltage_v[rows]
+            for model in (DECLARED, RECALIBRATED)
         )
         return slope_on(record.measurement.voltage_v[rows] - declared_v, recalibrated_v - declared_v)
 
