@@ -65,8 +65,8 @@ def judged(spec: CaseSpec, cells: str, limit_s: float | None = LIMIT_S) -> dict[
 
 
 NOT_MADE = "not made"
-"""Of a case that the laboratory cannot make as planned, such as one that meets the limit of the voltage: it is counted,
-and in no rate."""
+"""Verdict of a case that the laboratory cannot make as planned, such as one that meets the limit of the voltage: it
+is counted, and in no rate."""
 
 
 def _planned(spec: CaseSpec) -> dict[str, Any]:

@@ -37,7 +37,8 @@ from aesi.tracer.search.grown import ended, growths_on
 
 RIGHT_TEMPERATURE = ("25degC", "drive_cycle")
 CONSTANT = ("cap_1c",)
-"""In the names of records: at the temperature that their file is of, and at a current that never changes."""
+"""Parts of the names of records that are left out, since their current never changes; RIGHT_TEMPERATURE, of those
+that are at the temperature that their file is of."""
 THERE = "clock_skew"
 """The voltage channel of one cycler does lag, by 0.12 s on three records: no chance."""
 

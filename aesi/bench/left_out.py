@@ -26,7 +26,7 @@ from aesi.tracer import discover
 from aesi.tracer.decide.written import AS_GOOD
 
 LIMIT_S = 900.0
-"""Of a processor, for one case: a convention; the slowest of `aesi bench left_out` took 390 s."""
+"""Limit of processor time for one case, s: a convention; the slowest of `aesi bench left_out` took 390 s."""
 
 
 @dataclass(frozen=True)

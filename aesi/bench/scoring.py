@@ -16,7 +16,7 @@ TWINS = frozenset({frozenset({"leakage_current", "current_sensor_offset"})})
 """Effects that are one and the same in current and voltage: a current that passes the cell and not the sensor. Naming
 either with the other as its group is exact."""
 CERTAIN = 0.95
-"""Of every interval of a rate (Clopper and Pearson 1934, exact)."""
+"""Confidence of every interval of a rate (Clopper and Pearson 1934, exact)."""
 TO_THE_NOISE = 1.1
 """An error on unseen data of at most so many times the noise is the noise."""
 TENTHS = 10

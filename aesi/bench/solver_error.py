@@ -31,6 +31,7 @@ from aesi.numerics.typing import Array
 from aesi.tracer.case.blocks import blocks_of
 from aesi.tracer.likelihood.fit import said_at
 from aesi.tracer.likelihood.model_error import Size, SplitTable
+from aesi.tracer.likelihood.size_sums import SizeSums
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import fitted_hypothesis
 
@@ -48,8 +49,8 @@ def said_by_size(case: BlindCase) -> Array | None:
     fit = fitted_hypothesis(problem, blocks, case.effects, None, Archive(None, ""))
     if fit is None:
         return None
-    table = SplitTable(problem, blocks, fit.point.table())
-    said = np.array([said_at(table, fit.point, Size(size)).total for size in SIZES_V])
+    sums = SizeSums(SplitTable(problem, blocks, fit.point.table()))
+    said = np.array([said_at(sums, fit.point, Size(size)).total for size in SIZES_V])
     return said - said.max()
 
 

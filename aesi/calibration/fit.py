@@ -7,7 +7,7 @@ on from there with that heat.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from datetime import date
 
@@ -34,12 +34,12 @@ from aesi.calibration.result import (
 )
 from aesi.calibration.rewind import capacities, rewound
 from aesi.calibration.shapes import Shapes
-from aesi.calibration.start import one_branch, size_assumed, sized, with_activation
+from aesi.calibration.start import one_branch, size_assumed, sized, tell_the_size, with_activation
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError, FitError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
-from aesi.physics.belongs import check_voltage
+from aesi.physics.belongs import check_voltage, unlike
 from aesi.physics.cell import Cell
 from aesi.physics.cell.energies import SPAN_K
 from aesi.physics.cell.health import day_of
@@ -61,6 +61,8 @@ NOTED_SILICON = 0.05
 NOTED_DEVIATIONS = 2.0
 """A fit that ends more than this many standard deviations from a prior that the user gave contradicts it. A
 convention."""
+OnStep = Callable[[int, float], None]
+"""Told at each step of a fit: their number so far, and the share of the misfit of the start that is left."""
 OF_ROWS_LEFT_OUT = (
     "the state of charge that was given is that of its first row, which is not fitted; it starts where its "
     "voltage says."
@@ -73,6 +75,7 @@ def calibrate(
     conditions: Conditions | None = None,
     *,
     evaluations: int = EVALUATIONS,
+    on_step: OnStep | None = None,
 ) -> Calibration:
     """Fit the parameters of a cell's file to records by maximum a posteriori: capacities, stoichiometry windows,
     potentials, diffusion, kinetics, electrolyte and contacts, with temperature. Gives the new cell, values with 95 %
@@ -86,7 +89,7 @@ def calibrate(
     began = time.perf_counter()
     conditions = conditions or Conditions()
     model, notes = problem(cell, records, conditions)
-    x, found, of_heat = _fitted_twice(model, evaluations)
+    x, found, of_heat = _fitted_twice(_Told(model, on_step), evaluations)
     states = model.states(cell, x)
     scaled = model.jacobian(x) * information_weights(model, x)[:, None]
     covariance: Array = np.asarray(np.linalg.inv(scaled.T @ scaled), dtype=float)
@@ -111,16 +114,39 @@ def calibrate(
     )
 
 
-def _fitted_twice(model: Model, evaluations: int) -> tuple[Array, Cell, tuple[str, ...]]:
+class _Told:
+    """A model whose descents pass on where they stand.  on_step : or nobody is told."""
+
+    def __init__(self, model: Model, on_step: OnStep | None) -> None:
+        self.model, self._on_step = model, on_step
+        self._steps, self._first, self._last = 0, 0.0, 0.0
+
+    def residual(self, x: Array) -> Array:
+        """The model's, remembered by its size."""
+        residual = self.model.residual(x)
+        self._last = float(residual @ residual)
+        return residual
+
+    def jacobian(self, x: Array) -> Array:
+        """The model's, which a descent asks for once a step, where it has taken it."""
+        self._first = self._first or self._last
+        if self._on_step is not None:
+            self._on_step(self._steps, self._last / self._first if self._first else 1.0)
+        self._steps += 1
+        return self.model.jacobian(x)
+
+
+def _fitted_twice(told: _Told, evaluations: int) -> tuple[Array, Cell, tuple[str, ...]]:
     """Where the descents end, the cell there with what its temperatures tell of heat, and a sentence on that.
 
     Where no record tells of heat, a second descent would begin with what the first one had, and there is none.
     """
-    x = descended(model, evaluations)
+    model = told.model
+    x = _descended(told, evaluations, np.zeros(model.layout.size))
     found, of_heat = with_heat(rewound(model, x), model.records)
     if of_heat:  # how fast a winding follows its case is of the file, which is fitted as it is simulated
         model.take_heat_of(found)
-        x = descended(model, evaluations, x)
+        x = _descended(told, evaluations, x)
         found = rewound(model, x)
     return x, found, of_heat
 
@@ -166,6 +192,8 @@ def problem(
         start, [data for data, _ in kept], conditions.temperatures_degc
     )
     start, of_activation = with_activation(start)
+    telling = () if conditions.same_cell else tell_the_size(cell, records)
+    of_potentials = filter(None, (unlike(start, records[i]) for i in telling))
     cut = [r.name for r, whole in zip(placed, records, strict=True) if r.time_s[0] > whole.time_s[0]]
     model_name = conditions.model or "espm"
     ready = prepared(start, placed, conditions.soc0, model_name, conditions.same_cell, cut)
@@ -188,6 +216,7 @@ def problem(
     )
     return model, (
         *of_size,
+        *of_potentials,
         *zero.sentences,
         *(sentence for _, of_branch in kept for sentence in of_branch),
         *of_temperature,
@@ -255,16 +284,16 @@ def _of_small_span(span_k: float, n_records: int) -> tuple[str, ...]:
     return (f"{apart}: activation energies and entropy stay as they are.",)
 
 
-def descended(model: Model, evaluations: int, x0: Array | None = None) -> Array:
+def _descended(told: _Told, evaluations: int, x0: Array) -> Array:
     """Working vector at which bounded least squares ends."""
-    x = np.zeros(model.layout.size) if x0 is None else x0
-    if not np.isfinite(model.residual(x)).all():
+    model = told.model
+    if not np.isfinite(model.residual(x0)).all():
         raise FitError(
             f"{model.cell.name}: the start file cannot be simulated on these records; start from a cell of the same "
             "chemistry."
         )
     found = least_squares(
-        model.residual, x, model.jacobian, (model.low, model.high), ftol=GAIN, xtol=1e-5, gtol=1e-8,
+        told.residual, x0, told.jacobian, (model.low, model.high), ftol=GAIN, xtol=1e-5, gtol=1e-8,
         max_nfev=evaluations,
     )  # fmt: skip
     return np.asarray(found.x, dtype=float)

@@ -29,15 +29,19 @@ FULL_WINDOW_V = 0.15
 """A discharge is a full one if it starts within this of the upper limit and ends within twice this of the lower."""
 ALL_OF_IT = 0.95
 """Least share of the most charge that a record takes out of a cell for which its lowest voltage counts as empty.
-Where less has left, a pulse reached the limit, which happens at any state of charge in the cold. A convention."""
+Where less has left, a pulse reached the limit, which happens at any state of charge in the cold; and where as much of
+what was taken was given back, the cell was charged. A convention."""
+NEAR_THE_SIZE = 0.5
+"""Least share of the largest full discharge that another one has to have: a smaller one is of another cell, or in
+another unit, and tells no size. A convention."""
 LONG_CHARGE = 0.3
-"""Share of the capacity: a longer charge changes the branch of the hysteresis, where there is one."""
+"""Share of the capacity, or of the most that was taken: a longer charge changes the branch of the hysteresis, where
+there is one."""
 
 
 def sized(cell: Cell, measurements: Sequence[Measurement]) -> tuple[Cell, tuple[str, ...]]:
     """The cell with its area scaled to the charge of a full discharge among the measurements, if there is one."""
-    charges = [_full_discharge_ah(cell, m) for m in measurements]
-    known = max((q for q in charges if q is not None), default=None)
+    known = max((q for q in _full_discharges_ah(cell, measurements) if q is not None), default=None)
     if known is None:
         return cell, (size_assumed(cell, measurements),)
     factor = known / cell.capacity_ah
@@ -48,16 +52,27 @@ def sized(cell: Cell, measurements: Sequence[Measurement]) -> tuple[Cell, tuple[
     )
 
 
+def tell_the_size(cell: Cell, measurements: Sequence[Measurement]) -> tuple[int, ...]:
+    """The numbers of the measurements with a full discharge of the size that `sized` takes, or nearly."""
+    charges = _full_discharges_ah(cell, measurements)
+    known = max((q for q in charges if q is not None), default=0.0)
+    return tuple(i for i, q in enumerate(charges) if q is not None and q >= NEAR_THE_SIZE * known)
+
+
+def _full_discharges_ah(cell: Cell, measurements: Sequence[Measurement]) -> list[float | None]:
+    return [_full_discharge_ah(cell, m) for m in measurements]
+
+
 def size_assumed(cell: Cell, measurements: Sequence[Measurement]) -> str:
     """A sentence that the size of the cell is the file's; '' where a full discharge among the measurements tells it.
     A fit then speaks of capacity within its windows of stoichiometry only: the size is no parameter of it."""
-    if any(_full_discharge_ah(cell, m) is not None for m in measurements):
+    if any(q is not None for q in _full_discharges_ah(cell, measurements)):
         return ""
     return (
-        f"no record holds a full discharge (from {cell.upper_voltage_v - FULL_WINDOW_V:.4g} V or more at its first row "
-        f"to {cell.lower_voltage_v + 2 * FULL_WINDOW_V:.4g} V or less): the size of the cell is taken from the start "
-        f"file, {cell.capacity_ah:.3g} Ah, and capacity, lithium and active material are off by as much as that is, "
-        "beyond their intervals."
+        f"no record holds a full discharge (from {cell.upper_voltage_v - FULL_WINDOW_V:.4g} V or more to "
+        f"{cell.lower_voltage_v + 2 * FULL_WINDOW_V:.4g} V or less, by the cut-offs of the start file): the size of "
+        f"the cell is taken from the start file, {cell.capacity_ah:.3g} Ah, and capacity, lithium and active material "
+        "are off by as much as that is, beyond their intervals."
     )
 
 
@@ -133,15 +148,46 @@ def _numbered(flags: BoolArray) -> Array:
 
 
 def _full_discharge_ah(cell: Cell, data: Measurement) -> float | None:
-    """Charge from full to empty, or None where the record does not go from one to the other."""
-    if data.voltage_v[0] < cell.upper_voltage_v - FULL_WINDOW_V:
-        return None
-    end = int(np.argmin(data.voltage_v))
+    """Charge from full to empty: the most that a stretch of the record takes from one to the other, None where none
+    does. A stretch begins where the cell is full, and ends where it has been charged to there again."""
+    full = data.voltage_v >= cell.upper_voltage_v - FULL_WINDOW_V
+    taken_ah = data.discharged_ah("backward")
+    most: float | None = None
+    position = 0
+    while full[position:].any():
+        position += int(np.argmax(full[position:]))
+        left = np.flatnonzero(~full[position:])
+        if not len(left):
+            break
+        # Of the rows at the top, that to which it was charged; the first, where the record begins up there.
+        top = slice(position, position + int(left[0]))
+        start = position + int(np.argmin(taken_ah[top])) if position else 0
+        stop = top.stop + _recharged(taken_ah[top.stop :] - taken_ah[start], full[top.stop :])
+        most = max(filter(None, (most, _emptied_ah(cell, data, taken_ah, start, stop))), default=None)
+        position = stop
+    return most
+
+
+def _recharged(taken_ah: Array, full: BoolArray) -> int:
+    """The row of a stretch at which the cell has been charged to full again, or their number where it has not.
+
+    taken_ah : (n,) since it was full.  A cell that rests near full, or that a pulse left there, is still discharged.
+    """
+    if not len(taken_ah):
+        return 0
+    most_ah = np.maximum.accumulate(taken_ah)
+    given_back = most_ah - taken_ah >= ALL_OF_IT * most_ah
+    again = np.flatnonzero(full & given_back & (most_ah > LONG_CHARGE * most_ah[-1]))
+    return int(again[0]) if len(again) else len(taken_ah)
+
+
+def _emptied_ah(cell: Cell, data: Measurement, taken_ah: Array, start: int, stop: int) -> float | None:
+    """Charge from a full row to the lowest voltage before another, or None where that is not empty."""
+    end = start + int(np.argmin(data.voltage_v[start:stop]))
     if data.voltage_v[end] > cell.lower_voltage_v + 2 * FULL_WINDOW_V:
         return None
-    taken_ah = data.discharged_ah("backward")
-    if taken_ah[end] < ALL_OF_IT * taken_ah.max():
+    if taken_ah[end] - taken_ah[start] < ALL_OF_IT * (taken_ah[start:stop].max() - taken_ah[start]):
         return None
     # One sum, not the last of running ones: where a descent ends moves by millivolts with the last digit of this.
-    steps = data.current_a[1 : end + 1] * np.diff(data.time_s[: end + 1])
+    steps = data.current_a[start + 1 : end + 1] * np.diff(data.time_s[start : end + 1])
     return float(steps.sum()) / SECONDS_PER_HOUR

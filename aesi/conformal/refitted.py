@@ -31,7 +31,7 @@ MOST_FORESTS = 40
 MEMORY = 10
 """Residuals that a forest is grown on, in windows."""
 TREES = 10
-"""As in Xu and Xie's algorithm 1. Their depth of two is replaced by a least number of residuals in a leaf."""
+"""Trees, as in Xu and Xie's algorithm 1. Their depth of two is replaced by a least number of residuals in a leaf."""
 LEAF = 10
 """Residuals in a leaf, at least: a convention."""
 FEATURES = 1 / 3

@@ -16,7 +16,7 @@ from aesi.conformal.regressors.normalised import NormalisedQuantiles
 from aesi.numerics.trees.boosting import Growth
 
 RATE = 0.05
-"""Of the adaptive step: fast enough to hold 85 % in every bin of current and charge on a measured drive, slow
+"""Rate of the adaptive step: fast enough to hold 85 % in every bin of current and charge on a measured drive, slow
 enough to stay within 5 % of the best score possible where that is known; `tests/statistical/` asserts both."""
 FOREST_ROWS = 10_000
 """Rows that each tree of a forest sees, at most. A convention; it bounds the time of a fit."""

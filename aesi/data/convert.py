@@ -107,7 +107,8 @@ def _size_line(record: Measurement) -> list[str]:
     low, high = (each / resistance for each in USUAL_RESISTANCE_OHM_AH)
     return [
         f"Steps of the current show {1e3 * resistance:.3g} mohm, as cells of {low:.2g} to {high:.2g} Ah do; if it is "
-        "none of these, the current is in another unit than A (--unit current_a=...), or scaled; --cell FILE checks it."
+        "none of these, the current is in another unit than A (--unit current_a=...), or scaled, or, of a larger cell, "
+        "the voltage was taken with the drop of its leads; --cell FILE checks it."
     ]
 
 

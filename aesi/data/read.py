@@ -16,7 +16,7 @@ from aesi.data.channels.glitches import glitch_doubts, glitches
 from aesi.data.channels.implausible import check_scale, check_sign, check_signed
 from aesi.data.channels.load_columns import keep_rows, load_columns
 from aesi.data.channels.stamps import time_doubts
-from aesi.data.channels.stuck import check_dead, check_stuck
+from aesi.data.channels.stuck import check_dead, check_stuck, held_doubts
 from aesi.data.channels.temperature import temperature_doubts
 from aesi.data.readers import open_table
 from aesi.data.readers.formats.format import Sign
@@ -50,7 +50,8 @@ def read_measurement(
     """Read one continuous test: CSV (also gzip), Excel, Parquet, BDF, or a cycler's export or own file.
 
     columns : quantity -> the file's name for it, for those not named time_s, current_a, voltage_v,
-        temperature_degc (optional), as in BDF or as in a known cycler's export; None leaves the temperature out.
+        temperature_degc (optional), as in BDF or as in a known cycler's export; None leaves the temperature out,
+        and a number states it, degC in every row.
     sign : which direction of the file's current is positive; None: as the known export has it, else discharge.
         BDF's is charge positive.
     max_rows : more rows than this are decimated (interval averages); None keeps all.
@@ -149,6 +150,7 @@ def _examine(
     if found.leaps.size:
         course = keep_rows(data, context, np.delete(np.arange(len(data["time_s"])), found.leaps))
     _examine_course(*course, header, sign_advice)
+    notes.extend(held_doubts(course[0]))
     return data
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from aesi.numerics.typing import Array
 
 UPDATED_TRIALS = 2
-"""Of a step with slopes brought up to date: where it fails, they may be what is wrong."""
+"""Trials of a step whose slopes were only brought up to date: where it fails, these may be what is wrong."""
 
 
 class Residual(Protocol):

@@ -11,7 +11,7 @@ from aesi.constants import GAS_CONSTANT_J_MOL_K, ZERO_CELSIUS_K
 from aesi.numerics.typing import Array, BoolArray, SavedState
 
 RESOLUTION = 0.005
-"""Of a state of charge: no model of an error tells places apart that are closer."""
+"""Distance in the state of charge below which no model of an error tells two places apart."""
 LENGTH = 0.12
 """Share of the charge over which a cell model's error changes: that of the potentials in the effect ocp_shape. Over
 the development splits of the NMC drive in `aesi bench splits` (16 candidates) a correction that fades over half of it

@@ -23,7 +23,7 @@ want 1/1.06 to 1.06 times the capacity of their own file, and 51 of the 108 pair
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -124,14 +124,56 @@ def check_voltage(cell: Cell, data: Measurement) -> None:
         )
 
 
-def check_measured(cell: Cell, records: Sequence[Measurement]) -> None:
+def check_measured(cell: Cell, records: Sequence[Measurement], known: Collection[int] = ()) -> None:
     """As `check_belongs`, and of every row of its voltage: for what fits a record or is judged on it, where a
-    simulation needs only its current."""
+    simulation needs only its current.
+
+    known : of the records, the numbers of those whose full discharge the cell has its capacity from. What their
+    voltages want beside that is no other size but what the potentials of the file are off, which a fit moves: it is
+    allowed to all records, unless nobody said how warm they were and the cold would explain it.
+    """
+    slack = Slack()
+    for number in known:
+        record = records[number]
+        if not (record.temperature_degc is None and _of_the_cold(cell, record)):
+            slack = slack.with_what(cell, record)
     for record in records:
         _check_window(cell, record)
         check_voltage(cell, record)
         if np.all(np.isfinite(record.voltage_v)):
-            _check_capacity(cell, record)
+            _check_capacity(cell, record, slack)
+
+
+@dataclass(frozen=True)
+class Slack:
+    """By how much the potentials of a file alone make a record want another capacity than its cell is known to have.
+
+    more, less : times the known capacity, at least 1 and at most 1.
+    """
+
+    more: float = 1.0
+    less: float = 1.0
+
+    def with_what(self, cell: Cell, record: Measurement) -> Slack:
+        """Widened to what a record of a cell of known capacity wants."""
+        bounds, known = capacity_bounds(cell, record), _capacity_ah(cell)
+        return Slack(max(self.more, bounds.low_ah / known), min(self.less, bounds.high_ah / known))
+
+
+def unlike(cell: Cell, record: Measurement) -> str:
+    """A sentence where the voltages of a full discharge, which the cell has its capacity from, want another one by the
+    potentials of its file; '' where they do not."""
+    if not np.all(np.isfinite(record.voltage_v)) or _capacity_fault(cell, record) is None:
+        return ""
+    bounds, known = capacity_bounds(cell, record), _capacity_ah(cell)
+    more = bounds.low_ah > TOO_SMALL * known
+    wanted = f"{bounds.low_ah:.3g} Ah or more" if more else f"{bounds.high_ah:.3g} Ah or less"
+    return (
+        f"{record.name}: by the open-circuit potentials of the start file its voltages are those of a cell of "
+        f"{wanted}, where a full discharge shows {known:.3g} Ah: these potentials are of other materials, and the fit "
+        "has to bend them. Start from a file of the same materials, where there is one, and see what is left over the "
+        "state of charge."
+    )
 
 
 def check_belongs(cell: Cell, records: Iterable[Measurement]) -> None:
@@ -149,7 +191,7 @@ def check_belongs(cell: Cell, records: Iterable[Measurement]) -> None:
 def _check_current(cell: Cell, record: Measurement) -> None:
     """Of a current without a voltage in every row: one that no cell of this capacity carries, or that moves many times
     what it holds, is in another unit."""
-    declared = max(cell.nominal_capacity_ah, cell.capacity_ah)
+    declared = _capacity_ah(cell)
     row = int(np.argmax(np.abs(record.current_a)))
     rate = float(np.abs(record.current_a[row])) / declared
     head = f"{record.name}, {stamp(record.time_s[row])} s: {record.current_a[row]:.4g} A are {rate:.3g}C of"
@@ -217,13 +259,12 @@ def _check_window(cell: Cell, record: Measurement) -> None:
         )
 
 
-def _check_capacity(cell: Cell, record: Measurement) -> None:
-    fault = _capacity_fault(cell, record)
+def _check_capacity(cell: Cell, record: Measurement, slack: Slack | None = None) -> None:
+    fault = _capacity_fault(cell, record, slack)
     if fault is None:
         return
     check_voltage(cell, record)
-    coldest = replace(record, temperature_degc=np.full(len(record), COLD_DEGC - MOST_SPANS * COLD_SPAN_K))
-    if record.temperature_degc is None and _capacity_fault(cell, coldest) is None:
+    if record.temperature_degc is None and _of_the_cold(cell, record):
         fault += (
             f". Or it was far colder than the {_declared_degc(cell):.4g} degC that the cell's file declares: give its "
             "temperature in a column temperature_degc, or declare another in that file (Initial temperature [K])"
@@ -234,16 +275,26 @@ def _check_capacity(cell: Cell, record: Measurement) -> None:
     raise DataError(f"{fault}.")
 
 
-def _capacity_fault(cell: Cell, record: Measurement) -> str | None:
+def _of_the_cold(cell: Cell, record: Measurement) -> bool:
+    """Whether a record that the cell's capacity does not explain would be of it in the cold."""
+    coldest = replace(record, temperature_degc=np.full(len(record), COLD_DEGC - MOST_SPANS * COLD_SPAN_K))
+    return _capacity_fault(cell, record) is not None and _capacity_fault(cell, coldest) is None
+
+
+def _capacity_ah(cell: Cell) -> float:
+    return max(cell.nominal_capacity_ah, cell.capacity_ah)
+
+
+def _capacity_fault(cell: Cell, record: Measurement, slack: Slack | None = None) -> str | None:
     """What is moved between two voltages and which capacity that is of, where it is not the cell's, and why."""
-    bounds = capacity_bounds(cell, record)
-    declared = max(cell.nominal_capacity_ah, cell.capacity_ah)
-    if bounds.low_rows is not None and bounds.low_ah > TOO_SMALL * declared:
+    bounds, allowed = capacity_bounds(cell, record), slack or Slack()
+    declared = _capacity_ah(cell)
+    if bounds.low_rows is not None and bounds.low_ah > TOO_SMALL * allowed.more * declared:
         return (
             f"{_moved(record, bounds.low_rows)}, as in a cell of {bounds.low_ah:.3g} Ah or more, but {cell.name} has "
             f"{declared:.3g} Ah: {_cause(bounds.low_ah / declared, record)}"
         )
-    if bounds.high_rows is not None and declared > TOO_LARGE * bounds.high_ah:
+    if bounds.high_rows is not None and allowed.less * declared > TOO_LARGE * bounds.high_ah:
         return (
             f"{_moved(record, bounds.high_rows)}, as in a cell of {bounds.high_ah:.3g} Ah or less, but {cell.name} has "
             f"{declared:.3g} Ah: {_cause(bounds.high_ah / declared, record)}"
@@ -276,8 +327,8 @@ def _cause(ratio: float, record: Measurement) -> str:
         )
     if ratio < 1.0 / 15.0:
         return (
-            "the time is in minutes or hours (give s, or declare it: --unit time_s=min or h), or the cell file is "
-            "another's"
+            "the time is in minutes or hours (give s, or declare it: --unit time_s=min or h), the current is a C-rate "
+            "(give A), or the cell file is another's"
         )
     if ratio > 15.0:
         return (

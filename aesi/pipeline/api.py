@@ -101,7 +101,7 @@ def discover(
         model,
         good=known,
     )
-    case = with_cold_admitted(within_budget(case))  # refused before anything is searched
+    case = with_cold_admitted(within_budget(case.checked()))  # refused before anything is searched
     finding = Finding(case, run_case(case, folder, progress))
     if folder is not None:
         finding.save(folder)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from aesi.calibration import Calibration, Conditions, calibrate
+from aesi.calibration.fit import OnStep
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.parameters import check_names
 from aesi.calibration.posterior import PosteriorSamples, check_posterior, sampled
@@ -18,7 +19,7 @@ from aesi.calibration.records.prepared import with_temperatures
 from aesi.calibration.records.spectra import BAND_HZ, check_spectra
 from aesi.calibration.result import RecordError
 from aesi.calibration.rewind import start_soc
-from aesi.calibration.start import sized
+from aesi.calibration.start import sized, tell_the_size
 from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError
 from aesi.numerics.files.whole import write_whole
@@ -69,9 +70,15 @@ def check_request(cell: Path, request: Request) -> None:
 
 
 def calibrate_files(
-    cell: Path, measurements: Sequence[Measurement], out: Path, request: Request | None = None
+    cell: Path,
+    measurements: Sequence[Measurement],
+    out: Path,
+    request: Request | None = None,
+    on_step: OnStep | None = None,
 ) -> dict[str, Any]:
     """Calibrate the cell of a BPX file; writes `out` (BPX) and the report beside it, and returns the report.
+
+    on_step : told at each step of the fit.
 
     Raises CellError or DataError, one sentence, for what cannot be used.
     """
@@ -84,7 +91,7 @@ def calibrate_files(
     declared, model = given.cell, conditions.model or given.model
     start = scaled_to(declared, measurements, conditions.temperatures_degc)
     check_spectra(start, (*conditions.spectra, *asked.impedance))
-    found = calibrate(declared, measurements, replace(conditions, model=model))
+    found = calibrate(declared, measurements, replace(conditions, model=model), on_step=on_step)
     name = declared.name if asked.title is None else asked.title
     found = replace(found, cell=replace(found.cell, name=name, description=_made_from(found)))
     posterior = sampled(found, asked.posterior, asked.seed) if asked.posterior else None
@@ -181,7 +188,8 @@ def scaled_to(
     its temperature.
     """
     start = sized(declared, measurements)[0]
-    check_measured(start, with_temperatures(start, measurements, temperatures_degc or {})[0])
+    placed = with_temperatures(start, measurements, temperatures_degc or {})[0]
+    check_measured(start, placed, tell_the_size(declared, measurements))
     return start
 
 

@@ -9,7 +9,8 @@ from itertools import combinations
 from aesi.errors import DataError
 from aesi.over_time import stamp
 from aesi.records import Measurement, Spectrum
-from aesi.records.overlap import Overlap, Rows, overlap
+from aesi.records.overlap import overlap
+from aesi.records.rows import Overlap, Rows
 from aesi.tracer.case.records import led_by
 
 _Listed = Sequence[Measurement] | Sequence[Spectrum]
@@ -50,7 +51,7 @@ def check_distinct(
     fitted: Sequence[Measurement], tests: Sequence[Measurement] = (), *, led: bool = False
 ) -> None:
     """Raises DataError, one sentence, for two records that hold the same rows, in whole or in part, as they are or
-    shifted in time, rounded or thinned.
+    shifted in time, rounded, thinned or resampled.
 
     fitted : what may be looked at.  tests : what chooses nothing.
     led : a test that begins with a fitted record is judged where that ends.
@@ -103,7 +104,8 @@ def _of_one_test(one: str, other: str, found: Overlap, where: str) -> DataError:
     """One sentence about two records that share rows."""
     way = "later" if found.ahead_s > 0 else "earlier"
     clock = f", {stamp(abs(found.ahead_s))} s {way} than in {one}" if found.ahead_s else ""
+    same = "one test on other times" if found.resampled else "the same rows of one test"
     return DataError(
-        f"{one} and {other} hold the same rows of one test ({found.rows:,} rows, in {other} from "
+        f"{one} and {other} hold {same} ({found.rows:,} rows, in {other} from "
         f"{stamp(found.from_s)} to {stamp(found.to_s)} s{clock}), and are both {where}."
     )

@@ -7,14 +7,16 @@ from datetime import date
 
 import numpy as np
 
+from aesi.calibration.records.thinning import thinned
 from aesi.calibration.records.zero import zero_of
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.numerics.typing import Array
 from aesi.physics import ActiveEffect, Cell, ModelName
 from aesi.physics.cell import Soh
 from aesi.physics.simulation import MODEL_WORDS, model_with
+from aesi.physics.start.temperature import contradicted_temperature
 from aesi.pipeline.product.hybrid import HybridModel
-from aesi.records import Measurement, at_its_temperature
+from aesi.records import Hold, Measurement, at_its_temperature
 
 SEPARATOR = ": "
 TELLING_K = 5.0
@@ -100,6 +102,21 @@ def on_temperatures(
     """
     given, acting = list(temperatures_degc), model_with(cell, effects).cell
     return (*without_energies(acting, given), *beyond_fitted(acting, given))
+
+
+def of_contradiction(model: HybridModel, record: Measurement, soc0: float, hold: Hold) -> tuple[str, ...]:
+    """A sentence where the voltage of a record contradicts the temperature that it is simulated at, told on the rows
+    that a fit would see of it.
+
+    model : what is simulated, without its correction.  soc0 : at the first row.  hold : how the current runs between
+    the rows.
+    """
+    if record.temperature_degc is None or not np.all(np.isfinite(record.voltage_v)):
+        return ()
+    thin = thinned(record, model.cell.capacity_ah)
+    between = hold if thin.data is record else thin.hold
+    found = contradicted_temperature(model.cell, thin.data, soc0, between, model.effects, model.model)
+    return () if found is None else (found.sentence(record.name),)
 
 
 def of_day(cell: Cell, soh: Soh | None) -> tuple[str, ...]:

@@ -26,7 +26,14 @@ from aesi.physics.cell import Soh
 from aesi.physics.depletion import ran_out
 from aesi.physics.effects.self_heating import of_file
 from aesi.physics.rest.open_circuit import GIVEN_SD
-from aesi.pipeline.notes import of_another_model, of_day, of_fitted, on_temperatures, temperature_sentence
+from aesi.pipeline.notes import (
+    of_another_model,
+    of_contradiction,
+    of_day,
+    of_fitted,
+    on_temperatures,
+    temperature_sentence,
+)
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.product.prediction import Prediction
@@ -205,6 +212,7 @@ def _placed(
             hold_sentence(record.name, model.hold, asked.hold is not None, saved=saved),
             temperature_sentence(model.cell, record, model.effects),
             *on_temperatures(model.cell, [record.temperature_degc], model.effects),
+            *of_contradiction(model, record, start.soc, model.hold),
             *_with_effects(record, model),
             *([f"when this model was made: {model.finding}"] if model.finding else []),
         ]

@@ -28,7 +28,7 @@ from aesi.tracer.case.records import PreparedRecord, prepare_all, prepare_test
 from aesi.tracer.decide.beside import gathered_beside
 from aesi.tracer.decide.evidence import Answer, Evidence, gathered
 from aesi.tracer.decide.model_choice import ModelChoice, with_model
-from aesi.tracer.decide.temperatures import fitted_at_fault, left_by_fit, other_temperatures
+from aesi.tracer.decide.temperatures import fitted_at_fault, left_by_fit, of_unseen, other_temperatures
 from aesi.tracer.decide.verdict import Thresholds, Verdict
 from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_state import ModelState
@@ -102,7 +102,8 @@ class Discovery:
     contradicted : whether what explains the data leaves more of the test part than a right explanation may.
     warnings : that, records that contradict their own temperature, where the written model does worse than another one
     on the test part or on what was fitted, and where the test part has no load.
-    other_temperature : names of the records that contradict their own, and that nothing fitted at it explains.
+    other_temperature : names of the records, those that judge among them, that contradict their own, and that nothing
+    fitted at it explains.
     seconds : spent.  simulations : of the hypotheses that were tried, without what judges them.
     """
 
@@ -255,9 +256,11 @@ def _discovery_of(
 ) -> Discovery:
     """The finding.  rng : of the intervals.  simulations, seconds : spent on the search."""
     problem, verdict = evidence.path.problem, evidence.verdict
-    others = _contradicting(evidence)
-    evidence = _without_fault(evidence, others)
     records, declared = problem.records, ModelState(problem)
+    fitted = _fitted(evidence)
+    others = left_by_fit(fitted, other_temperatures(problem))
+    at_other = {records[k].name: other for k, other in others.items()} | of_unseen(fitted, tested)
+    evidence = _without_fault(evidence, others)
     states: States = {"before": declared, "recalibrated": evidence.recalibrated, "after": evidence.after}
     files = outcomes(records, states, tested, rng)
     inside, soc0 = evidence.after.settled()
@@ -281,10 +284,10 @@ def _discovery_of(
         notes=(choice.sentence, *_notes(evidence, tested, left), *emptied(files)),
         contradicted=contradicted_by_v(files, verdict) is not None,
         warnings=(
-            *(other.sentence(records[k].name) for k, other in others.items()),
+            *(other.sentence(name) for name, other in at_other.items()),
             *warnings(files, verdict, REST_C_RATE * problem.cell.capacity_ah),
         ),
-        other_temperature=tuple(records[k].name for k in others),
+        other_temperature=tuple(at_other),
         written={name: (evidence.after.values or {})[name] for name in evidence.after.hypothesis},
         own={state: own_parameters(states[state]) for state in ("recalibrated", "after")},
         tried=problem.competing(),
@@ -293,13 +296,10 @@ def _discovery_of(
     )
 
 
-def _contradicting(evidence: Evidence) -> Mapping[int, OtherTemperature]:
-    """The records that contradict their own temperature, and that nothing fitted at it explains, by number."""
-    problem = evidence.path.problem
-    # What explains the data is not always what is written: it may not run over the declared range.
+def _fitted(evidence: Evidence) -> ModelState:
+    """What explains the data; it is not always what is written, which has to run over the declared range."""
     unknown = evidence.verdict.word == "unknown"
-    fitted = evidence.after if unknown else ModelState.of(problem, evidence.path.chosen)
-    return left_by_fit(fitted, other_temperatures(problem))
+    return evidence.after if unknown else ModelState.of(evidence.path.problem, evidence.path.chosen)
 
 
 def _without_fault(evidence: Evidence, others: Mapping[int, OtherTemperature]) -> Evidence:

@@ -16,7 +16,8 @@ LOST = {
     "keepalives_count": 4,
     "tcp_user_timeout": 1000 * STATEMENT_S,
 }
-"""By when a connection is lost whose other end is gone without a word: 10 + 4 * 5 s, the time that a statement has."""
+"""Time-outs after which a connection is lost whose other end is gone without a word: 10 + 4 * 5 s, the time that a
+statement has."""
 
 
 def with_driver(url: str) -> str:

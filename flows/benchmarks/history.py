@@ -38,9 +38,9 @@ class Watch:
 TIMING = 0.4
 """Ratios of times from one run of a shared machine scatter by a quarter and more."""
 RESULT = 0.1
-"""By how much an error may rise between two recorded runs."""
+"""Share by which an error may rise between two recorded runs."""
 RATE = 0.03
-"""By how much a share of cases, or of a reduction, may fall."""
+"""Share of cases, or of a reduction, by which a rate may fall."""
 
 WATCHED = {
     "espm": Watch(("case",), higher={"ratio": TIMING}, lower={"rmse_mv": RESULT}),

@@ -30,7 +30,7 @@ from flows.benchmarks.page import write_between
 QUICK = {"a_cell": 5, "seeds": 1, "candidates": 24, "resamples": 40, "dt_s": 1.0}
 """A look at every split in hours; `whole` runs them at the settings of an experiment."""
 BLOCK_S = 100.0
-"""Of the bootstrap."""
+"""Length of a block of the bootstrap, s."""
 CHEAP = ("conformal.method=split", "conformal.compare=[]", "conformal.horizons_s=[60.0]")
 """Intervals one step ahead are not judged here."""
 QUICK_MODELS = ("ESPM", "ESPM, one resistor", "ESPM recalibrated", "AESI I", "AESI II")

@@ -30,7 +30,7 @@ from aesi.sparse.terms.inputs import with_inputs
 from flows.base import environment
 
 METRICS = 10
-"""As many as a candidate logs; and parameters."""
+"""How many metrics, and how many parameters, are logged: as many as of a candidate."""
 PARAMETERS = 14
 DELIVERY_S = 120.0
 """Wait for the store at the end."""

@@ -290,15 +290,16 @@ def discover(
 def _discover_experiment(experiment: Path, overrides: list[str], out: Path | None, prefect: bool) -> None:
     """Raises InputError where the finding of the experiment would be written over a file that it names."""
     options.say_reading([experiment])
-    from aesi.pipeline.experiment.config import read_experiment
     from aesi.pipeline.experiment.sources import named_files
     from flows.jobs.discovery import finding_folder
+    from flows.jobs.run_request import RunRequest
     from flows.jobs.start import discover_experiment
 
-    config = read_experiment(experiment, overrides)
-    place = out or finding_folder(config)
-    outputs.check_folder(place, [experiment, *named_files(config).values()], discovery_files(place))
-    discover_experiment(str(experiment), overrides, out, prefect)
+    request = RunRequest(str(experiment), tuple(overrides))
+    place = out or finding_folder(request.config)
+    read = [experiment, *named_files(request.config).values()]
+    outputs.check_folder(place, read, discovery_files(place))
+    discover_experiment(request, out, prefect)
 
 
 def export(

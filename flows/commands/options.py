@@ -138,8 +138,8 @@ READING: dict[str, Any] = {
         _LIST,
         typer.Option(
             "--column",
-            help='quantity=name, for other headers: current_a="I[A]"; also cycle=, step=; '
-            "temperature_degc= leaves it out.",
+            help='quantity=name, for other headers: current_a="I[A]", or its number, #2, where there are none; also '
+            "cycle=, step=; temperature_degc=40 states it for every row, temperature_degc= leaves it out.",
         ),
     ],
     "unit": Annotated[
@@ -253,7 +253,10 @@ def measurements(
     out = []
     for path, name in zip(paths, record_names(paths), strict=True):
         end = (until or {}).get(name)
-        out.append(read(path, reading if end is None else reading.but(stop_s=end), name=name).held(hold))
+        told = reading if end is None else reading.but(stop_s=end)
+        out.append(
+            read(path, told, None, name).held(hold)
+        )  # with all rows, as in Python: a fit thins them itself
     return tuple(out)
 
 

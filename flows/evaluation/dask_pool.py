@@ -204,7 +204,7 @@ class DaskPool:
 
 
 _MEMORY = MemoryOfThreads()
-"""Of a worker's process."""
+"""Memory limit of the threads of a worker's process."""
 
 
 def _evaluate_timed(

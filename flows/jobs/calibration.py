@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -25,7 +26,14 @@ def calibrate(
     read = together(note for m in measurements for note in m.notes)
     for note in read:
         console.say(note)
-    content = calibrate_files(cell, measurements, out, request)
+    started_s = time.monotonic()
+
+    def stands(steps: int, left: float) -> None:
+        console.count(
+            "steps of the fit", steps, started_s, f"{100.0 * left:.3g} % of the start's misfit left"
+        )
+
+    content = calibrate_files(cell, measurements, out, request, stands)
     for row in content["files"]:
         console.say(
             f"  {row['name']}: {row['before_rmse_mv']:.2f} mV before, {row['after_rmse_mv']:.2f} mV after, "

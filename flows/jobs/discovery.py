@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aesi.constants import MV_PER_V
-from aesi.pipeline.experiment.config import ExperimentConfig, read_experiment
+from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.sections import TrackingConfig
 from aesi.pipeline.written import ARCHIVE, FINDING, REPORT
 from flows.base import environment
@@ -60,11 +60,10 @@ def check(case: Case) -> None:
     )
 
 
-def case_and_folder(path: str, overrides: Sequence[str], out: Path | None) -> tuple[Case, Path, TrackedUnder]:
-    """The case of an experiment file, the folder of its results, and what it is tracked under."""
+def case_and_folder(config: ExperimentConfig, out: Path | None) -> tuple[Case, Path, TrackedUnder]:
+    """The case of an experiment, the folder of its results, and what it is tracked under."""
     from aesi.pipeline.discovery.cases import case_of_experiment
 
-    config = read_experiment(path, overrides)
     return case_of_experiment(config), out or finding_folder(config), TrackedUnder.of(config)
 
 

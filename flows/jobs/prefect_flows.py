@@ -8,7 +8,6 @@ from typing import Any, Literal
 from prefect import flow
 from prefect.runtime import flow_run
 
-from aesi.pipeline.experiment.config import read_experiment
 from flows.base import environment
 from flows.base.console import Console
 from flows.jobs.discovery import TrackedUnder, case_and_folder, trace
@@ -64,22 +63,24 @@ def discovery(
     cell: str = "",
     data: list[str] | None = None,
     case: Any = None,
+    request: Any = None,
 ) -> dict[str, Any]:
     """The whole job of `aesi discover`.
 
     path : an experiment file that describes the case and how it is tracked, as a deployment gives it.
     case : which only a process that has read the records can hand over: `cell` and `data` then say what it is about.
-    How it is tracked is still read from `path`, where there is one: the address may hold a password, which Prefect
-    would keep and show among the parameters.
+    request : `path` and `overrides` with the file as that process has read it, which says how the case is tracked: the
+    address may hold a password, which Prefect would keep and show among the parameters.
     """
     environment.prepare_process()
     console = Console()
     folder = Path(out) if out else None
     under = TrackedUnder()
     if case is None:
-        case, folder, under = case_and_folder(str(path), overrides or (), folder)
-    elif path is not None:
-        under = TrackedUnder.of(read_experiment(path, overrides or ()))
+        asked = request or RunRequest(str(path), tuple(overrides or ()))
+        case, folder, under = case_and_folder(asked.config, folder)
+    elif request is not None:
+        under = TrackedUnder.of(request.config)
     assert folder is not None  # `aesi discover` with records asks for one
     stages = PrefectStages(console.say)
     return as_the_job(lambda: trace(case, folder, stages, console, under))

@@ -77,12 +77,11 @@ def discover(
     out: Path,
     use_prefect: bool = True,
     under: TrackedUnder | None = None,
-    path: str | None = None,
-    overrides: Sequence[str] = (),
+    request: RunRequest | None = None,
 ) -> dict[str, Any]:
     """Trace one case and write the finding to `out`; returns the content of discovery.json.
 
-    under : what it is tracked under.  path, overrides : the experiment file that says so, if one does.
+    under : what it is tracked under.  request : of the experiment file that says so, if one does.
     Raises AesiError, one sentence, for what cannot be used; nothing is started then.
     """
     environment.prepare_process()
@@ -96,12 +95,13 @@ def discover(
         from flows.jobs.prefect_flows import discovery
 
         found: dict[str, Any] = discovery(
-            path=path,
-            overrides=list(overrides),
+            path=request.path if request else None,
+            overrides=list(request.overrides) if request else [],
             out=str(out),
             cell=case.cell.name.removesuffix(".json").removesuffix(".bpx"),
             data=[one.name for one in case.measurements],
             case=case,
+            request=request,
         )
         return found
 
@@ -113,11 +113,11 @@ def discover(
 
 
 def discover_experiment(
-    path: str, overrides: Sequence[str] = (), out: Path | None = None, use_prefect: bool = True
+    request: RunRequest, out: Path | None = None, use_prefect: bool = True
 ) -> dict[str, Any]:
     """Trace the case that an experiment file describes; its results go below runs/ where no folder is given."""
-    case, folder, under = case_and_folder(path, overrides, out)
-    return discover(case, folder, use_prefect, under, path, overrides)
+    case, folder, under = case_and_folder(request.config, out)
+    return discover(case, folder, use_prefect, under, request)
 
 
 def _with_or_without(under_prefect: Callable[[], T], plainly: Callable[[], T], use_prefect: bool) -> T:

@@ -24,7 +24,7 @@ from flows.tracking.store import KIND, Store, now_ms, without_login
 
 PARAMETER_LIMIT = 6000  # MLflow cuts longer ones off
 SAMPLE_S = 10.0
-"""Between two readings of memory and processor."""
+"""Time between two readings of memory and processor, s."""
 LOCAL_UI = "http://127.0.0.1:5000"
 
 

@@ -30,7 +30,7 @@ from aesi.sparse.search.evolution import fittest
 from aesi.sparse.search.genome_space import GenomeSpace
 
 BASE = Options(inputs=INPUTS, p_c=3, d=2, mixed=False, block=100, fold=200)
-"""As in the experiment on the measured drive."""
+"""Options of the problem, as in the experiment on the measured drive."""
 
 SETTINGS: dict[str, dict[str, Any]] = {
     "fold 100": {"fold": 100},

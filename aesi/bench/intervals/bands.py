@@ -37,7 +37,7 @@ HORIZONS_S = (1.0, 10.0, 60.0)
 """Those of the tables of a run."""
 OPTIONS = Options(p_c=3, d=2, mixed=False, resamples=50, block=100)
 RIDGE, THRESHOLD = 10.0, 1e-3
-"""Of the one genome that is fitted: conventions, in the midst of what a search tries."""
+"""Genes of the one genome that is fitted: conventions, in the midst of what a search tries."""
 LAYOUTS: tuple[SplitLayout, ...] = ("repeats", "schedules", "beyond")
 
 

@@ -22,7 +22,7 @@ from aesi.numerics.typing import Array, IntArray
 
 ALPHA, NORMAL_95 = 0.1, 1.6448536269514722
 SIZE_V = 1e-3
-"""Of a residual at the mildest current; at the hardest it is GROWTH times as large, conventions all."""
+"""Size of a residual at the mildest current, V; at the hardest it is GROWTH times as large, conventions all."""
 GROWTH = 4.0
 HOLD = 30
 """Samples that a current lasts. A convention."""

@@ -27,11 +27,12 @@ from aesi.records import Measurement
 
 CONTACT_OHM = 8e-3
 SLOWER = 0.6
-"""Of the truth: contacts, and the factor of the negative electrode's diffusivity."""
+"""What the true cell has that the start file has not: its contacts, and the factor on its negative electrode's
+diffusivity."""
 NOISE_V = 1e-3
 """White noise of the voltage. A convention, as the sizes above."""
 HOLD_S, REST_S = 30, 60
-"""Of one current of a drive, and of the rest that it begins with."""
+"""Duration of one current of a drive, and of the rest that it begins with, s."""
 
 
 def run(

@@ -40,13 +40,14 @@ from aesi.physics import Cell, ModelName, initial_state, simulate
 from aesi.records import Measurement
 
 WINDOW_ROWS = 1024
-"""As ECM-UDE judges."""
+"""Rows of a window, as ECM-UDE judges."""
 HELD_WITHIN_V = 0.01
-"""Of the cut-off voltage: rows that a tester holds there. Of those of 0degC_cycle_1 98 % are within 5 mV below and 9
-above it."""
+"""Distance from the cut-off voltage, V, within which a tester holds the rows. Of those of 0degC_cycle_1 98 % are
+within 5 mV below and 9 above it."""
 HELD_SHARE, HELD_FROM_THEN_ON = 0.01, 0.1
-"""Of all rows, and of those from the first of them on: a record with more is one that was held from then on.
-Conventions: 8 of 45 of the Panasonic have 1 to 8 % of all, two of these 30 and 40 % from then on, six 3 to 4 %."""
+"""Shares of held rows among all, and among those from the first of them on: a record with more of both was held from
+then on. Conventions: 8 of 45 of the Panasonic have 1 to 8 % of all, two of these 30 and 40 % from then on, six 3 to
+4 %."""
 NMC, M50T = "about_energy_nmc", "lg_m50t_w8"
 START = "lg_m50_chen2020"
 ECM_UDE = (
@@ -296,7 +297,7 @@ def cell_of(cells: Path, data: str, name: str | None) -> Cell:
 
 
 NOMINAL_AH = {NCR: 2.9, HG2: 3.0}
-"""As the makers state them, for cell files of another size of the same chemistry."""
+"""Capacities as the makers state them, Ah, for cell files of another size of the same chemistry."""
 
 
 @dataclass(frozen=True, eq=False)

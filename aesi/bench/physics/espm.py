@@ -25,7 +25,8 @@ BREAK_POINT_S = 1.0
 SOC0 = 0.95
 """Where the load starts, so that charges stay below full."""
 MEAN_C_RATE, SPREAD_C_RATE, LARGEST_C_RATE, CORRELATION_S = 0.25, 1.0, 3.0, 20.0
-"""Of the load, in 1/h, and s: conventions, as of a drive that discharges the cell."""
+"""Mean, spread and largest rate of the load, 1/h, and its correlation time, s: conventions, as of a drive that
+discharges the cell."""
 
 
 def run(

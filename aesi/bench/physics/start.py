@@ -31,11 +31,12 @@ FITTED = ((NCR, NCR, "25degC_hppc"), (HG2, HG2, "25degC_cap_1c"), (HG2, HG2, "25
 """Set, cell file, record: at 25 degC, where the capacity is that of the cell file, and without the slow discharges,
 whose cycler counts some percent of charge too much."""
 PUBLISHED = ((NMC, None, "drive_cycle"), (M50T, START, "n0_hppc"), (M50T, START, "n0_udds"))
-"""The same by files that saw none of the records; None is the file published with the set."""
+"""Set, cell file and record of the same cases by files that saw none of the records; None is the file published with
+the set."""
 NEAR, WRONG = 0.02, 0.2
-"""Of a given state of charge: what a careful user is off by, and a mistake. Conventions of this benchmark."""
+"""Errors of a given state of charge: that of a careful user, and a mistake. Conventions of this benchmark."""
 LEAST_ROWS = 300
-"""Of what remains of a record."""
+"""Least rows that have to remain of a record."""
 
 
 def run(

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 WORST = 5
 LINE_PX = 17
-"""Of a name beside the confusion matrix."""
+"""Height of a name beside the confusion matrix, px."""
 RATIO = (-1.0, 3.0)
-"""Of found to true size, as drawn; what lies beyond is drawn at the edge."""
+"""Range of the ratio of found to true size that is drawn; what lies beyond is drawn at the edge."""
 STATES = {"before": "as declared", "recalibrated": "recalibrated", "after": "after"}
 
 

@@ -22,7 +22,7 @@ CELLS = {
 FITTED = frozenset({(HG2, "25degC_mixed1"), (HG2, "25degC_cap_1c")})
 """Records that a file was calibrated on: what is asked of them says nothing, so that they are no controls."""
 WINDOW_S = 3600.0
-"""Of a drive: the first hour."""
+"""Part of a drive that is taken, s: the first hour."""
 THERMOCOUPLE = "thermocouple on the case"
 PUT_IN = "put in"
 COLD_AND_HOT: dict[str, tuple[str, ...]] = {
@@ -75,12 +75,12 @@ FAULTS: dict[FaultKind, tuple[tuple[float, ...], dict[str, float]]] = {
 wrongly is for the finder to correct, without a name."""
 RESISTANCES_OHM = {HG2: (0.005, 0.015), PANASONIC: (0.005, 0.015), NMC: (0.0005, 0.002)}
 MORE_IN_FILE = 0.05
-"""Of both electrodes, in a cell file that is made wrong."""
+"""Share by which both electrodes are larger in a cell file that is made wrong."""
 LOSSES = ("lithium_inventory_loss", "active_material_loss_negative", "active_material_loss_positive")
 
 
 SPECTRA = {"25degC": "25degC_eis", "10degC": "10degC_eis"}
-"""Of the Panasonic: start of a record's name -> the spectra of the same month."""
+"""Start of a Panasonic record's name -> the spectra of the same month."""
 
 
 DRIVES = ("cycle", "us06", "mixed", "la92")

@@ -20,7 +20,7 @@ conventions."""
 NEAR_PP = 2.0
 NEAR_SHARE = 0.15
 HALVED = 0.5
-"""Of the declared error."""
+"""Share of the declared error that counts as halved."""
 SOC0 = "wrong_soc0"
 
 

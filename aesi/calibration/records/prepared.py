@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aesi.calibration.records.thinning import WINDOW_S, thinned
+from aesi.calibration.records.thinning import thinned
 from aesi.calibration.records.zero import is_slow
 from aesi.calibration.start import flowing
 from aesi.constants import ZERO_CELSIUS_K
@@ -28,8 +28,6 @@ OTHER_CELL_SD = 0.01
 """The same where the file is of another cell. The start file of the shipped ones, an LG M50, reads eight full
 charges of an LG 18650HG2 and a Panasonic NCR18650PF as 0.984 to 1.000, off by 0.010 root mean square. With 0.005 the
 starts of the Panasonic's pulses at 10 and 0 degC, read as 0.976 and 0.977, end 3.9 deviations away, at 0.996."""
-MOST_ROWS = 4000
-"""Rows of a drive that a fit sees: windows grow until there are no more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +83,7 @@ def prepared(
 def _prepared(
     cell: Cell, data: Measurement, soc0: float | None, shared: bool, model: ModelName, least: float
 ) -> Prepared:
-    window_s = max(WINDOW_S, float(data.time_s[-1] - data.time_s[0]) / MOST_ROWS)
-    thin = thinned(data, cell.capacity_ah, window_s)
+    thin = thinned(data, cell.capacity_ah)
     start = initial_state(
         cell, data, soc0, data.hold_taken, shared=shared, model=model, potentials_v=GOOD_READING_V
     )

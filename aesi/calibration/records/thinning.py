@@ -12,6 +12,8 @@ from aesi.records import Hold, Measurement
 
 WINDOW_S = 1.0
 """Rows of a drive are averaged over this: solid diffusion and the electrolyte are slower."""
+MOST_ROWS = 4000
+"""Rows of a drive that a fit sees: windows grow until there are no more."""
 STEADY_ROWS = 400
 """Rows that a steady record is spread over, besides those after its steps."""
 SPACING = Spacing(first_s=0.2, growth=0.4)
@@ -33,16 +35,12 @@ class Thinned:
     hold: Hold
 
 
-def thinned(data: Measurement, capacity_ah: float, window_s: float) -> Thinned:
-    """The rows that a fit sees.
-
-    capacity_ah : what a step of the current is measured by.  window_s : rows of a record that is not steady are
-    averaged over it; `WINDOW_S` where the record is not too long.
-    """
-    longest_s = float(data.time_s[-1] - data.time_s[0]) / STEADY_ROWS
-    steady = condensed(data, capacity_ah, longest_s, SPACING)
+def thinned(data: Measurement, capacity_ah: float) -> Thinned:
+    """The rows that a fit sees.  capacity_ah : what a step of the current is measured by."""
+    span_s = float(data.time_s[-1] - data.time_s[0])
+    steady = condensed(data, capacity_ah, span_s / STEADY_ROWS, SPACING)
     if steady is None:
-        rows = averaged_over(data, window_s)
+        rows = averaged_over(data, max(WINDOW_S, span_s / MOST_ROWS))
         return Thinned(rows, np.ones(len(rows), dtype=bool), "linear")
     rows, _ = steady
     gaps = np.diff(rows.time_s)

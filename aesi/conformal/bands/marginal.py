@@ -14,7 +14,7 @@ from aesi.numerics.compiled import kept_njit
 from aesi.numerics.typing import Array, BoolArray, SavedState
 
 ROUND_OFF = 1e-9
-"""Of a rank, which must not be missed by it."""
+"""Round-off that a rank is allowed, so that it is not missed by it."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,6 +30,9 @@ ROUNDED_SHARE = 0.2
 write the end of a step and the start of the next with one stamp: 0.4 % of the rows at most in 212 of their files."""
 CLOCK_JUMPS_S = (SECONDS_PER_HOUR, 24 * SECONDS_PER_HOUR)
 """By which a time of day runs back: the end of daylight saving, and midnight."""
+FEW_TURNS = 0.05
+"""Of the steps between rows, those that run back where pieces in order were written one after the other; where the rows
+themselves are out of order it is about half of them. A convention: pieces of twenty rows and more."""
 MOST_RELAXED_V = 0.5
 """No cell's voltage moves by more without a current: relaxation after a load is some 0.3 V at most."""
 
@@ -46,12 +49,21 @@ class Context:
 
     def at(self, quantity: str, row: int) -> str:
         """'drive.csv, row 5 (line 6), column voltage_v'."""
-        name = self.header[quantity]
+        name = self.header.get(quantity, quantity)  # a temperature that was stated has no column
         column = quantity if name == quantity else f"{quantity} ({name!r})"
         return f"{self.file}, {self.where(row)}, column {column}"
 
 
 Columns = dict[str, Array]
+
+OF_MEDIAN = 1.4826
+"""Deviations in the median size of what is normally distributed."""
+
+
+def scatter_v(voltage_v: Array) -> float:
+    """V, one deviation of what single rows of a voltage (n,) scatter by: of a smooth one, second differences are noise
+    alone, and of one that moves they are more."""
+    return float(np.median(np.abs(np.diff(voltage_v, 2)))) * OF_MEDIAN / np.sqrt(6.0)
 
 
 def check_finite(columns: Columns, context: Context) -> None:
@@ -121,6 +133,8 @@ def _disorder(time_s: Array, step: Array) -> str:
             "; it is a clock that was put back, or that starts anew at midnight: give the time since the start of the "
             "test, or split the file there."
         )
+    if len(first) == 1 and step[-1] < 0:
+        return "; it is the last row alone, as a line of sums or means below a table is: remove it."
     if len(first) == 1:
         again = ", and starts again there, as that of a second test does"
         return (
@@ -131,6 +145,12 @@ def _disorder(time_s: Array, step: Array) -> str:
         return (
             f", and begins anew {len(first)} times, as the time of a step does: name the column of the whole test's "
             "time, --column time_s=NAME, or read one step alone, --step NUMBER."
+        )
+    if len(first) <= FEW_TURNS * len(step):
+        return (
+            f", and {len(first)} times in all, with rows in order between: pieces with clocks of their own, as a "
+            "logger writes that starts its time again with each step. Sorting would mix them: export the time of the "
+            "whole test, or put them one after the other, or split the file into its tests."
         )
     return f", and {len(first)} times in all: sort the rows by their time, or split the file into its tests."
 

@@ -15,6 +15,7 @@ from difflib import get_close_matches
 from aesi.data import units
 from aesi.data.channels import headers
 from aesi.data.readers.formats.format import Sign
+from aesi.data.readers.heading import NUMBER
 from aesi.data.readers.table import TableFile, names_listed
 from aesi.errors import DataError
 
@@ -39,7 +40,7 @@ BDF = {
 }
 STRANGE_UNITS = {
     "time_s": ("weeks",),
-    "current_a": ("c",),
+    "current_a": ("c", "c-rate", "1/h", "w", "mw", "kw", "ah", "mah", "wh"),
     "voltage_v": ("kv",),
     "temperature_degc": (),
 }
@@ -52,6 +53,7 @@ class Mapped:
 
     bdf_current : the current came from a BDF column, so it is positive on charge by definition.
     maker, maker_sign : of a known export; its sign holds where the user gives none.
+    stated_degc : of every row, where the user gave a number for the temperature and no column.
     """
 
     position: dict[str, int]
@@ -61,6 +63,7 @@ class Mapped:
     notes: tuple[str, ...]
     maker: str = ""
     maker_sign: Sign | None = None
+    stated_degc: float | None = None
 
 
 def map_columns(
@@ -72,7 +75,8 @@ def map_columns(
 ) -> Mapped:
     """Find the quantities among the names of a table's columns.
 
-    columns : quantity or selector -> name, or None to leave it out; goes before the known names.
+    columns : quantity or selector -> name, or None to leave it out; goes before the known names. For the temperature
+    also a number, degC in every row, where no column is called so.
     declared : quantity -> unit, as the user says; goes before what names and formats say, but may not contradict a
     name's unit that is not SI.
     required : what has to be there; the rest is found where it is.
@@ -117,6 +121,7 @@ class _Finder:
         self.notes: list[str] = []
         self.bdf_current = False
         self._of_export: list[str] = []
+        self._stated_degc: float | None = None
 
     def take(self, quantity: str) -> bool:
         """Whether the quantity is there; it is taken then. True also where it is left out as asked."""
@@ -126,6 +131,10 @@ class _Finder:
                 if quantity in self._required:
                     raise DataError(f"{self._file}: {quantity} cannot be left out.")
                 self.notes.append(f"{quantity} was left out as asked.")
+                return True
+            if quantity == "temperature_degc" and NUMBER.fullmatch(name) and name not in self._table.header:
+                self._stated_degc = float(name)
+                self.notes.append(f"{quantity} is {name} in every row, as stated.")
                 return True
             self.position[quantity] = self._named(name, quantity)
             if name != quantity:
@@ -208,6 +217,7 @@ class _Finder:
             tuple(self.notes),
             form.name if form else "",
             form.sign if form else None,
+            self._stated_degc,
         )
 
     def _named(self, name: str, quantity: str) -> int:
@@ -321,6 +331,11 @@ class _Finder:
             raise DataError(
                 f"{self._file}: column {name!r} is in {said} by its name, and {quantity} is needed in "
                 f"{units.SI[quantity]}; declare it: --unit {quantity}={said}."
+            )
+        if said is None and quantity == "current_a" and headers.is_rate_or_power(name):
+            raise DataError(
+                f"{self._file}: column {name!r} is a C-rate or a power by its name, and current_a is needed in A; "
+                "convert the column, or, if it is a current in A, declare it: --unit current_a=A."
             )
         if headers.unit_in(name).lower() in STRANGE_UNITS[quantity]:
             raise DataError(

@@ -22,6 +22,8 @@ REST_CURRENT_SHARE = 0.02
 """A gap is a rest where the current beside it is below this share of the largest and the voltage moved by less than
 REST_VOLTAGE_V."""
 REST_VOLTAGE_V = 0.005
+SUMMER_TIME_S = SECONDS_PER_HOUR
+"""By which clocks are put forward in spring, in a row."""
 FEW_RESTS = 3
 """Told one by one; more are told by their number."""
 
@@ -91,8 +93,13 @@ def gap_error(columns: Columns, k: int, context: Context) -> DataError:
     """The sentence for a gap between rows k and k + 1."""
     time = columns["time_s"]
     last, first = float(time[k]), float(time[k + 1])
+    row_s = float(np.median(np.diff(time)))
+    put_forward = abs(first - last - row_s - SUMMER_TIME_S) <= row_s
+    summer = (
+        " Or it is a clock that was put forward to summer time: give the time in UTC." if put_forward else ""
+    )
     return DataError(
         f"{context.at('time_s', k + 1)}: a gap of {first - last:.6g} s after {last:.10g} s, "
-        f"where rows come every {np.median(np.diff(time)):.3g} s; what the cell did there is unknown. "
-        f"Split the file there, or read one side of it: --to-s {last:.10g} or --from-s {first:.10g}."
+        f"where rows come every {row_s:.3g} s; what the cell did there is unknown. "
+        f"Split the file there, or read one side of it: --to-s {last:.10g} or --from-s {first:.10g}.{summer}"
     )

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-from aesi.data.channels.checks import Columns, Context
+from aesi.data.channels.checks import Columns, Context, scatter_v
 from aesi.data.channels.implausible import ENOUGH_STEPS, STEP_SHARE
 from aesi.numerics.typing import Array, BoolArray, IntArray
 
@@ -37,6 +37,10 @@ JUMP_V, JUMP_S = 0.8, 60.0
 """Between two rows no further apart, beyond what is explained: 0.44 V at most where the steps tell a resistance."""
 BARE_JUMP_V, BARE_EXPLAINED = 0.35, 20.0
 """As JUMP_V, where the current hardly moves: 0.16 V at most, within the first 0.1 s of a load."""
+STILL_JUMP_V, NOISES = 0.04, 10.0
+"""As JUMP_V, where the current stands still over ROWS_BESIDE either side, within STILL_SHARE of its largest: beyond
+STEPS_BESIDE times the steps before and after it, and NOISES deviations of the noise: 0.005 V at most of 128 records."""
+STILL_SHARE, STEPS_BESIDE = 0.002, 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +142,22 @@ def _jumps(time: Array, current: Array, voltage: Array, ohm: float, lost_v: floa
     explained = ohm * np.where(moved > 0, fall, rise)
     size = np.abs(moved) - lost_v
     far = (size > JUMP_V + EXPLAINED * explained) | (size > BARE_JUMP_V + BARE_EXPLAINED * explained)
+    far |= _still(current) & (
+        size > STILL_JUMP_V + NOISES * scatter_v(voltage) + STEPS_BESIDE * _beside(moved)
+    )
     return np.flatnonzero(far & (np.diff(time) <= JUMP_S))
+
+
+def _still(current: Array) -> BoolArray:
+    """(n - 1,) between which rows the current stands still, ROWS_BESIDE either side of them included."""
+    steps = maximum_filter1d(np.abs(np.diff(current)), 2 * ROWS_BESIDE + 1, mode="nearest")
+    return np.asarray(steps <= STILL_SHARE * float(np.max(np.abs(current))))
+
+
+def _beside(steps: Array) -> Array:
+    """(n,) the larger of the steps before and after each; infinite at both ends, where one of them is not known."""
+    size = np.abs(steps)
+    return np.maximum(np.append(np.inf, size[:-1]), np.append(size[1:], np.inf))
 
 
 def _there_and_back(current: Array) -> Array:

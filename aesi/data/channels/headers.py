@@ -27,6 +27,7 @@ WHOLE_TIME = r"total|test|cumul|elapsed"
 """Of the names of a time: beside one of these a bare 'Time' begins anew with each step."""
 NO_TEMPERATURE = r"time|/dt|set\b|limit|circuit"
 """Of the names of what only looks like a temperature."""
+RATE_OR_POWER = r"\bc[-_ ]?rate\b|\bpower\b|\bleistung\b"
 UNIT = re.compile(
     r"[\[(<]\s*([^\])>]+?)\s*[\])>]\s*$|[/#]\s*([^/#\[\](){}]+?)\s*$|[_ ]\s*([^/_ \[\](){}]+)\s*$"
 )
@@ -68,6 +69,11 @@ def unit_in(name: str) -> str:
     """The unit in a column's name: 'I[mA]', 'Current (mA)', 'Voltage / mV', 'time_ms'; '' without one."""
     found = UNIT.search(name)
     return next((text for text in found.groups() if text), "") if found else ""
+
+
+def is_rate_or_power(name: str) -> bool:
+    """Is a column, by its name, what looks like a current and is a multiple of one?"""
+    return re.search(RATE_OR_POWER, plain(name)) is not None
 
 
 def unit_of(quantity: str, name: str) -> str | None:

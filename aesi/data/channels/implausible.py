@@ -63,6 +63,8 @@ ENOUGH_STEPS = 5
 CLEAR_CORRELATION = 0.5
 """Of current and voltage steps: beyond it they say which sign the current has. Voltage falls with the current, so
 that measured records lie near -1."""
+STRIDES = (1, 3, 10)
+"""Of rows. Where loggers write the two a row apart, what the voltage slides by is all that it does at a step."""
 VOLTAGE_TREND_V = 0.05
 """A voltage that moves by less than this along the test has no trend."""
 TREND_POINTS = 200
@@ -175,7 +177,7 @@ def check_sign(columns: Columns, context: Context, advice: str) -> None:
 
     advice : what the user can do about it, from '; ' on.
     """
-    found = answer_to_steps(columns)
+    found = clearest_answer(columns)
     if found is not None and abs(found[1]) > CLEAR_CORRELATION:
         contradicts, evidence = found[1] > 0, "at its steps"
     else:
@@ -270,6 +272,14 @@ def answer_to_steps(columns: Columns) -> tuple[float, float] | None:
     x, y = rise[clear], answer[clear]
     slope = float(np.sum(x * y) / np.sum(x * x))
     return slope, float(np.sum(x * y) / np.sqrt(np.sum(x * x) * np.sum(y * y)))
+
+
+def clearest_answer(columns: Columns) -> tuple[float, float] | None:
+    """As `answer_to_steps`, of those of the rows, each of STRIDES apart, that show it best: loggers may write current
+    and voltage some rows apart."""
+    every = [{name: column[::stride] for name, column in columns.items()} for stride in STRIDES]
+    found = [answer for answer in map(answer_to_steps, every) if answer is not None]
+    return max(found, key=lambda answer: abs(answer[1]), default=None)
 
 
 def _trend(columns: Columns) -> float:

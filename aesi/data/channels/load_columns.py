@@ -55,12 +55,15 @@ def _numbers(table: TableFile, mapped: Mapped) -> Columns:
     data = dict(zip(plain, table.read(tuple(mapped.position[name] for name in plain)), strict=True))
     for name in as_text:
         data[name] = _times(table, mapped, name)
-    return {
+    columns = {
         name: units.to_si(name, data[name], mapped.unit[name])
         if name in plain and name in mapped.unit
         else data[name]
         for name in wanted
     }
+    if mapped.stated_degc is not None:
+        columns["temperature_degc"] = np.full(len(columns["time_s"]), mapped.stated_degc)
+    return columns
 
 
 def _times(table: TableFile, mapped: Mapped, name: str) -> Array:

@@ -18,8 +18,8 @@ WORDS = {"degF": "Fahrenheit", "degC": "degC", "K": "kelvin"}
 
 
 def temperature_doubts(data: Columns, context: Context) -> list[str]:
-    """A sentence on a temperature that may be, and is more likely something else; none without one."""
-    if "temperature_degc" not in data:
+    """A sentence on a temperature that may be, and is more likely something else; none without a column of it."""
+    if "temperature_degc" not in data or "temperature_degc" not in context.header:
         return []
     temperature_degc, time_s = data["temperature_degc"], data["time_s"]
     if not temperature_degc.any():

@@ -80,6 +80,22 @@ def likely_heading(rows_from: Iterable[Sequence[Sequence[str]]]) -> Heading | No
     return None
 
 
+def first_of_numbers(rows_from: Iterable[Sequence[Sequence[str]]]) -> int | None:
+    """The line at which a table without names begins: at least two numbers, in the same columns as in the line below,
+    and right above it nothing that could be names. None where there is none.
+
+    rows_from : as of `likely_heading`.
+    """
+    names_above = False
+    for line, (cells, *below) in enumerate(rows_from):
+        numbers = [_is_number(cell) for cell in cells]
+        if sum(numbers) >= 2 and below and [_is_number(cell) for cell in below[0]] == numbers:
+            return None if names_above else line
+        if any(cell.strip() for cell in cells):
+            names_above = sum(bool(cell.strip()) for cell in cells) >= 2
+    return None
+
+
 def _is_number(cell: str) -> bool:
     return bool(NUMBER.fullmatch(cell.strip()) or WITH_COMMA.fullmatch(cell.strip()))
 

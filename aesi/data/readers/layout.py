@@ -16,12 +16,18 @@ from aesi.data.readers.heading import (
     SEPARATORS,
     WITH_COMMA,
     find_heading,
+    first_of_numbers,
     likely_heading,
     split,
 )
+from aesi.data.readers.table import SHOWN
 from aesi.errors import DataError
 
 COMMENT = "#"
+COLUMN_NUMBER = "#"
+"""Before the number of a column in a table without names."""
+LINES_BELOW = 49
+"""Of the table, that tell its decimal sign and its width. A convention."""
 THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
 BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
@@ -83,20 +89,29 @@ def layout_of(text: str, encoding: str, *, whole: bool, name: str, wanted: Colle
     notes: list[str] = []
     rows = [_cells(line) for line in lines[:LINES_LOOKED_AT]]
     heading = find_heading(rows, wanted) or likely_heading(_rows_from(lines))
-    if heading is None:
-        start, header, last = *_first_line(lines, name), 0
+    nameless = first_of_numbers(_rows_from(lines)) if heading is None else None
+    if heading is not None:
+        start, header = heading.line, heading.header
+        first_row = start + 1 + int(heading.has_units)
+    elif nameless is not None:
+        start, header = nameless, _numbered(rows[nameless], name, nameless, wanted)
+        first_row = start
+        notes.append("No line names the columns; they were numbered, #1 the first.")
     else:
-        start, header, last = heading.line, heading.header, int(heading.has_units)
+        start, header = _first_line(lines, name)
+        first_row = start + 1
     separator = max(SEPARATORS, key=lines[start].count)
     if start:
-        notes.append(f"{start} lines before the header were passed over.")
-    if last:
+        notes.append(
+            f"{start} lines before the {'table' if nameless is not None else 'header'} were passed over."
+        )
+    if heading is not None and heading.has_units:
         notes.append("The line of units below the header was read as such.")
     if encoding == "latin-1":
         notes.append("The file is not UTF-8; it was read as Latin-1.")
     if whole and text and not text.endswith(("\n", "\r")):
         notes.append("The last line does not end: if the file was cut there, its last number is too short.")
-    below = lines[start + 1 + last : start + 50 + last]
+    below = lines[first_row : first_row + LINES_BELOW]
     decimal = _decimal(below, separator)
     if decimal == ",":
         notes.append("Numbers were read with a decimal comma.")
@@ -105,7 +120,7 @@ def layout_of(text: str, encoding: str, *, whole: bool, name: str, wanted: Colle
     layer = _layer(header, below, separator) if form else 0
     if layer:
         notes.append("The rows of cycles and steps between the records were passed over.")
-    return Layout(encoding, separator, decimal, header, start + 1 + last, tuple(notes), form, units, layer)
+    return Layout(encoding, separator, decimal, header, first_row, tuple(notes), form, units, layer)
 
 
 def _rows_from(lines: Sequence[str]) -> Iterator[list[list[str]]]:
@@ -147,12 +162,23 @@ def _first_line(lines: Sequence[str], name: str) -> tuple[int, tuple[str, ...]]:
             "separate the cells by one of these, or, where this is a block above the table, name its columns "
             "(--column time_s=NAME --column current_a=NAME --column voltage_v=NAME)."
         )
-    if len(header) > 1 and all(NUMBER.fullmatch(cell) for cell in header):
-        raise DataError(
-            f"{name}, line {start + 1}: numbers where the header should be; put a line with the names of the "
-            "columns first: time_s,current_a,voltage_v."
-        )
     return start, header
+
+
+def _numbered(cells: Sequence[str], name: str, line: int, wanted: Collection[str]) -> tuple[str, ...]:
+    """Names for the columns of a table that has none, by which a user who saw its first row can call them."""
+    if not any(each.startswith(COLUMN_NUMBER) for each in wanted):
+        shown = ", ".join(
+            f"{COLUMN_NUMBER}{i} {cell.strip()!r}" for i, cell in enumerate(cells[:SHOWN], start=1)
+        )
+        more = f" and {len(cells) - SHOWN} more" if len(cells) > SHOWN else ""
+        raise DataError(
+            f"{name}, line {line + 1}: no line above the numbers names the columns; call them by their number: "
+            f"--column time_s={COLUMN_NUMBER}N --column current_a={COLUMN_NUMBER}N --column voltage_v={COLUMN_NUMBER}N,"
+            " and --sign charge-positive if charging is positive there. "
+            f"The first row: {shown}{more}."
+        )
+    return tuple(f"{COLUMN_NUMBER}{i}" for i in range(1, len(cells) + 1))
 
 
 def _as_wide_as_the_rows(header: tuple[str, ...], below: Sequence[str], separator: str) -> tuple[str, ...]:

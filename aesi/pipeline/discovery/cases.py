@@ -62,7 +62,7 @@ def case_of_files(
         model=model,
         soh=soh,
     )
-    return with_cold_admitted(within_budget(case))
+    return with_cold_admitted(within_budget(case.checked()))
 
 
 def case_of_experiment(config: ExperimentConfig) -> Case:
@@ -95,4 +95,4 @@ def case_of_experiment(config: ExperimentConfig) -> Case:
         good=good,
         of_experiment=True,
     )
-    return within_budget(case)
+    return within_budget(case.checked())

@@ -70,9 +70,10 @@ class Case:
     good: tuple[Measurement, ...] = ()
     of_experiment: bool = False
 
-    def __post_init__(self) -> None:
-        """Raises DataError for a record that is given twice."""
+    def checked(self) -> Case:
+        """The case as it is.  Raises DataError for a record that is given twice."""
         check_distinct((*self.measurements, *self.good), self.tests, led=True)
+        return self
 
     @property
     def records(self) -> tuple[Measurement, ...]:

@@ -34,7 +34,7 @@ from aesi.pipeline.experiment.sources import (
     sources_of,
     with_keys,
 )
-from aesi.pipeline.notes import of_day, on_temperatures, temperature_sentence
+from aesi.pipeline.notes import of_contradiction, of_day, on_temperatures, temperature_sentence
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import ErrorSeries, Hold, LeftOutDrives, Measurement, Role, Split, hold_sentence
@@ -245,13 +245,14 @@ def _on_grid(
         declared = known_soc0 if config.cell.soc0 is None else config.cell.soc0
         begins = Beginning(measurement, declared, shared)
         start = starts[name] = begins.under(cell, given.effects, data.hold, given.model)
-        held = hold_sentence(measurement.name, data.hold, "hold" in data.model_fields_set, "data.hold: {}")
+        held = hold_sentence(measurement.name, data.hold, data.declared_hold is not None, "data.hold: {}")
         sampled = _of_sampling(measurement, data.dt_s)
         even = to_even(measurement, data.dt_s, data.hold)
         notes += [
             held,
             *sampled,
             temperature_sentence(cell, measurement, given.effects),
+            *map(with_keys, of_contradiction(given, even, start.soc, data.hold)),
             *map(with_keys, even.notes),
         ]
         records[name] = no_rows(even, start.soc, start.read_sd, begins)

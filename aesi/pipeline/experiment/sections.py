@@ -93,7 +93,8 @@ class DataConfig(Section):
     valid : those on which the search validates its candidates; without any it takes parts of the training records.
     test : those that the finished models meet once.
     dt_s : s, step to which the records are brought, which is that of the correction and of its bands.
-    hold : how the current runs between the rows of a run; a discovery has its own (`discover.hold`).
+    hold : how the current runs between rows. A discovery takes it where it is given here, unless `discover.hold` says
+    otherwise.
     columns : quantity, or `state`, `cycle`, `step`, and the file's name for it; `state` is the column that gives a
     current its sign, and None leaves out the temperature.
     units : quantity and unit of the file's column (`mA`, `mV`, `h`, `K`, `h:m:s`, `date` or a pattern).
@@ -153,6 +154,11 @@ class DataConfig(Section):
     def reading(self) -> Reading:
         """How the files are read."""
         return Reading(self.columns, self.units, self.sign, self.state_words, duplicates=self.duplicates)
+
+    @property
+    def declared_hold(self) -> Hold | None:
+        """How the current runs between rows where that is said; None where the default stands."""
+        return self.hold if "hold" in self.model_fields_set else None
 
     @property
     def has_roles(self) -> bool:
@@ -385,8 +391,8 @@ class DiscoverConfig(Section):
     fit_until_s : s, by record the time up to which fits see it.
     until_s : s, what comes later is left out of every test record.
     holdout : the last share of each record, kept back where there are no test records; None takes 0.3.
-    hold : how the current runs between rows (of `data.kind: virtual` it is known); None takes it of each record as its
-    rows show, like `aesi discover` of a file.
+    hold : how the current runs between rows (of `data.kind: virtual` it is known); None takes `data.hold` where that is
+    given, else that of each record as its rows show, like `aesi discover` of a file.
     max_effects : most effects that are named.
     """
 

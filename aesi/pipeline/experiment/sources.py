@@ -135,11 +135,12 @@ def discovery_records(
         experiment = virtual_experiment(config, cell)
         return experiment.train, experiment.test, ()
     placed = _placed(_locator(config), (*wanted.fit, *wanted.test, *wanted.good))
+    hold = wanted.hold or config.data.declared_hold
 
     def until(names: Sequence[str], stop_s: Mapping[str, float | None]) -> tuple[Measurement, ...]:
         reading = config.data.reading
         return tuple(
-            _record(placed[name][0], reading.but(stop_s=stop_s.get(name)), placed[name][1]).held(wanted.hold)
+            _record(placed[name][0], reading.but(stop_s=stop_s.get(name)), placed[name][1]).held(hold)
             for name in names
         )
 
@@ -194,7 +195,9 @@ def _record(path: Path, reading: Reading, called: str | None = None) -> Measurem
     called : None calls it as its file is.
     """
     try:
-        return read(path, reading, name=called)
+        return read(
+            path, reading, None, called
+        )  # with all rows, whose averages are taken once, on the step asked for
     except DataError as error:
         raise DataError(with_keys(str(error))) from None
 

@@ -44,7 +44,7 @@ class PreparedRecord:
     data : as measured.  thin : what fits run on, fit and held-out part.  n_fit : rows of `thin` that fits may see.
     fit_until_s : the time where the fit part of `data` ends (inf for all).  start : the state at the first row.
     hold, thin_hold : how the current runs between the samples of either.  white_v : (n_thin,) V, standard deviation of
-    the white noise in each row of `thin`.  noise_full_v : of that in `data`.
+    the white noise in each row of `thin`.  noise_full_v : of that in the fit part of `data`.
     lead_rows : rows of `data` at the start that only lead to what is judged.
     good : known to be good: nothing is looked for in it, and what others have beside it is what is different there.
     continues : number of the record that fits have seen and that this one begins with, where it does.
@@ -157,7 +157,8 @@ def _prepared(
     duration = float(data.time_s[-1] - data.time_s[0])
     until = data.time_s[0] + (1.0 - holdout) * duration if holdout > 0 else np.inf
     n_fit = int(np.searchsorted(thin.time_s, until))
-    noise_full = noise_floor_v(data.voltage_v, data.current_a)
+    fitted = data.take(slice(0, int(np.searchsorted(data.time_s, until))))
+    noise_full = noise_floor_v(fitted.voltage_v, fitted.current_a)
     white = _white_v(record, thin.take(slice(0, n_fit)), noise_full)
     as_given = start.basis == "given" and not (start.contradicted or start.doubted)
     said = () if as_given else (start.sentence,)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -13,7 +13,9 @@ from aesi.errors import AesiError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
 from aesi.physics.start.temperature import OtherTemperature, other_temperature
+from aesi.records import Measurement
 from aesi.tracer.case.problem import InverseProblem
+from aesi.tracer.case.records import PreparedRecord
 from aesi.tracer.likelihood.model_state import ModelState
 
 LEAVES_TIMES = 2.0
@@ -25,19 +27,32 @@ on a drive of the NMC cell, with nine parameters moved."""
 def other_temperatures(problem: InverseProblem) -> dict[int, OtherTemperature]:
     """Number of a record -> the temperature at which the declared model follows what fits see of it, for those
     records that contradict their own column of temperature."""
-    out: dict[int, OtherTemperature] = {}
-    declared_degc = problem.cell.initial_temperature_k - ZERO_CELSIUS_K
-    for index, seen in enumerate(problem.seen):
-        if seen.temperature_degc is None:
-            continue
-        found = other_temperature(seen.temperature_degc, declared_degc, partial(_left_v, problem, index))
-        if found is not None:
-            out[index] = found
+    pairs = zip(problem.records, problem.seen, strict=True)
+    found = {index: _other(problem, record, seen) for index, (record, seen) in enumerate(pairs)}
+    return {index: other for index, other in found.items() if other is not None}
+
+
+def of_unseen(fitted: ModelState, records: Sequence[PreparedRecord]) -> dict[str, OtherTemperature]:
+    """Name of a record that no fit has seen -> the same, for those records that a fitted model does not explain at
+    their own temperature: they are judged at one that is not theirs."""
+    out = {}
+    for record in records:
+        other = _other(fitted.problem, record, record.thin)
+        if other is not None and not _explains(fitted, record, None, other):
+            out[record.name] = other
     return out
 
 
-def _left_v(problem: InverseProblem, index: int, degc: Array) -> float | None:
-    record, there = problem.records[index], replace(problem.seen[index], temperature_degc=degc)
+def _other(problem: InverseProblem, record: PreparedRecord, seen: Measurement) -> OtherTemperature | None:
+    """seen : the thinned rows that are looked at."""
+    if seen.temperature_degc is None:
+        return None
+    declared_degc = problem.cell.initial_temperature_k - ZERO_CELSIUS_K
+    return other_temperature(seen.temperature_degc, declared_degc, partial(_left_v, problem, record, seen))
+
+
+def _left_v(problem: InverseProblem, record: PreparedRecord, seen: Measurement, degc: Array) -> float | None:
+    there = replace(seen, temperature_degc=degc)
     try:
         run = problem.run(there, record.soc0, problem.fixed, record.thin_hold)
     except AesiError:
@@ -49,20 +64,21 @@ def left_by_fit(fitted: ModelState, others: Mapping[int, OtherTemperature]) -> d
     """Those of the records that a fitted model does not explain at their own temperature: it leaves more of them
     than the declared model does at another one, or is not simulated to their end. What it leaves less of, as where
     the kinetics are off, is explained."""
-    out = {}
-    for index, other in others.items():
-        try:
-            explained = _left_by_v(fitted, index) <= other.there_v
-        except AesiError:
-            explained = False
-        if not explained:
-            out[index] = other
-    return out
+    records = fitted.problem.records
+    return {
+        index: other for index, other in others.items() if not _explains(fitted, records[index], index, other)
+    }
 
 
-def _left_by_v(fitted: ModelState, index: int) -> float:
-    """RMS, V, of what fits see of a record."""
-    record = fitted.problem.records[index]
+def _explains(fitted: ModelState, record: PreparedRecord, index: int | None, other: OtherTemperature) -> bool:
+    try:
+        return _left_by_v(fitted, record, index) <= other.there_v
+    except AesiError:
+        return False
+
+
+def _left_by_v(fitted: ModelState, record: PreparedRecord, index: int | None) -> float:
+    """RMS, V, of what fits see of a record, or of all of one that they do not.  index : among the fitted ones."""
     rows = slice(0, record.n_fit)
     voltage_v = fitted.simulated(record, index, thin=True).voltage_v[rows]
     return rms(np.asarray(record.thin.voltage_v[rows] - voltage_v))
@@ -75,11 +91,11 @@ def fitted_at_fault(written: ModelState, others: Mapping[int, OtherTemperature])
     if written.values is None:
         return None
     for index, other in others.items():
-        left_v = _left_by_v(written, index)
+        record = written.problem.records[index]
+        left_v = _left_by_v(written, record, index)
         if left_v > LEAVES_TIMES * other.there_v:
-            name = written.problem.records[index].name
             return (
-                f"what was fitted at {other.degc:.4g} degC leaves {MV_PER_V * left_v:.1f} mV of {name}, the "
+                f"what was fitted at {other.degc:.4g} degC leaves {MV_PER_V * left_v:.1f} mV of {record.name}, the "
                 f"declared model at {other.there_degc:.4g} degC {MV_PER_V * other.there_v:.1f}: it makes up for a "
                 "temperature that the record contradicts"
             )

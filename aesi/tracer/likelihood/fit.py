@@ -26,6 +26,7 @@ from aesi.tracer.likelihood.gaussian import (
     weighed,
 )
 from aesi.tracer.likelihood.model_error import PRIORS, Size, SplitTable, off_within_seconds, whitened
+from aesi.tracer.likelihood.size_sums import SizeSums
 
 GAIN_NATS = 0.05
 """A descent stops where a step gains less than this, in nats by an error as large as what is left
@@ -168,15 +169,14 @@ def beyond_expected(white: Array) -> float:
 
 def scored(problem: InverseProblem, blocks: Blocks, point: Linearised) -> PredictiveScore:
     """The predictive score of a linear form, over sizes of the model error."""
-    prior, table = PRIORS[problem.trust], SplitTable(problem, blocks, point.table())
-    said = [said_at(table, point, size, prior.log_density(size)) for size in prior.sizes]
+    prior, sums = PRIORS[problem.trust], SizeSums(SplitTable(problem, blocks, point.table()))
+    said = [said_at(sums, point, size, prior.log_density(size)) for size in prior.sizes]
     return best_over_sizes(said, len(point.x))
 
 
-def said_at(table: SplitTable, point: Linearised, size: Size, log_prior: float = 0.0) -> Weighed:
-    """A linear form, scored at one size of the model error.  table : that of the point."""
-    sums = block_sums(table.blocks, *table.whitened(size))
-    return weighed(table.blocks, sums, point.padded_x, point.padded_bounds, size, log_prior)
+def said_at(sums: SizeSums, point: Linearised, size: Size, log_prior: float = 0.0) -> Weighed:
+    """A linear form, scored at one size of the model error.  sums : of its table."""
+    return weighed(sums.table.blocks, sums.at(size), point.padded_x, point.padded_bounds, size, log_prior)
 
 
 @dataclass(frozen=True, eq=False)

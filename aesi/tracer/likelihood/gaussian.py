@@ -66,6 +66,11 @@ def block_sums(blocks: Blocks, table: Array, log_det: Array) -> BlockSums:
     products = np.empty((count, m, m))
     for k, rows in enumerate(blocks.rows):
         products[k] = table[rows].T @ table[rows]
+    return sums_of_products(blocks, products, log_det)
+
+
+def sums_of_products(blocks: Blocks, products: Array, log_det: Array) -> BlockSums:
+    """products : (b, 1 + m, 1 + m), of the whitened residual and sensitivities with each other.  log_det : (n,)."""
     return BlockSums(
         products[:, 0, 0],
         products[:, 1:, 0],

@@ -8,9 +8,10 @@ a step costs as many simulations as the effect has parameters.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
+from threading import Lock
 
 import numpy as np
 
@@ -29,14 +30,15 @@ from aesi.tracer.case.free_parameter import (
 from aesi.tracer.case.problem import STEP, InverseProblem, ValuesByOwner
 from aesi.tracer.likelihood.fit import GAIN_NATS, FittedHypothesis, beyond_expected
 from aesi.tracer.likelihood.gaussian import (
+    BlockSums,
     Linearised,
     PredictiveScore,
     best_over_sizes,
     block_sums,
-    bounds_of_own,
     weighed,
 )
 from aesi.tracer.likelihood.model_error import PRIORS, Size, SplitTable, off_within_seconds, whitened
+from aesi.tracer.likelihood.size_sums import SizeSums
 
 ROUNDS = 6
 """Most times that a descent takes slopes anew."""
@@ -49,12 +51,19 @@ class Parent:
     problem: InverseProblem
     blocks: Blocks
     fit: FittedHypothesis
+    _white: dict[Size, tuple[Array, Array]] = field(default_factory=dict, init=False)
+    _whitening: Lock = field(default_factory=Lock, init=False)
+
+    def white(self, size: Size) -> tuple[Array, Array]:
+        """Whitened sensitivities and what the file may be off by (n, m + k), and log|C| (n,), worked out once."""
+        with self._whitening:
+            if size not in self._white:
+                self._white[size] = self._columns.whitened(size)
+            return self._white[size]
 
     @cached_property
-    def white(self) -> dict[Size, tuple[Array, Array]]:
-        """Size -> whitened sensitivities and what the file may be off by (n, m + k), and log|C| (n,)."""
-        columns = SplitTable(self.problem, self.blocks, self.fit.point.table()[:, 1:])
-        return {size: columns.whitened(size) for size in PRIORS[self.problem.trust].sizes}
+    def _columns(self) -> SplitTable:
+        return SplitTable(self.problem, self.blocks, self.fit.point.table()[:, 1:])
 
     @cached_property
     def movable(self) -> IntArray:
@@ -134,7 +143,7 @@ class EffectGrowth:
     def q(self) -> Array:
         """Orthonormal basis of the columns that the other parameters can take up, over their prior."""
         off = whitened(self.problem, self.parent.blocks, self.off_v, self.size)[0]
-        known_columns = np.column_stack([self.parent.white[self.size][0][:, self.rest], off])
+        known_columns = np.column_stack([self.parent.white(self.size)[0][:, self.rest], off])
         return np.linalg.qr(np.vstack([known_columns, np.eye(known_columns.shape[1])]))[0]
 
     def from_own_starts(self) -> EffectGrowth:
@@ -264,7 +273,7 @@ def promise(parent: Parent, slopes_v: Array) -> float:
     bounds = np.vstack([fit.point.padded_bounds, open_ends])
     said = []
     for size in {fit.score.size, prior.nearest(prior.median)}:
-        known, log_det = parent.white[size]
+        known, log_det = parent.white(size)
         new, _ = own.whitened(size)
         sums = block_sums(parent.blocks, np.column_stack([new[:, :1], known, new[:, 1:]]), log_det)
         said.append(weighed(parent.blocks, sums, x, bounds, size, prior.log_density(size)).total)
@@ -276,28 +285,40 @@ def _scored(growth: EffectGrowth, u: Array, e: Array, jacobian: Array) -> Grown:
     lowest, highest = at_ends(u, growth.low, growth.high)
     inside = ~(lowest | highest)  # a linear form cannot see a bound
     x = np.concatenate([fit.point.x[growth.rest], u[inside]])
-    prior, out = PRIORS[growth.problem.trust], []
     bounds = np.vstack(
         [fit.point.bounds[growth.rest], np.column_stack([growth.low, growth.high])[inside].reshape(-1, 2)]
     )
-    own_columns = SplitTable(
-        growth.problem, parent.blocks, np.column_stack([e, jacobian[:, inside], growth.off_v])
-    )
-    off = bounds_of_own(growth.off_v.shape[1])
-    padded_x, padded_bounds = np.concatenate([x, np.zeros(len(off))]), np.vstack([bounds, off])
-    for size in prior.sizes:
-        known, _ = parent.white[size]
-        new, log_det = own_columns.whitened(size)
-        table = np.column_stack([new[:, :1], known[:, growth.rest], new[:, 1:]])
-        sums = block_sums(parent.blocks, table, log_det)
-        out.append(weighed(parent.blocks, sums, padded_x, padded_bounds, size, prior.log_density(size)))
-    hypothesis = (*fit.hypothesis, growth.effect)
-    free = (*(fit.free[j] for j in growth.rest), *(f for f, i in zip(growth.added, inside, strict=True) if i))
     slopes = np.column_stack([fit.point.jacobian_v[:, growth.rest], jacobian[:, inside]])
     point = Linearised(x, e, slopes, bounds, growth.off_v)
+    prior, sums_at = PRIORS[growth.problem.trust], _sums_of(growth, point)
+    out = [
+        weighed(
+            parent.blocks, sums_at(size), point.padded_x, point.padded_bounds, size, prior.log_density(size)
+        )
+        for size in prior.sizes
+    ]
+    hypothesis = (*fit.hypothesis, growth.effect)
+    free = (*(fit.free[j] for j in growth.rest), *(f for f, i in zip(growth.added, inside, strict=True) if i))
     on_bounds = {f.key: f.value(float(v)) for f, v, i in zip(growth.added, u, inside, strict=True) if not i}
     score, held = best_over_sizes(out, len(x)), growth.held_on_bounds()
     return Grown(hypothesis, free, point, score, growth.simulations, on_bounds, held, u, jacobian)
+
+
+def _sums_of(growth: EffectGrowth, point: Linearised) -> Callable[[Size], BlockSums]:
+    """Size of the model error -> sums of a linear form whose first parameters are the parent's: where these have to be
+    whitened at each size, they are as they were for all that grows on it."""
+    parent, blocks = growth.parent, growth.parent.blocks
+    if blocks.windows is not None:
+        return SizeSums(SplitTable(growth.problem, blocks, point.table())).at
+    added = point.jacobian_v[:, len(growth.rest) :]
+    own = SplitTable(growth.problem, blocks, np.column_stack([point.residual_v, added, point.off_v]))
+
+    def at(size: Size) -> BlockSums:
+        known, _ = parent.white(size)
+        new, log_det = own.whitened(size)
+        return block_sums(blocks, np.column_stack([new[:, :1], known[:, growth.rest], new[:, 1:]]), log_det)
+
+    return at
 
 
 Explanation = FittedHypothesis | Grown

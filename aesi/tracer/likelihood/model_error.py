@@ -153,28 +153,41 @@ class SplitTable:
         slow = self.blocks.windows.means(self.table)
         return slow, self.table - slow
 
+    @cached_property
+    def at_one_volt(self) -> tuple[Array, Array]:
+        """Where both are told apart, what lasts and what is gone within seconds, each whitened at a size of 1 V: (n, m)
+        each, which another size divides, since the amplitude of a measured cell's error is proportional to it."""
+        slow, rest = self._parts
+        root = np.sqrt(self.problem.independent)[:, None]
+        return slow * root / self._amplitude(Size(1.0))[:, None], rest * root
+
     def whitened(self, size: Size) -> tuple[Array, Array]:
         """The columns (n, m), whitened at a size, and log|C| by rows (n,).
 
         By the noise and an error that wanders, block by block; or, of a measured cell, with rows that count as many
         samples as are independent, over the size of the error alone.
         """
-        problem = self.problem
-        amplitude = amplitude_v(problem.steepness, size.delta_v, problem.trust)
-        if problem.coarse:
-            return self._coarsened(amplitude, size.fast_v)
-        return whiten(self.table, problem.time_s, self.blocks.starts[:-1], amplitude, problem.white_v)
-
-    def _coarsened(self, amplitude: Array, fast_v: float) -> tuple[Array, Array]:
-        """amplitude : (n,) V of what lasts.  fast_v : V of what is gone within seconds, where it is told apart."""
-        share, windows = self.problem.independent, self.blocks.windows
-        log_det = share * (2.0 * np.log(amplitude) + LOG_2PI) - LOG_2PI  # of so many samples, not of a row
-        if windows is None:
-            return self.table * (np.sqrt(share) / amplitude)[:, None], log_det
+        problem, amplitude = self.problem, self._amplitude(size)
+        if not problem.coarse:
+            return whiten(self.table, problem.time_s, self.blocks.starts[:-1], amplitude, problem.white_v)
+        root = np.sqrt(problem.independent)
+        if self.blocks.windows is None:
+            return self.table * (root / amplitude)[:, None], self.log_det(size)
         slow, rest = self._parts
-        over = slow / amplitude[:, None] + rest / fast_v
-        of_fast = share * windows.fast_dof * (2.0 * np.log(fast_v) + LOG_2PI)
-        return over * np.sqrt(share)[:, None], log_det + of_fast
+        over = slow / amplitude[:, None] + rest / size.fast_v
+        return over * root[:, None], self.log_det(size)
+
+    def log_det(self, size: Size) -> Array:
+        """(n,) log|C| by rows of a coarsened likelihood: of so many samples, not of a row."""
+        share, windows = self.problem.independent, self.blocks.windows
+        of_lasting = share * (2.0 * np.log(self._amplitude(size)) + LOG_2PI) - LOG_2PI
+        if windows is None:
+            return np.asarray(of_lasting)
+        return np.asarray(of_lasting + share * windows.fast_dof * (2.0 * np.log(size.fast_v) + LOG_2PI))
+
+    def _amplitude(self, size: Size) -> Array:
+        """(n,) V of what lasts."""
+        return amplitude_v(self.problem.steepness, size.delta_v, self.problem.trust)
 
 
 def whitened(problem: InverseProblem, blocks: Blocks, table: Array, size: Size) -> tuple[Array, Array]:

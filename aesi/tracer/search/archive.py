@@ -11,6 +11,7 @@ import inspect
 import json
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields, is_dataclass
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -81,7 +82,7 @@ def context_of(problem: InverseProblem) -> str:
     """Changes whenever a stored fit would no longer be the same fit."""
     text = [
         source_digest(),
-        repr(problem.cell),
+        _told(problem.cell),
         problem.model,
         *(identity(e) for e in problem.effects.values()),
     ]
@@ -106,7 +107,12 @@ def _parameters(parameters: Mapping[str, object]) -> str:
 
 
 def _told(value: object) -> str:
-    """A value, the same in every process: a function by its code and what it is bound to."""
+    """A value, the same in every process: a dataclass by all of its fields, whatever its repr leaves out, a function by
+    its code and what it is bound to."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return (
+            f"{type(value).__name__} {[(one.name, _told(getattr(value, one.name))) for one in fields(value)]}"
+        )
     if isinstance(value, partial):
         bound = [_told(one) for one in (*value.args, *chain.from_iterable(sorted(value.keywords.items())))]
         return f"{_told(value.func)} of {bound}"

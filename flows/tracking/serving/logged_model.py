@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 CODE = Path(__file__).with_name("served_model.py")
 ADDRESS = "MLFLOW_TRACKING_URI"
 DEFAULT_SOC0 = 0.5
-"""In a logged model's signature, where the model knows none."""
+"""State of charge in a logged model's signature, where the model knows none."""
 NEEDS = ("bpx", "numba", "numpy", "pandas", "pyarrow", "pydantic", "quantile-forest", "scikit-learn", "scipy")
 
 

@@ -36,6 +36,18 @@ def test_a_record_is_read_up_to_a_time_of_its_own_not_of_its_namesake(files):
     }
 
 
+def test_two_long_files_of_one_test_were_averaged_over_rows_of_their_own_and_no_longer_known_as_one(
+    files, monkeypatch
+):
+    """As in Python, all rows are read; a fit thins them itself."""
+
+    def averaged(record, most):
+        raise AssertionError(f"{record.name} was averaged")
+
+    monkeypatch.setattr("aesi.data.read.decimate", averaged)
+    assert [len(record) for record in options.measurements(files, Reading())] == [100, 101, 102, 103]
+
+
 @pytest.mark.parametrize("said", ["W8_0.5C", "W8_0.5C.csv", "{folder}/W8_0.5C.csv"])
 def test_a_file_is_meant_by_its_path_its_name_or_its_record_s(files, said):
     given = options.by_file("--temperature", [f"{said.format(folder=files[0].parent)}=10"], files)

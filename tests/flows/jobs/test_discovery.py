@@ -151,6 +151,7 @@ def test_a_discovery_of_an_experiment_was_not_tracked_where_its_file_says(
 
     from aesi.pipeline.discovery import cases
     from flows.jobs import discovery, prefect_flows, start
+    from flows.jobs.run_request import RunRequest
     from flows.jobs.stages import PlainStages
     from flows.tracking.store import Store
 
@@ -163,10 +164,33 @@ def test_a_discovery_of_an_experiment_was_not_tracked_where_its_file_says(
         monkeypatch.setattr(start, "_with_or_without", lambda under_prefect, plainly, use: under_prefect())
         monkeypatch.setattr(prefect_flows, "discovery", prefect_flows.discovery.fn)
         monkeypatch.setattr(prefect_flows, "PrefectStages", PlainStages)
-    under = start.discover_experiment("told.yaml", [f"tracking.uri={uri}"], None, use_prefect=prefect)
+    request = RunRequest("told.yaml", (f"tracking.uri={uri}",))
+    under = start.discover_experiment(request, use_prefect=prefect)
     assert (under.name, under.tracking.uri) == ("told_where", uri)
     assert Store(uri).find_experiment("told_where") is not None
     assert not (workspace / "mlflow.db").exists()
+
+
+def test_an_experiment_was_read_again_after_it_was_checked(workspace, case, monkeypatch):
+    """Who edits the file meanwhile edits that of the next run."""
+    from aesi.pipeline.discovery import cases
+    from aesi.pipeline.experiment.config import read_experiment
+    from flows import cli
+    from flows.jobs import run_request, start
+
+    (workspace / "told.yaml").write_text(EXPERIMENT)
+    read, found = [], []
+
+    def counted(path, overrides):
+        read.append(path)
+        return read_experiment(path, overrides)
+
+    monkeypatch.setattr(run_request, "read_experiment", counted)
+    monkeypatch.setattr(cases, "case_of_experiment", lambda config: case)
+    monkeypatch.setattr(start, "discover", lambda case, folder, *rest: found.append((case, folder)))
+    cli.app(["discover", "told.yaml"], standalone_mode=False)
+    assert read == ["told.yaml"]
+    assert found == [(case, workspace / "runs" / "told_where" / "discovery")]
 
 
 def _only_tracked(case, out, run, console, under):

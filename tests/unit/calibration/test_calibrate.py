@@ -17,7 +17,7 @@ from aesi.calibration.parameters import Free, free_parameters
 from aesi.calibration.posterior import PosteriorSamples, sampled
 from aesi.calibration.records.conditions import Conditions, Prior
 from aesi.calibration.result import at_bounds, intervals
-from aesi.calibration.start import size_assumed, sized
+from aesi.calibration.start import size_assumed, sized, tell_the_size
 from aesi.errors import DataError, InputError
 from aesi.physics import simulate
 from aesi.records import Measurement
@@ -360,6 +360,47 @@ def test_a_pulse_that_touched_the_lower_limit_half_way_was_taken_for_a_full_disc
     assert sized(start, [cold])[0] == start
     whole = replace(cold, voltage_v=np.where(pulse, 2.9, np.linspace(4.2, 2.55, len(time))))
     assert sized(start, [whole])[0].capacity_ah == pytest.approx(whole.discharged_ah("backward")[-1])
+
+
+def test_a_long_fit_said_nothing_until_its_end(start, records):
+    told = []
+    calibrate(start, records[:1], evaluations=3, on_step=lambda steps, left: told.append((steps, left)))
+    assert [steps for steps, _ in told] == list(range(len(told)))
+    assert told[0][1] == 1.0
+    assert told[-1][1] < told[0][1]
+
+
+def cycled(cell, before_ah):
+    """A charge of `before_ah` from empty to full, a rest at full, and a discharge of the cell's nominal capacity."""
+    full_ah, rate = cell.nominal_capacity_ah, 0.2 * cell.nominal_capacity_ah
+    phases = ((before_ah / rate, -rate), (0.5, 0.0), (full_ah / rate, rate), (0.5, 0.0))
+    current = np.concatenate([np.full(round(360 * hours), amperes) for hours, amperes in phases])
+    time = 10.0 * np.arange(len(current))
+    taken_ah = np.cumsum(current) * 10.0 / 3600.0
+    voltage = 4.2 - 1.65 * (taken_ah + before_ah) / full_ah - 0.02 * np.sign(current)
+    return Measurement(time, current, voltage, name="cycled", hold="backward")
+
+
+def test_the_full_discharge_after_a_charge_told_no_size(start):
+    cell = replace(start, nominal_capacity_ah=1.1 * start.nominal_capacity_ah)
+    record = cycled(cell, cell.nominal_capacity_ah)
+    assert record.voltage_v[0] < 3.0  # so that its first row is not full
+    assert sized(start, [record])[0].capacity_ah == pytest.approx(cell.nominal_capacity_ah, rel=1e-3)
+
+
+def test_a_charge_before_the_full_discharge_was_taken_off_its_size(start):
+    record = cycled(start, 0.05 * start.nominal_capacity_ah)  # begins near full, and is charged first
+    assert record.voltage_v[0] > start.upper_voltage_v - 0.15
+    assert sized(start, [record])[0].capacity_ah == pytest.approx(start.nominal_capacity_ah, rel=1e-3)
+
+
+def test_of_several_cycles_each_discharge_is_one(start):
+    one = cycled(start, start.nominal_capacity_ah)
+    twice = Measurement(
+        10.0 * np.arange(2 * len(one)), np.tile(one.current_a, 2), np.tile(one.voltage_v, 2), name="twice"
+    )
+    assert sized(start, [twice])[0].capacity_ah == pytest.approx(start.nominal_capacity_ah, rel=1e-3)
+    assert tell_the_size(start, [twice, replace(one, current_a=1e-3 * one.current_a, name="kA")]) == (0,)
 
 
 def test_a_file_that_is_fuller_than_most_cells_started_from_another_one(start):

@@ -8,7 +8,7 @@ import pytest
 
 from aesi.calibration.model import leniency, saturated
 from aesi.calibration.records.prepared import hold_told, prepared
-from aesi.calibration.records.thinning import WINDOW_S, thinned
+from aesi.calibration.records.thinning import thinned
 from aesi.physics import initial_state, simulate
 from aesi.physics.cell import Cell
 from aesi.records import Measurement
@@ -29,7 +29,7 @@ def charge_ah(data: Measurement, hold: str) -> float:
 
 def test_a_pulse_test_keeps_its_charge_and_its_pulses_in_a_tenth_of_the_rows():
     data = pulses()
-    thin = thinned(data, 3.0, WINDOW_S)
+    thin = thinned(data, 3.0)
     assert len(thin.data) < 0.1 * len(data)
     assert charge_ah(thin.data, thin.hold) == pytest.approx(charge_ah(data, "backward"), rel=1e-3)
     assert thin.data.current_a.max() == pytest.approx(5.0, abs=1e-6)
@@ -38,7 +38,7 @@ def test_a_pulse_test_keeps_its_charge_and_its_pulses_in_a_tenth_of_the_rows():
 def test_a_drive_is_averaged_to_its_window_and_keeps_its_charge():
     time = np.arange(0.0, 600.0, 0.1)
     current = 3.0 * np.sin(time / 3.0) + 1.0
-    thin = thinned(Measurement(time, current, 3.7 - 0.02 * current), 3.0, WINDOW_S)
+    thin = thinned(Measurement(time, current, 3.7 - 0.02 * current), 3.0)
     assert np.median(np.diff(thin.data.time_s)) == pytest.approx(1.0, abs=0.05)
     assert charge_ah(thin.data, thin.hold) == pytest.approx(
         charge_ah(Measurement(time, current, current), "linear"), rel=0.01
@@ -46,7 +46,7 @@ def test_a_drive_is_averaged_to_its_window_and_keeps_its_charge():
 
 
 def test_a_row_in_the_middle_of_a_step_is_not_believed_where_another_follows_soon():
-    thin = thinned(pulses(), 3.0, WINDOW_S)
+    thin = thinned(pulses(), 3.0)
     after = np.flatnonzero(np.abs(np.diff(thin.data.current_a)) > 1.0) + 1
     assert not thin.trusted[after].any()
     assert thin.trusted.mean() > 0.9

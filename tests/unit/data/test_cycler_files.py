@@ -127,6 +127,19 @@ def pec() -> tuple[str, bytes]:
     return "pec.csv", "\n".join([*lines, ""]).encode()
 
 
+def bitrode() -> tuple[str, bytes]:
+    """As of a published test, doi:10.5281/zenodo.2580327; three counters share a name."""
+    head = (
+        "Exclude,Time(s),Cycle,Loop,Loop,Loop,Step,StepTime(s),Current(A),Voltage(V),Power(W),Capacity(Ah),"
+        "Energy(Wh),Mode,Data,Temperature(C)"
+    )
+    body = rows(
+        ["No"] * N, TIME, STEP // 4, [1] * N, [1] * N, [1] * N, STEP, TIME, -CURRENT, VOLTAGE, TIME * 0, TIME * 0,
+        TIME * 0, words("DCHG", "CHRG", "REST"), [" "] * N, TEMPERATURE,
+    )  # fmt: skip
+    return "bitrode.csv", "\r\n".join([head, *body, ""]).encode()
+
+
 def neware_magnitudes() -> tuple[str, bytes]:
     name, content = neware()
     return name, content.replace(b",-", b",")
@@ -209,7 +222,8 @@ def workbook() -> tuple[str, bytes]:
 
 
 EXPORTS: tuple[Callable[[], tuple[str, bytes]], ...] = (
-    arbin, maccor, biologic, neware, neware_layers, neware_magnitudes, digatron, basytec, novonix, pec, bdf, workbook,
+    arbin, maccor, biologic, neware, neware_layers, neware_magnitudes, digatron, basytec, novonix, pec, bitrode, bdf,
+    workbook,
 )  # fmt: skip
 
 

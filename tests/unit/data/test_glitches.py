@@ -218,3 +218,67 @@ def test_what_is_no_number_for_a_reason_is_told_with_it(tmp_path, cell, words):
     path.write_text("\n".join(["time_s,current_a,voltage_v", *rows, f"20,{cell},3.9"]) + "\n")
     with pytest.raises(DataError, match=words):
         read_measurement(path)
+
+
+def test_a_dead_sensor_with_noise_was_taken_for_a_current(tmp_path):
+    noise = 0.003 + 0.01 * np.random.default_rng(2).normal(size=len(TIME))
+    said = refusal(tmp_path, noise, VOLTAGE)
+    assert "the steps of the current" in said
+    assert "do not move it (their correlation is 0.0" in said
+    partly = CURRENT.copy()
+    partly[1500:2700] = noise[1500:2700]
+    said = refusal(tmp_path, partly, VOLTAGE)
+    assert "row 1501 (line 1502)" in said
+    assert "the current stays within -0.0" in said
+    assert "--to-s 1500 or --from-s 2699" in said
+
+
+@pytest.mark.parametrize("rows_late", [1, 2])
+def test_a_voltage_that_is_written_rows_late_is_no_dead_current(tmp_path, rows_late):
+    late = np.roll(VOLTAGE, rows_late)
+    late[:rows_late] = VOLTAGE[0]
+    read_measurement(written(tmp_path, CURRENT, late))
+
+
+@pytest.mark.parametrize(("noise_v", "told"), [(0.0, True), (1e-3, True), (0.01, False)])
+def test_two_tests_that_were_joined_in_a_rest_a_tenth_of_a_volt_apart(tmp_path, noise_v, told):
+    """At rest nothing explains a step; in noise that is as large, it is not told."""
+    current, voltage = CURRENT.copy(), VOLTAGE.copy()
+    current[1700:1900], voltage[1700:1900] = 0.0, 3.95 - 0.005 * np.exp(-np.arange(200) / 30.0)
+    voltage = voltage + noise_v * np.random.default_rng(3).normal(size=len(TIME))
+    assert "goes from" not in notes(tmp_path, current, voltage)
+    joined = voltage.copy()
+    joined[1800:] -= 0.09
+    assert (
+        "V at row 1801 (line 1802), 1 s after the row before it" in notes(tmp_path, current, joined)
+    ) == told
+
+
+def test_a_line_of_means_below_a_table_was_a_second_test(tmp_path):
+    rows = np.append(np.arange(len(TIME)), 0)
+    said = refusal(tmp_path, CURRENT[rows], VOLTAGE[rows], TIME[rows])
+    assert "time runs back from 3599 s to 0 s; it is the last row alone, as a line of sums or means" in said
+
+
+@pytest.mark.parametrize(("hours", "told"), [(1.0, True), (2.0, False)])
+def test_a_clock_that_was_put_forward_was_rows_that_are_missing(tmp_path, hours, told):
+    time = TIME + np.where(np.arange(len(TIME)) > 1000, 3600.0 * hours, 0.0)
+    assert ("a clock that was put forward to summer time" in refusal(tmp_path, time=time)) == told
+
+
+@pytest.mark.parametrize("name", ["C-rate", "c_rate", "power_w", "Power", "Current (W)", "capacity (Ah)"])
+def test_a_c_rate_or_a_power_was_taken_for_a_current(tmp_path, name):
+    said = refusal(tmp_path, header=f"time_s,{name},voltage_v", reading={"columns": {"current_a": name}})
+    assert "by its name, and current_a is needed in A; convert the column" in said
+    read_measurement(
+        written(tmp_path, header="time_s,Power supply (A),voltage_v"),
+        columns={"current_a": "Power supply (A)"},
+    )
+
+
+@pytest.mark.parametrize(("rows", "told"), [(1, False), (4, True)])
+def test_a_voltage_that_is_written_less_often_than_its_current_was_taken_for_the_cell_s(tmp_path, rows, told):
+    held = np.round(VOLTAGE[np.arange(len(TIME)) // rows * rows], 4)
+    assert (
+        "of the steps of the current, as where it is written less often" in notes(tmp_path, CURRENT, held)
+    ) == told

@@ -179,6 +179,13 @@ def test_times_that_run_back_are_told_by_what_they_are(tmp_path, order, words):
     assert words in refusal(tmp_path, text(time=TIME[order]))
 
 
+def test_pieces_with_clocks_of_their_own_were_to_be_sorted_into_one_another(tmp_path):
+    clock = np.where(
+        np.arange(N) // 50 % 2, TIME - 10.0, TIME
+    )  # each second piece starts before the first ends
+    assert "Sorting would mix them" in refusal(tmp_path, text(time=clock))
+
+
 def test_a_clock_that_passes_midnight_is_told_from_two_tests(tmp_path):
     clock = (TIME + 86_300.0) % 86_400.0
     assert "starts anew at midnight" in refusal(tmp_path, text(time=clock))
@@ -322,7 +329,7 @@ def test_a_unit_in_the_name_is_believed(tmp_path):
     [
         (b"", "empty"),
         (HEADER.encode(), "too few rows below its header (0)"),
-        (text().split("\n", 1)[1].encode(), "header"),
+        (text().split("\n", 1)[1].encode(), "names the columns"),
         (bytes(range(256)) * 10, "binary"),
         (gzip.compress(text().encode())[:300], "truncated"),
         (b"PAR1" + b"x" * 20, "damaged"),
@@ -334,6 +341,41 @@ def test_a_unit_in_the_name_is_believed(tmp_path):
 )
 def test_what_is_no_table_is_refused(tmp_path, content, word):
     assert word in refusal(tmp_path, content)
+
+
+NAMELESS = text().split("\n", 1)[1]
+BY_NUMBER = {"time_s": "#1", "current_a": "#2", "voltage_v": "#3"}
+
+
+@pytest.mark.parametrize(
+    "above", ["", "LabVIEW Measurement\t\nSeparator\tComma\n***End_of_Header***\t\n\t\n", "# a note\n\n"]
+)
+def test_a_table_without_names_could_not_be_read_or_lost_its_first_row(tmp_path, above):
+    path = tmp_path / "drive.txt"
+    path.write_text(above + NAMELESS)
+    record = read_measurement(path, BY_NUMBER)
+    assert len(record) == N
+    np.testing.assert_allclose(record.time_s, TIME)
+    np.testing.assert_allclose(record.current_a, CURRENT)
+    assert "numbered" in " ".join(record.notes)
+
+
+def test_a_table_without_names_says_its_first_row_and_how_columns_are_called(tmp_path):
+    said = refusal(tmp_path, "No,0.0,3.6,1.5,x\nNo,1.0,3.6,1.5,x\n")
+    assert "--column time_s=#N" in said
+    assert "#2 '0.0', #3 '3.6'" in said
+
+
+def test_a_number_that_no_column_has_is_told(tmp_path):
+    path = tmp_path / "drive.csv"
+    path.write_text(NAMELESS)
+    with pytest.raises(DataError, match="no column '#9' for time_s"):
+        read_measurement(path, {**BY_NUMBER, "time_s": "#9"})
+
+
+def test_a_header_with_a_name_too_few_is_no_table_without_names(tmp_path):
+    said = refusal(tmp_path, "time_s,current_a,voltage_v\n0,1,3.7,25\n1,1,3.7,25\n")
+    assert "4 cells where the header has 3" in said
 
 
 def test_no_file_and_a_folder(tmp_path):
@@ -355,6 +397,24 @@ def test_temperature_can_be_left_out(tmp_path):
     with pytest.raises(DataError, match="kelvin"):
         read_measurement(path)
     assert read_measurement(path, {"temperature_degc": None}).temperature_degc is None
+
+
+@pytest.mark.parametrize("stated", ["40", "-10.5", "0"])
+def test_a_temperature_that_is_known_needed_a_column(tmp_path, stated):
+    path = tmp_path / "drive.csv"
+    path.write_text(text())
+    record = read_measurement(path, {"temperature_degc": stated})
+    np.testing.assert_array_equal(record.temperature_degc, np.full(N, float(stated)))
+    assert [note for note in record.notes if "temperature" in note] == [
+        f"drive.csv: temperature_degc is {stated} in every row, as stated."
+    ]
+
+
+def test_a_stated_temperature_that_no_cell_has_is_refused(tmp_path):
+    path = tmp_path / "drive.csv"
+    path.write_text(text())
+    with pytest.raises(DataError, match="column temperature_degc"):
+        read_measurement(path, {"temperature_degc": "298.15"})
 
 
 def test_decimation_keeps_the_charge_and_is_said(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 
 import aesi
 from aesi.errors import DataError
-from aesi.physics.belongs import capacity_bounds, check_belongs, check_measured
+from aesi.physics.belongs import capacity_bounds, check_belongs, check_measured, unlike
 from aesi.records import Measurement
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
@@ -200,3 +200,49 @@ def test_a_current_in_milliampere_was_simulated_where_its_first_row_alone_has_a_
         check_belongs(m50, [replace(started, current_a=1e3 * started.current_a)])
     with pytest.raises(DataError, match="the time is in ms"):
         check_belongs(m50, [replace(started, time_s=1e3 * started.time_s)])
+
+
+@pytest.fixture(scope="module")
+def of_manganese():
+    """Full discharges at C/3 with rests of a cell whose potential has a plateau near 4 V, as of a lithium manganese
+    spinel, and that has the capacity of the shipped 30 Ah cell of NMC."""
+    cell = aesi.Cell.from_bpx(CELLS / "nmc_30ah.bpx.json")
+    time_s = np.arange(0.0, 16_000.0, 10.0)
+    current_a = np.where((time_s > 600) & (time_s % 2000 > 300), cell.nominal_capacity_ah / 3.0, 0.0)
+    taken = np.cumsum(current_a) * 10.0 / 3600.0 / cell.capacity_ah
+    rows = taken < 1.0
+    soc = [0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 1.0]
+    rest_v = [2.75, 3.25, 3.45, 3.57, 3.7, 3.8, 3.92, 4.02, 4.1, 4.19]
+    voltage_v = np.interp(1.0 - taken, soc, rest_v) - 1e-3 * current_a
+    return cell, Measurement(time_s[rows], current_a[rows], voltage_v[rows], name="spinel", hold="backward")
+
+
+def test_a_calibration_could_not_start_from_a_file_of_other_materials(of_manganese):
+    cell, record = of_manganese
+    warm = replace(record, temperature_degc=np.full(len(record), 25.0))
+    with pytest.raises(DataError, match="the cell file is another cell's"):
+        check_measured(cell, [warm])
+    check_measured(cell, [warm], known=[0])
+    assert "of other materials" in unlike(cell, warm)
+    again = replace(warm.between(3000.0, 9000.0), name="again")  # of the same cell, and no full discharge
+    with pytest.raises(DataError, match="the cell file is another cell's"):
+        check_measured(cell, [again])
+    check_measured(cell, [warm, again], known=[0])
+
+
+def test_what_the_potentials_are_off_allows_no_other_unit(of_manganese):
+    cell, record = of_manganese
+    warm = replace(record, temperature_degc=np.full(len(record), 25.0))
+    in_ma = replace(warm, current_a=1000.0 * warm.current_a, name="in mA")
+    with pytest.raises(DataError, match="in mA"):
+        check_measured(cell, [warm, in_ma], known=[0])
+
+
+def test_a_temperature_that_nobody_gave_is_asked_for_before_the_potentials_are_blamed(of_manganese):
+    cell, record = of_manganese
+    with pytest.raises(DataError, match="Or it was far colder"):
+        check_measured(cell, [record], known=[0])
+
+
+def test_the_potentials_of_its_own_file_are_like_those_of_a_cell(m50, record):
+    assert unlike(m50, record) == ""

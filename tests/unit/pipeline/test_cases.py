@@ -31,16 +31,21 @@ def test_the_measured_case_is_judged_where_its_fit_ends(shared_data, monkeypatch
     assert case.tests[0].time_s[-1] == 8000
 
 
-def test_how_the_current_runs_between_rows_is_as_records_show_or_as_the_discovery_says(
-    shared_data, monkeypatch
+@pytest.mark.parametrize(
+    ("experiment", "overrides", "hold"),
+    [
+        ("measured_nmc", [], "backward"),  # by its data.hold
+        ("measured_nmc", ["discover.hold=linear"], "linear"),
+        ("measured_hg2_cold", [], None),
+        ("measured_hg2_cold", ["data.hold=linear"], "linear"),
+    ],
+)
+def test_the_current_runs_between_rows_as_the_experiment_says_or_else_as_records_show(
+    shared_data, monkeypatch, experiment, overrides, hold
 ):
     monkeypatch.setenv("AESI_DATA", str(shared_data / "measured"))
-    shown, said = (
-        case_of_experiment(read_experiment(EXPERIMENTS / "measured_nmc.yaml", overrides))
-        for overrides in ([], ["discover.hold=backward"])
-    )
-    assert {m.hold for m in shown.records} == {None}
-    assert {m.hold for m in (*said.records, *said.tests)} == {"backward"}
+    case = case_of_experiment(read_experiment(EXPERIMENTS / f"{experiment}.yaml", overrides))
+    assert {m.hold for m in (*case.records, *case.tests)} == {hold}
 
 
 def test_a_discovery_starts_from_a_cell_at_its_state_of_health(tmp_path):

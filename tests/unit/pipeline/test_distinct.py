@@ -35,6 +35,7 @@ EXPORTS = {
     "all": replace(RECORD, time_s=np.round(TIME - 77.0, 1), voltage_v=np.round(RECORD.voltage_v, 3)).take(
         slice(1000, 2500, 3)
     ),
+    "other sign": replace(RECORD, current_a=-RECORD.current_a),
 }
 
 
@@ -98,3 +99,71 @@ def test_halves_that_were_rounded_up_are_the_same_test():
     up = np.floor(RECORD.current_a * 1e3 + 0.5) / 1e3
     with pytest.raises(DataError, match="hold the same rows of one test"):
         check_distinct([RECORD], [replace(RECORD, name="export", current_a=up)])
+
+
+def interpolated(step_s, at_s=0.3, decimals=4):
+    time = np.arange(at_s, TIME[-1], step_s)
+    columns = (np.interp(time, TIME, column) for column in (RECORD.current_a, RECORD.voltage_v))
+    return Measurement(time, *(np.round(column, decimals) for column in columns), name="export")
+
+
+def of_rows(step_s, to):
+    """The row before (-1), nearest (0) or after (1) every `step_s`."""
+    time = np.arange(0.2, TIME[-1] - 1.0, step_s)
+    rows = {-1: np.floor(time), 0: np.round(time), 1: np.ceil(time)}[to].astype(int)
+    return replace(RECORD.take(rows), time_s=time, name="export")
+
+
+def in_means(rows, begin=0.0):
+    count = len(TIME) // rows
+    current, voltage = (
+        column[: count * rows].reshape(count, rows).mean(axis=1)
+        for column in (RECORD.current_a, RECORD.voltage_v)
+    )
+    time = begin + TIME[: count * rows : rows]
+    return Measurement(time, np.round(current, 3), np.round(voltage, 4), name="export")
+
+
+@pytest.mark.parametrize(
+    "export",
+    [
+        interpolated(0.7),
+        interpolated(0.13),
+        interpolated(2.5, decimals=3),
+        replace(interpolated(2.5, 0.0), time_s=interpolated(2.5, 0.0).time_s + 500.0),
+        replace(interpolated(2.5), current_a=-interpolated(2.5).current_a),
+        *(of_rows(2.3, to) for to in (-1, 0, 1)),
+        in_means(10),
+        in_means(10, begin=9.0),
+        interpolated(0.7).between(1000.0, 2000.0),
+    ],
+)
+def test_an_export_on_other_times_was_taken_for_another_test(export):
+    told = (
+        "hold (one test on other times|the same rows of one test)"  # of rows that were moved to another time
+    )
+    with pytest.raises(DataError, match=told + " .* and are both among the data and the tests"):
+        check_distinct([RECORD], [export])
+    with pytest.raises(DataError, match=told):
+        check_distinct([export, RECORD])
+
+
+@pytest.mark.parametrize("rounded", [(4, 5), (2, 3), (1, 2)])
+def test_a_second_test_of_the_same_protocol_on_other_times_is_another(rounded):
+    second = drive("day 2", 2, 4e-3)
+    time = np.arange(0.3, TIME[-1], 2.5)
+    columns = [np.interp(time, TIME, column) for column in (second.current_a, second.voltage_v)]
+    other = Measurement(time, *(np.round(c, d) for c, d in zip(columns, rounded, strict=True)), name="other")
+    check_distinct([RECORD], [other])
+
+
+def test_two_cycles_of_a_virtual_cell_on_other_times_are_two_tests():
+    """Without noise, and by a millivolt or two apart."""
+    cell = Cell.from_bpx(CELLS / "nmc_30ah.bpx.json")
+    current = np.repeat(np.random.default_rng(7).normal(10.0, 30.0, 300), 5)
+    cycles = []
+    for k, step_s in enumerate((1.0, 2.5)):
+        time = np.arange(0.0, 1500.0, step_s)
+        run = simulate(cell, time, np.interp(time, np.arange(1500.0), current), 0.8 - 0.005 * k)
+        cycles.append(Measurement(time, np.round(run.current_a, 2), np.round(run.voltage_v, 3), name=f"{k}"))
+    check_distinct(cycles)

@@ -339,6 +339,21 @@ def test_self_heating_that_a_measured_temperature_leaves_idle_was_told_as_simula
     assert "with self_heating(" in said[False]
 
 
+@pytest.mark.parametrize("use", [simulate_file, predict_file])
+@pytest.mark.parametrize(("column_degc", "told"), [(0.0, True), (25.0, False), (None, False)])
+def test_a_dead_temperature_was_simulated_at_without_a_word(model, data, tmp_path, use, column_degc, told):
+    physics, record, said = HybridModel(model.cell, hold="linear"), tmp_path / "drive.csv", []
+    run = aesi.simulate(model.cell, data.time_s, data.current_a, SOC0, temperature_degc=25.0)
+    columns = {"time_s": data.time_s, "current_a": data.current_a, "voltage_v": run.voltage_v}
+    degc = {} if column_degc is None else {"temperature_degc": column_degc}
+    pd.DataFrame(columns | degc).to_csv(record, index=False)
+    asked = ProfileRequest(soc0=SOC0)
+    use(physics.save(tmp_path / "physics"), record, tmp_path / "out.csv", asked, say_notes=said.extend)
+    found = [note for note in said if "its voltage contradicts its temperature" in note]
+    assert bool(found) == told
+    assert not found or found[0].startswith("drive: its voltage contradicts its temperature. At 0 degC")
+
+
 def test_physics_with_effects_alone_is_a_model_too(model, data, tmp_path):
     effect = CATALOGUE["series_resistance"].activate(resistance_ohm=1.5e-3)
     folder = HybridModel(model.cell, (effect,), hold="backward").save(tmp_path / "physics")

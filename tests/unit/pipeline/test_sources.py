@@ -9,7 +9,7 @@ from small_experiment import BPX, PERIOD_S, SOC0, experiment, write_record
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.reading import Reading
 from aesi.errors import DataError, SimulationError
-from aesi.physics import Cell
+from aesi.physics import Cell, simulate
 from aesi.physics.initial_state import OTHER_STATE
 from aesi.pipeline.experiment.config import parse_experiment
 from aesi.pipeline.experiment.load import load
@@ -157,3 +157,20 @@ def test_a_unit_that_was_declared_wrongly_was_told_in_options_that_a_run_does_no
     )
     with pytest.raises(DataError, match=words):
         load(config.model_copy(update={"data": data}))
+
+
+@pytest.mark.parametrize(("column_degc", "told"), [(0.0, True), (25.0, False)])
+def test_a_run_took_a_dead_temperature_without_a_word(tmp_path, column_degc, told):
+    import pandas as pd
+
+    path = write_record(tmp_path)
+    table = pd.read_csv(path)
+    run = simulate(Cell.from_bpx(BPX), table["time_s"], table["current_a"], SOC0, temperature_degc=25.0)
+    table.assign(voltage_v=run.voltage_v, temperature_degc=column_degc).to_csv(path, index=False)
+    said = [
+        note for note in load(experiment(path)).notes if "its voltage contradicts its temperature" in note
+    ]
+    assert bool(said) == told
+    for note in said:
+        assert note.startswith("drive: its voltage contradicts its temperature. At 0 degC")
+        assert note.endswith("(in an experiment file: data.columns, data.units).")

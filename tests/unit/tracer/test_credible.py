@@ -9,7 +9,7 @@ from aesi.tracer.case.records import prepare_all
 from aesi.tracer.decide.verdict import Thresholds, judged
 from aesi.tracer.likelihood.credible import reaches
 from aesi.tracer.likelihood.gaussian import BlockSums, Posterior
-from aesi.tracer.report.candidate_effects import estimates, ranking
+from aesi.tracer.report.candidate_effects import CandidateEffect, best_first, estimates, ranking
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.forward import searched
 
@@ -82,3 +82,11 @@ def test_what_a_growth_left_on_a_bound_of_its_parent_has_an_interval_too(cell, m
         told = estimates(path, one, owner)
         assert set(told) == set(CATALOGUE[owner].parameters)
         assert all(t.low < t.high for t in told.values())
+
+
+def test_of_effects_that_say_nothing_another_one_was_listed_first_in_each_version():
+    rows = [
+        CandidateEffect(effect, "physics", score, None, {}, (effect,), "")
+        for effect, score in (("first", 0.0), ("second", 3e-14), ("third", 5.0), ("last", -0.1))
+    ]
+    assert [row.effect for row in best_first(rows)] == ["third", "first", "second", "last"]

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from aesi.physics import Cell, simulate
+from aesi.physics.cell.relations import scaled
 from aesi.physics.effects import CATALOGUE
 from aesi.records import Measurement
 from aesi.tracer.case.blocks import blocks_of
@@ -441,6 +442,22 @@ def test_running_empty_at_the_end_of_a_discharge_is_no_fault(path, monkeypatch, 
     monkeypatch.setattr("aesi.tracer.decide.carry_over._end", end)
     moved = ModelState(path.problem, {"soc0": {"0": 0.9}})
     assert range_fault(moved) == ("runs empty" if at_fault else None)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda cell: cell.with_positive(rate_constant=0.2 * cell.positive.rate_constant),
+        lambda cell: cell.with_negative(diffusivity=scaled(cell.negative.diffusivity, 0.3)),
+        lambda cell: replace(cell, contact_resistance_ohm=0.02),
+        lambda cell: replace(cell, initial_temperature_k=273.15),
+    ],
+)
+def test_fits_of_another_cell_of_the_same_name_were_taken_for_this_one_s(path, change):
+    """They were where its state of charge was that of a full charge, which no kinetics move."""
+    problem = path.problem
+    assert context_of(replace(problem, cell=change(problem.cell))) != context_of(problem)
+    assert context_of(replace(problem, cell=replace(problem.cell))) == context_of(problem)
 
 
 def test_fits_of_another_version_were_taken_for_this_one_s(path, monkeypatch):

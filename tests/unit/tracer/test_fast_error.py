@@ -10,8 +10,10 @@ from aesi.physics.effects import CATALOGUE
 from aesi.tracer.case.blocks import Windows, blocks_of
 from aesi.tracer.case.problem import OHMIC_SHARE
 from aesi.tracer.discovery import inverse_problem
+from aesi.tracer.likelihood.gaussian import block_sums
 from aesi.tracer.likelihood.growth import EffectGrowth, Parent
 from aesi.tracer.likelihood.model_error import MEASURED_V, PRIORS, Size, SplitTable, amplitude_v, whitened
+from aesi.tracer.likelihood.size_sums import SizeSums
 from aesi.tracer.likelihood.surrogates import _drawn
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import base_of, fitted_hypothesis
@@ -82,6 +84,20 @@ def test_a_table_is_split_once_for_all_sizes_of_the_model_error(problem, monkeyp
         assert np.array_equal(at_once.whitened(size)[0], white)
         assert np.array_equal(at_once.whitened(size)[1], log_det)
     assert len(calls) == 1
+
+
+@pytest.mark.parametrize("trust", ["measured", "lasting", "tight"])
+def test_sums_at_a_size_are_those_of_the_rows_whitened_at_it(problem, trust):
+    problem = replace(problem, trust=trust)
+    blocks = blocks_of(problem)
+    table = np.random.default_rng(1).normal(0.0, 5e-3, (len(problem.time_s), 4))
+    sums = SizeSums(SplitTable(problem, blocks, table))
+    for size in PRIORS[trust].sizes[::7]:
+        there, rows = sums.at(size), block_sums(blocks, *whitened(problem, blocks, table, size))
+        for name in ("square", "moment", "gram", "log_det", "rows"):
+            expected = getattr(rows, name)
+            least = 1e-12 * np.abs(expected).max()
+            assert getattr(there, name) == pytest.approx(expected, rel=1e-12, abs=least), (name, size)
 
 
 def test_sizes_of_both_are_tried_together_where_they_are_told_apart():

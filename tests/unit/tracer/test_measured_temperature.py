@@ -98,3 +98,15 @@ def test_slow_kinetics_at_a_right_temperature_were_told_as_a_contradiction_of_it
     assert found.other_temperature == ()
     assert not any("contradicts" in warning for warning in found.warnings)
     assert "contradicts" not in short_finding(discovery_content(found))
+
+
+def test_a_dead_temperature_of_a_record_that_judges_was_taken_without_a_word(cell, make):
+    right = warm_record(cell, make, 35.0)
+    dead = replace(right, temperature_degc=np.zeros(len(right)), name="judge", time_s=right.time_s + 1e6)
+    found = discover(cell, [right], [dead], soc0=0.9, effects=TRIED)
+    assert found.other_temperature == ("judge",)
+    assert found.warnings[0].startswith("judge: its voltage contradicts its temperature. At 0 degC")
+    well = discover(
+        cell, [right], [replace(dead, temperature_degc=right.temperature_degc)], soc0=0.9, effects=TRIED
+    )
+    assert well.other_temperature == ()

@@ -1,0 +1,91 @@
+"""Records as two of them are compared: their rows, in the decimals in which they are written, and what they share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from aesi.numerics.typing import Array, BoolArray, IntArray
+from aesi.records.measurement import Measurement
+
+FEWEST_ROWS = 30
+"""That have to agree where current or voltage move: fewer are a seam between two parts, or chance."""
+MOVES = 3.0
+"""Of the last decimal, by which a row is another than the one before: rows of a voltage that slides by less are the
+same in every cycle under one current."""
+MOST_DECIMALS = 5
+"""Of seconds, amperes and volts: more than a file of 4-byte numbers keeps."""
+WHOLE = 1e-3
+"""Of the last decimal, within which a number is written in so many: what a file in other units leaves of round-off."""
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """What the second of two records shares with the first.
+
+    rows, share : of the sparser's rows at common times, those that agree.  from_s, to_s : the second's times between
+    which they lie.  ahead_s : by how much its clock is ahead.  resampled : between the rows of the other, not on them.
+    """
+
+    rows: int
+    share: float
+    from_s: float
+    to_s: float
+    ahead_s: float
+    resampled: bool = False
+
+    def of_the_other(self) -> Overlap:
+        """What the first shares with the second, where this is what the second does with the first."""
+        times = self.from_s - self.ahead_s, self.to_s - self.ahead_s
+        return Overlap(self.rows, self.share, *times, -self.ahead_s, self.resampled)
+
+
+class Rows:
+    """A record, with the decimals in which its columns are written."""
+
+    def __init__(self, record: Measurement) -> None:
+        self.time_s, self.current_a, self.voltage_v = record.time_s, record.current_a, record.voltage_v
+        self.decimals = tuple(map(_decimals, (self.time_s, self.current_a, self.voltage_v)))
+        self.step_s = float(np.median(np.diff(self.time_s))) if len(self.time_s) > 1 else np.inf
+        self._once: dict[tuple[int, int], tuple[IntArray, IntArray]] = {}
+
+    def once(self, of_current: int, of_voltage: int) -> tuple[IntArray, IntArray]:
+        """The rows, in so many decimals, that are there once, whichever way their current flows: their keys in order,
+        and where they are."""
+        at = of_current, of_voltage
+        if at not in self._once:
+            known = np.flatnonzero(np.isfinite(self.voltage_v))
+            current = np.round(np.abs(self.current_a[known]) * 10.0**of_current).astype(np.int64)
+            voltage = np.round(self.voltage_v[known] * 10.0**of_voltage).astype(np.int64)
+            keys, first, counts = np.unique(
+                current * 10 ** (MOST_DECIMALS + 2) + voltage, return_index=True, return_counts=True
+            )
+            self._once[at] = keys[counts == 1], known[first[counts == 1]]
+        return self._once[at]
+
+    def moving(self, of_current: int, of_voltage: int) -> BoolArray:
+        """(n,) True where current or voltage are others than in the row before, in so many decimals."""
+        moves = np.zeros(len(self.time_s), dtype=bool)
+        for column, digits in ((self.current_a, of_current), (self.voltage_v, of_voltage)):
+            moves[1:] |= np.abs(np.diff(column)) > MOVES * 10.0**-digits
+        return moves
+
+    @cached_property
+    def sums(self) -> tuple[Array, Array]:
+        """(n + 1,) of the currents and the voltages before each row."""
+        current, voltage = (
+            np.concatenate([[0.0], np.cumsum(column)]) for column in (self.current_a, self.voltage_v)
+        )
+        return current, voltage
+
+
+def _decimals(column: Array) -> int:
+    """Digits behind the point in which a column (n,) is written, at most MOST_DECIMALS."""
+    known = column[np.isfinite(column)]
+    for digits in range(MOST_DECIMALS):
+        scaled = known * 10.0**digits
+        if np.all(np.abs(scaled - np.round(scaled)) < WHOLE):
+            return digits
+    return MOST_DECIMALS

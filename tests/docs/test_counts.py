@@ -1,0 +1,82 @@
+"""What the pages say in words of the findings on measured cells is what the tables of the benchmarks hold."""
+
+import re
+from pathlib import Path
+from statistics import median
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+BENCHMARKS = (ROOT / "docs" / "benchmarks.md").read_text(encoding="utf-8")
+PAGES = ("README.md", "docs/index.md", "docs/limits.md", "docs/benchmarks.md")
+
+
+def cases(name):
+    """Rows of the table of each case, by column, of one table of the benchmarks."""
+    table = BENCHMARKS.split(f"<!-- table of {name} -->")[1].split("<!-- end of")[0]
+    lines = [line.strip() for line in table.split('"Each case"')[-1].splitlines()]
+    cells = [[cell.strip() for cell in line[1:-1].split("|")] for line in lines if line.startswith("|")]
+    return [dict(zip(cells[0], row, strict=True)) for row in cells[2:]]
+
+
+def text_of(page):
+    """A page without its breaks of lines and marks of emphasis."""
+    return re.sub(r"[*`]", "", re.sub(r"\s+", " ", (ROOT / page).read_text(encoding="utf-8")))
+
+
+@pytest.fixture(scope="module")
+def withheld():
+    return [row for row in cases("aesi bench real, archive") if row["about"] == "temperature withheld"]
+
+
+def errors(rows):
+    return [[float(row[name]) for row in rows] for name in ("declared, mV", "recalibrated", "as written")]
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_how_often_a_written_model_errs_less_than_a_refit_alone(withheld, page):
+    declared, refitted, written = errors(withheld)
+    better = sum(one < other for one, other in zip(written, refitted, strict=True))
+    said = text_of(page)
+    assert re.search(rf"(errs|err) less (than a refit alone )?(\| )?on {better}\b", said)
+    for figure in (median(written), median(refitted), median(declared)):
+        assert re.search(rf"\b{figure:.0f}\b", said)
+    if page in PAGES[2:]:
+        worse = sum(one > 1.05 * other for one, other in zip(written, refitted, strict=True))
+        than_declared = sum(one > other for one, other in zip(written, declared, strict=True))
+        assert f"by more than 5 % more on {worse}" in said
+        assert re.search(
+            rf"on {than_declared} it errs more|more than the declared model on {than_declared}", said
+        )
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_how_far_off_a_withheld_temperature_is_named(withheld, page):
+    found = [re.fullmatch(r"(\S+) \[(\S+), (\S+)\]", row["found"]) for row in withheld]
+    assert all(found)
+    sizes = [[float(size) for size in each.groups()] for each in found]
+    true = [float(row["true"]) for row in withheld]
+    off = [abs(size - there) for (size, *_), there in zip(sizes, true, strict=True)]
+    inside = sum(low <= there <= high for (_, low, high), there in zip(sizes, true, strict=True))
+    half = [(high - low) / 2 for _, low, high in sizes]
+    said = text_of(page)
+    assert re.search(
+        rf"{round(median(off), 6):.1f} K (off )?in the median(,| and) {max(off):.0f} at worst", said
+    )
+    assert re.search(
+        rf"\b{inside} within (the interval of )?\+/- {min(half):.0f} to {max(half):.0f} K \(90 %\)", said
+    )
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_how_often_a_measured_cell_by_itself_is_unknown(page):
+    rows = cases("aesi bench real") + cases("aesi bench real, archive")
+    alone = [row["verdict"] for row in rows if row["declared, mV"]]
+    beside = [row["verdict"].split(":")[0] for row in rows if not row["declared, mV"]]
+    alone += [row["verdict"] for row in cases("aesi bench left_out")]
+    assert {verdict.split(":")[0] for verdict in alone} == {"unknown"}
+    said = text_of(page)
+    assert re.search(rf"\b{len(alone)}\b", said)
+    told = re.search(r"(\d+) (?:of \d+ )?(?:are |were )?found(?:,| and) (\d+) none", said)
+    assert told
+    assert [int(told[1]), int(told[2])] == [beside.count("found"), beside.count("none")]

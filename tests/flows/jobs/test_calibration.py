@@ -1,0 +1,19 @@
+"""What `aesi calibrate` says while it fits."""
+
+from pathlib import Path
+
+import pytest
+
+from aesi.errors import DataError
+from flows.jobs import calibration
+
+
+def test_a_fit_tells_where_it_stands(monkeypatch, capsys):
+    def fitted(cell, measurements, out, request, progress):
+        progress(7, 0.034)
+        raise DataError("no further.")
+
+    monkeypatch.setattr(calibration, "calibrate_files", fitted)
+    with pytest.raises(DataError):
+        calibration.calibrate(Path("cell.json"), [], Path("new.json"))
+    assert "steps of the fit: 7 in 0 s, 3.4 % of the start's misfit left" in capsys.readouterr().err
