@@ -11,3 +11,8 @@ def resolving(value: float, low: float, high: float, least: int = 3, most: int =
         return least
     largest = max(abs(low), abs(high), abs(value))
     return min(most, max(least, 2 + floor(log10(largest)) - floor(log10(high - low))))
+
+
+def decimals(largest: float, significant: int = 3) -> int:
+    """Decimals with which numbers up to `largest` in size have so many significant digits; none for nought."""
+    return max(0, significant - 1 - floor(log10(largest))) if largest > 0.0 else 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -67,7 +68,7 @@ def export(model: Path, out: Path, to: Target = "bpx") -> Exported:
     if not found.same_window(declared.cell):
         held.append("State of charge 0 and 1 are now those of the changed electrodes.")
     if to == "bpx":
-        left += [f"{_said(effect)}: BPX has no field for it." for effect in found.left]
+        left += _unheld(found.left, declared.beside, "BPX has no field for")
         left += _beyond_bpx(found.cell)
         if found.cell.contact_resistance_ohm:
             left.append(
@@ -78,11 +79,18 @@ def export(model: Path, out: Path, to: Target = "bpx") -> Exported:
     left += _beyond_bpx(found.cell)
     more, unknown = _for_pybamm(found.cell, found.left)
     held += [f"{_said(effect)}: as an option of the model." for effect in found.left if effect not in unknown]
-    left += [f"{_said(effect)}: PyBaMM's model from BPX has no counterpart." for effect in unknown]
+    left += _unheld(unknown, declared.beside, "PyBaMM's model from BPX has no counterpart of")
     text = _bpx(found.cell)
     _keep_unnamed(out, bpx, text)
     scripts = [_write(path, _script(bpx.name, more)) for path in script]
     return Exported((*scripts, _write(bpx, text)), tuple(held), tuple(left))
+
+
+def _unheld(effects: Sequence[ActiveEffect], beside: Sequence[str], why: str) -> list[str]:
+    """A sentence for each effect that the target does not hold, and one for all that were fitted beside a finding."""
+    said = [f"{_said(effect)}: {why} it." for effect in effects if effect.id not in beside]
+    names = [effect.id for effect in effects if effect.id in beside]
+    return [*said, *([f"{', '.join(names)}, fitted beside what was found: {why} that."] if names else [])]
 
 
 def _keep_unnamed(script: Path, bpx: Path, text: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from datetime import date
 
@@ -19,20 +20,29 @@ from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Hold, Measurement, at_its_temperature
 
 SEPARATOR = ": "
+MERE_NAMES = re.compile(r"[^\s,]+(, [^\s,]+)*")
+"""What notes share: names of records, which hold no space."""
 TELLING_K = 5.0
 """K from a cell's reference temperature beyond which activation energies tell: with 20 kJ/mol rates differ by a
 sixth. A convention."""
 
 
 def together(notes: Iterable[str]) -> tuple[str, ...]:
-    """`a: text`, `b: text` as `a, b: text`, in the order of the first of them."""
+    """`a: text`, `b: text` as `a, b: text`, in the order of the first of them; what is no mere name before the colon
+    says something by itself, and stays a line of its own."""
     subjects: dict[str, list[str]] = {}
     for note in notes:
         subject, separator, text = note.partition(SEPARATOR)
-        subjects.setdefault(text if separator else "", []).append(subject if separator else note)
+        if separator and not MERE_NAMES.fullmatch(subject):
+            subjects.setdefault(note, [])
+        else:
+            subjects.setdefault(text if separator else "", []).append(subject if separator else note)
     alone = subjects.pop("", [])
     return (
-        *(f"{', '.join(dict.fromkeys(names))}{SEPARATOR}{text}" for text, names in subjects.items()),
+        *(
+            f"{', '.join(dict.fromkeys(names))}{SEPARATOR}{text}" if names else text
+            for text, names in subjects.items()
+        ),
         *alone,
     )
 

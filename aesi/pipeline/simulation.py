@@ -171,7 +171,9 @@ def predict_file(
     frame = prediction.to_frame()
     frame.insert(1, "current_a", profile.current_a)
     _write(out, frame)
-    say(reached(hybrid.cell, record, prediction.voltage_v, prediction.soc))
+    # One step ahead knows the voltage before each row, which the physics does not: its errors are no peers of these.
+    alone_v = None if hybrid.correction is None or measured else prediction.physics_v
+    say(reached(hybrid.cell, record, prediction.voltage_v, prediction.soc, alone_v))
     say(_of_first(record, prediction, hybrid, measured))
     say(_of_band(record, prediction, hybrid, measured))
     return len(frame)
@@ -221,26 +223,39 @@ def _placed(
 
 
 def _with_effects(record: Measurement, model: HybridModel) -> list[str]:
-    """A sentence on the effects that act, or that the cell holds, with their values, which may be defaults."""
-    acting = [
-        one for one in model.effects if record.temperature_degc is None or one.effect.infers != "temperature"
-    ]
-    said = [f"with {', '.join(map(repr, acting))}"] if acting else []
-    said += [f"by a cell whose values hold {', '.join(model.held)}"] if model.held else []
+    """A sentence on the effects that act, or that the cell holds, with their values, which may be defaults; of those
+    that were fitted beside what was found the names alone."""
+    acting = {
+        one.id: repr(one)
+        for one in model.effects
+        if record.temperature_degc is None or one.effect.infers != "temperature"
+    }
+    held = {words.partition("(")[0]: words for words in model.held}
+    told, inside = (
+        [words for id, words in each.items() if id not in model.beside] for each in (acting, held)
+    )
+    beside = [id for id in (acting | held) if id in model.beside]
+    said = [f"with {', '.join(told)}"] if told else []
+    said += [f"by a cell whose values hold {', '.join(inside)}"] if inside else []
+    said += [f"with what was fitted beside: {', '.join(beside)}"] if beside else []
     return [f"{record.name}: {'; '.join(said)}."] if said else []
 
 
-def reached(cell: Cell, record: Measurement, voltage_v: Array, soc: Array) -> list[str]:
+def reached(
+    cell: Cell, record: Measurement, voltage_v: Array, soc: Array, alone_v: Array | None = None
+) -> list[str]:
     """Sentences on a simulated record: where it ended, its error, and how much lies outside what the file declares.
 
-    voltage_v, soc : (n,) simulated.  A record without a voltage has no error.
+    voltage_v, soc : (n,) simulated.  alone_v : (n,) V by the physics without a correction, where there is one.
+    A record without a voltage has no error.
     """
     said = [f"{record.name}: state of charge {soc[0]:.3f} at the start, {soc[-1]:.3f} at the end."]
     if np.all(np.isfinite(record.voltage_v)):
         error = MV_PER_V * (record.voltage_v - voltage_v)
         said.append(
             f"{record.name}: against the measured voltage {rms(error):.2f} mV RMSE, "
-            f"{np.mean(error):+.2f} mV in the mean (measured minus model), at most {np.max(np.abs(error)):.1f} mV."
+            f"{np.mean(error):+.2f} mV in the mean (measured minus model), at most {np.max(np.abs(error)):.1f} mV"
+            f"{_beside_physics(record, rms(error), alone_v)}."
         )
     beyond = (soc < -GIVEN_SD) | (soc > 1.0 + GIVEN_SD)  # as closely as any is known
     low, high = voltage_v < cell.lower_voltage_v, voltage_v > cell.upper_voltage_v
@@ -261,6 +276,15 @@ def reached(cell: Cell, record: Measurement, voltage_v: Array, soc: Array) -> li
         if np.any(rows):
             said.append(f"{record.name}: {_percent(rows)} of the simulated rows have {words}.")
     return said
+
+
+def _beside_physics(record: Measurement, corrected_mv: float, alone_v: Array | None) -> str:
+    """Clause, from '; ' on, on the error of the physics without its correction, and on that being the smaller one."""
+    if alone_v is None:
+        return ""
+    alone, ours = f"{rms(MV_PER_V * (record.voltage_v - alone_v)):.2f}", f"{corrected_mv:.2f}"
+    better = ": without the correction this record is met better" if float(alone) < float(ours) else ""
+    return f"; the physics alone {alone} mV RMSE{better}"
 
 
 def _too_much(soc: Array) -> str:

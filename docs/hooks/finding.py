@@ -4,7 +4,7 @@
 
 The measured voltage, its residual as declared, recalibrated and with what was found, the name and size of that, and
 what was measured beside it: RECORD, one whose temperature the loop was not given, or TEXT in your own words. Errors
-are of the part that chose nothing, shaded here. All curves are those that the folder's report carries.
+are of the part that was kept back, shaded here. All curves are those that the folder's report carries.
 """
 
 from __future__ import annotations
@@ -144,7 +144,7 @@ def _shade(start: float, end: float) -> str:
     right, top, bottom = WIDTH - RIGHT, VOLTAGE[0], RESIDUAL[1]
     return (
         f'<rect x="{x:.1f}" y="{top}" width="{right - x:.1f}" height="{bottom - top}" fill="#f3f5f8"/>'
-        + _text(x + 6, top + 16, "chose nothing", colour=GREY)
+        + _text(x + 6, top + 16, "kept back", colour=GREY)
     )
 
 
@@ -164,7 +164,9 @@ def _panel(
     step = nice((high - low) / 3)
     panel = Panel(*place, step * np.floor(low / step), step * np.ceil(high / step), end)
     if np.nanmin(every) < panel.low or np.nanmax(every) > panel.high:
-        title += ", cut off"
+        title += (
+            f" (axis from {panel.low:g})" if np.nanmin(every) < panel.low else f" (axis to {panel.high:g})"
+        )
     out = [_level(panel, v) for v in np.arange(panel.low, panel.high + step / 2, step)]
     middle = (panel.top + panel.bottom) / 2
     out.append(

@@ -54,7 +54,9 @@ def simulate(
 def predict(
     *,
     reading: Any,
-    model: Annotated[Path, typer.Option(help="Folder of a saved model (runs/.../model).")],
+    model: Annotated[
+        Path, typer.Option("--model", "--cell", help="Folder of a saved model (runs/.../model).")
+    ],
     current: Annotated[Path, typer.Option(help="CSV with time_s, current_a[, voltage_v, temperature_degc].")],
     out: Annotated[Path, typer.Option(help="CSV to write: voltage_v, lower_v, upper_v.")],
     measured: Annotated[
@@ -257,7 +259,9 @@ def discover(
         _discover_experiment(experiment, list(overrides or []), out, prefect)
         return
     if cell is None or not data or out is None:
-        raise InputError("give --cell, --data and --out, or an experiment file.")
+        given = {"--cell": cell, "--data": data, "--out": out}
+        lacking = " and ".join(option for option, value in given.items() if not value)
+        raise InputError(f"give {lacking}{'' if any(given.values()) else ', or an experiment file'}.")
     if overrides:
         raise InputError(
             "--set changes a key of an experiment file, and none is given; use the options instead."

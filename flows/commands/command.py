@@ -11,6 +11,9 @@ from typer.core import TyperCommand
 
 from aesi.errors import InputError, wanted
 
+MEANT = {"--model": "a saved model is given with --cell"}
+"""Option that is a choice -> how the sentence on a value that is none of them goes on."""
+
 
 class Command(TyperCommand):
     """A command that raises InputError, naming the option, for a value that is none and for an option that is there
@@ -43,5 +46,6 @@ class App(typer.Typer):
 
 def _sentence(option: str, fault: dict[str, Any]) -> str:
     if fault["type"] == "value_error":  # of a choice, which holds the value
-        return f"{option}: {str(fault['ctx']['error']).rstrip('.')}."
+        meant = f"; {MEANT[option]}" if option in MEANT else ""
+        return f"{option}: {str(fault['ctx']['error']).rstrip('.')}{meant}."
     return f"{option} {fault['input']}: it {wanted(fault)}."

@@ -225,17 +225,27 @@ def _track_result(tracker: Tracker | None, found: Discovery, content: dict[str, 
 
 def _say(console: Console, content: dict[str, Any], notes: Sequence[str], out: Path, started: float) -> None:
     from aesi.pipeline.notes import together
-    from aesi.pipeline.report.words.discoveries import reason_finding, short_finding, unchanged_finding
+    from aesi.pipeline.report.words.discoveries import (
+        look_alike_finding,
+        next_finding,
+        reason_finding,
+        short_finding,
+        written_finding,
+    )
     from aesi.pipeline.report.words.moved import moved_findings
 
     console.say(short_finding(content, sure=True))
     for warning in content["warnings"]:
         console.say(f"  WARNING: {warning}")
-    console.say(f"  {reason_finding(content)}")
-    for sentence in filter(None, (unchanged_finding(content), *moved_findings(content))):
+    said = (
+        written_finding(content),
+        reason_finding(content),
+        next_finding(content),
+        look_alike_finding(content),
+        *moved_findings(content),
+    )
+    for sentence in filter(None, said):
         console.say(f"  {sentence}")
-    for group in content["indistinguishable"]:
-        console.say(f"  these data cannot tell apart: {', '.join(group)}")
     for part in ("fit", "test"):
         if content["before"].get(part):
             console.say(f"  {part}: {_errors_of(content, part)}")

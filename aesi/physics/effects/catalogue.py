@@ -43,8 +43,13 @@ class Catalogue(dict[str, Effect]):
 
 
 def no_such_effect(name: object, known: Iterable[str]) -> str:
-    """The sentence on an id that none of the known effects has."""
-    return f"there is no effect {name!r} in the catalogue{did_you_mean(str(name), known)} `aesi effects` lists them."
+    """The sentence on an id that none of the known effects has: which is spelt most like it, else which speak of it."""
+    meant = did_you_mean(str(name), known)
+    word = str(name).replace("_", " ").lower()
+    speaking = [id for id, effect in CATALOGUE.items() if word in effect.summary.lower()]
+    if meant == "." and speaking:
+        meant = f"; of that speaks {' and '.join(speaking)}."
+    return f"there is no effect {name!r} in the catalogue{meant} `aesi effects` lists them."
 
 
 CATALOGUE = Catalogue(

@@ -189,13 +189,15 @@ def found_model(found: Discovery) -> HybridModel:
     if not inside.same_window(found.cell):
         inside = folded(found.cell, ())
     left = inside.left if inside.held else found.model_effects
+    held = (*found.held, *inside.held)
     return HybridModel(
         inside.cell,
         left,
         soc0=found.soc0,
         hold=found.hold,
         model=found.choice.model,
-        held=tuple(map(repr, (*found.held, *inside.held))),
+        held=tuple(map(repr, held)),
+        beside=tuple(one.id for one in (*left, *held) if one.id not in found.written),
         finding=" ".join(found.warnings),
     )
 

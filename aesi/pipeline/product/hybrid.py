@@ -47,6 +47,7 @@ class HybridModel:
     model : of the physics, "espm" or "dfn".
     dt_s : s, the step of the correction and of the bands; records sampled otherwise are brought to it and back.
     held : effects that values of the cell hold, in words; `effects` are those that act beside it.
+    beside : ids of those of both that were fitted beside what was found, and are no finding.
     finding : what it was found to be worth on records that chose nothing, in words; '' where that is not known.
     """
 
@@ -60,6 +61,7 @@ class HybridModel:
     soc0: float | None = None
     model: ModelName = "espm"
     held: tuple[str, ...] = ()
+    beside: tuple[str, ...] = ()
     finding: str = ""
 
     def __post_init__(self) -> None:
@@ -178,7 +180,7 @@ class HybridModel:
             if part is not None:
                 parts[name] = part.to_dict()
         own = {name: getattr(self, name) for name in ("dt_s", "hold", "soc0", "model", "finding")}
-        write_model(folder, own | {"held": list(self.held)}, parts)
+        write_model(folder, own | {"held": list(self.held), "beside": list(self.beside)}, parts)
         return folder
 
     @staticmethod
@@ -204,6 +206,7 @@ class HybridModel:
                 soc0=head["soc0"],
                 model=head.get("model", "espm"),
                 held=tuple(head.get("held", ())),
+                beside=tuple(head.get("beside", ())),
                 finding=head.get("finding", ""),
                 **read,
             )

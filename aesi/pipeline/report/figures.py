@@ -20,13 +20,16 @@ if TYPE_CHECKING:
 
 ZOOM_S = 120.0
 """Length of the zoom on the prediction intervals."""
+MOST_VIOLINS = 5
+"""Models whose residuals stand side by side; those of more are too narrow to compare."""
 
 
 def paper_figures(view: RunView) -> dict[str, Figure]:
     """All figures of the paper that the view has data for.
 
     Keys: bootstrap_coverage, profile_{current,voltage}, error_map_espm_{train,valid,test},
-    error_map_{before,after}, voltage_{train,valid,test}, violin, ranking, intervals_<n>, intervals_<n>_zoom.
+    error_map_{before,after}, voltage_{train,valid,test}, violin, violin_rest, ranking, intervals_<n>,
+    intervals_<n>_zoom.
     """
     figures: dict[str, Figure | None] = {}
     if view.bootstrap is not None:
@@ -39,7 +42,7 @@ def paper_figures(view: RunView) -> dict[str, Figure]:
     for role in ROLES:
         if view.of(role):
             figures[f"voltage_{role}"] = records.voltage_figure(view.of(role), view.chosen, view.corrected)
-    figures["violin"] = violin(view)
+    figures |= violins(view)
     figures["ranking"] = ensemble.importance_figure(view.terms)
     for i, model in enumerate(predicted_models(view), start=1):
         figures[f"intervals_{i}"] = records.interval_figure(view.of("test"), model)
@@ -79,16 +82,31 @@ def before_and_after_maps(view: RunView) -> dict[str, Figure | None]:
     }
 
 
-def violin(view: RunView) -> Figure | None:
-    """Squared residuals in free run on the test records: the physics model and every hybrid."""
+def violins(view: RunView) -> dict[str, Figure]:
+    """Squared residuals in free run on the test records: of the physics and the corrections that err least, the chosen
+    model and what it corrects among them whatever they err; and of the rest, where there are more."""
     tested = view.of("test")
     if not tested:
-        return None
+        return {}
     residuals = {view.corrected: _joined(tested)[2]}
     for name in predicted_models(view):
         parts = [t.measured_v - t.predictions[name].free_run_v for t in tested if name in t.predictions]
         residuals[name] = np.concatenate(parts)
-    return maps.violin_figure(residuals, style.model_colours(list(residuals), view.corrected))
+    named = (view.chosen, view.corrected, view.physics)
+    ranked = sorted(residuals, key=lambda name: (name not in named, _rms_or_last(residuals[name])))
+    colours = {name: style.CHOSEN if " + " in name else style.PHYSICS for name in ranked}
+    colours |= {name: style.GREY for name in ranked if " + " in name and name != view.chosen}
+    shown, rest = ranked[:MOST_VIOLINS], ranked[MOST_VIOLINS:]
+    figures = {"violin": maps.violin_figure({name: residuals[name] for name in shown}, colours)}
+    if rest:
+        figures["violin_rest"] = maps.violin_figure({name: residuals[name] for name in rest}, colours)
+    return figures
+
+
+def _rms_or_last(residual_v: Array) -> float:
+    """RMS, infinite of a model that diverged."""
+    square = float(np.mean(residual_v**2))
+    return square**0.5 if np.isfinite(square) else float("inf")
 
 
 def predicted_models(view: RunView) -> list[str]:

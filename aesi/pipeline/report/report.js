@@ -22,7 +22,7 @@
 
   // Python draws with the light palette; on a dark page the hues that would sink are lifted.
   function themed(name) {
-    const swaps = { "#1f2328": "--ink", "#0072B2": "--blue", "#D55E00": "--vermillion", "#009E73": "--green" };
+    const swaps = { "#1f2328": "--ink", "#000000": "--ink", "#0072B2": "--blue", "#D55E00": "--vermillion", "#009E73": "--green" };
     let text = JSON.stringify(payload.figures[name]);
     for (const [colour, token] of Object.entries(swaps)) text = text.replaceAll(colour, variable(token));
     const figure = JSON.parse(text);

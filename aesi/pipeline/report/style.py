@@ -6,7 +6,6 @@ lighter ones on a dark background.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -16,8 +15,10 @@ INK = "#1f2328"
 BLUE, VERMILLION, GREEN = "#0072B2", "#D55E00", "#009E73"
 SKY, ORANGE, PURPLE, GREY = "#56B4E9", "#E69F00", "#CC79A7", "#8c8c8c"
 
-MEASURED, PHYSICS = INK, VERMILLION
+MEASURED, PHYSICS, CHOSEN, INTERVAL = "#000000", VERMILLION, BLUE, SKY
 MODEL_COLOURS = (BLUE, GREEN, PURPLE, ORANGE, SKY)
+MEASURED_WIDTH = 1.6
+"""Of the line of what was measured, px: that of a model is thinner."""
 STATE_COLOURS = {"before": VERMILLION, "recalibrated": ORANGE, "after": BLUE}
 KIND_COLOURS = {"physics": BLUE, "parameter": GREEN, "instrument": ORANGE}
 KIND_SYMBOLS = {"physics": "circle", "parameter": "diamond", "instrument": "square"}
@@ -47,13 +48,6 @@ def framed(fig: Figure, title: str, caption: str, height: int = 380, **layout: A
     fig.update_xaxes(automargin=True, title_standoff=8)
     fig.update_yaxes(automargin=True, title_standoff=8)
     return fig
-
-
-def model_colours(names: Sequence[str], physics: str) -> dict[str, str]:
-    """One colour a model, the physics model always the same."""
-    others = [name for name in names if name != physics]
-    colours = {name: MODEL_COLOURS[i % len(MODEL_COLOURS)] for i, name in enumerate(others)}
-    return {physics: PHYSICS, **colours}
 
 
 def translucent(colour: str, alpha: float = 0.22) -> str:

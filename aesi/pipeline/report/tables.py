@@ -8,8 +8,8 @@ beyond the published schema a row may carry
     one_step   {train,valid,test}_rmse_mv, persistence_rmse_mv (test)
     k_step     {"1": mV, "10": mV, ...}: test RMSE by horizon in seconds; likewise k_step_persistence
     intervals  nominal_pct, coverage_pct, average_width_v, winkler_v, worst_bin_coverage_pct (one step ahead)
-    free_run_intervals   the same keys, in free run; with inside_coverage_pct, and pieces and
-                         worst_piece_coverage_pct of the calibration
+    free_run_intervals   the same keys, in free run; with inside_coverage_pct, pieces and worst_piece_coverage_pct of
+                         the calibration, and start_v, what a standard deviation of an uncertain start is worth
     bands_by_horizon     {"1": the same keys, ...}, by the time since the last measurement in seconds
     test_records         {record: rmse_mv, mser_pct, outside_pct, kept_pct, mean_degc, beyond_k; where a simulation ran
                          out ran_out_s, until_ran_out_mv}, in free run
@@ -40,7 +40,7 @@ def free_run_table(models: Sequence[Row]) -> Table:
     columns: list[Column] = [
         ("MSER train, %", lambda row: _number(row, "free_run.train_mser_pct", 2)),
         ("MSER valid, %", lambda row: _number(row, "free_run.valid_mser_pct", 2)),
-        ("MSER, drives that chose nothing, %", lambda row: _number(row, "validation_mser_pct", 2)),
+        ("MSER, training drives left out in turn, %", lambda row: _number(row, "validation_mser_pct", 2)),
         ("MSER test, %", _test_mser),
         ("against recalibrated, %", lambda row: _ranged(row, "free_run", "test_mser_recalibrated_pct")),
         ("RMSE test, mV", lambda row: _number(row, "free_run.test_rmse_mv", 2)),
@@ -54,7 +54,7 @@ def free_run_table(models: Sequence[Row]) -> Table:
         "is used after the first sample. Time: of fit and evaluation."
     )
     if any(row.get("validation_mser_pct") is not None for row in models):
-        caption += " Drives that chose nothing: each training drive by physics and a model that never saw it."
+        caption += " Training drives left out in turn: each of them by physics and a model that never saw it."
     return _table("mser", caption + _brackets(models), columns, models)
 
 

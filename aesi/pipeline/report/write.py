@@ -44,11 +44,12 @@ def write_run_report(path: str | Path, view: RunView) -> Path:
         chosen=chosen,
         physics=physics,
         corrected=corrected,
+        own_share=runs.own_share(view),
         finding=runs.run_finding(view),
         sentences=[
             sentence
             for sentence in (
-                runs.corrected_finding(view),
+                runs.refit_finding(view),
                 runs.constant_finding(view),
                 runs.others_finding(view),
                 runs.persistence_finding(chosen),
@@ -74,25 +75,25 @@ def write_discovery_report(path: str | Path, view: DiscoveryView) -> Path:
         view=view,
         discovery=view.discovery,
         states=discoveries.states_of(view.discovery),
-        written=discoveries.written_model(view.discovery),
+        written=discoveries.discovery_consequence(view),
         finding=discoveries.discovery_finding(view),
         sentences=[
             sentence
             for sentence in (
-                discoveries.look_alike_finding(view),
-                discoveries.discovery_consequence(view),
-                discoveries.unchanged_finding(view.discovery),
-                *moved_findings(view.discovery),
                 discoveries.reason_finding(view.discovery),
+                discoveries.next_finding(view.discovery, view.titles),
+                discoveries.look_alike_finding(view.discovery, view.titles),
+                *moved_findings(view.discovery),
                 discoveries.span_finding(view),
             )
             if sentence
         ],
         rest=discoveries.rest_finding(view.discovery),
+        look_alikes=discoveries.look_alikes_told(view.discovery, view.titles),
         closest=discoveries.closest_finding(view),
         moved=_moved_rows(view.discovery),
         candidates=[
-            row | {"title": hypotheses.hypothesis_title(row, view.titles)}
+            row | {"title": discoveries.hypothesis_title(row, view.titles)}
             for row in sorted(view.discovery["candidates"], key=lambda row: -row["score"])
         ],
     )
@@ -131,22 +132,17 @@ def discovery_figures(view: DiscoveryView) -> dict[str, Figure]:
 
 
 def _over_the_range(traces: Sequence[DiscoveryTrace], states: Mapping[str, str]) -> dict[str, Figure]:
-    """Residual against current and SOC, and maps over both, at the first and the last of the states."""
-    first, *_, last = states
-    ends = (first, last)
+    """Residual against current and SOC, and maps over both, at each of the states."""
     current = np.concatenate([t.current_a for t in traces])
     soc = np.concatenate([t.soc for t in traces])
     errors = {
-        state: np.concatenate([t.measured_v - getattr(t, f"{state}_v") for t in traces]) for state in ends
+        state: np.concatenate([t.measured_v - getattr(t, f"{state}_v") for t in traces]) for state in states
     }
     limit = maps.shared_limit(current, soc, list(errors.values()), False)
     return {
         "against_current": maps.dependence_figure(current, errors, states, "current, A (discharge > 0)"),
         "against_soc": maps.dependence_figure(100 * soc, errors, states, "SOC, %"),
-        "map_before": maps.map_figure(
-            current, soc, errors[ends[0]], f"Mean error, {states[ends[0]]}", False, limit
-        ),
-        "map_after": maps.map_figure(
-            current, soc, errors[ends[1]], f"Mean error, {states[ends[1]]}", False, limit
-        ),
+    } | {
+        f"map_{state}": maps.map_figure(current, soc, errors[state], f"Mean error, {words}", False, limit)
+        for state, words in states.items()
     }

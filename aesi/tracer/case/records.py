@@ -14,6 +14,7 @@ import numpy as np
 
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
+from aesi.over_time import stamp
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.initial_state import InitialState, initial_state
@@ -241,8 +242,10 @@ def prepare_test(
         return prepare(cell, data, soc0, 0.0, given=given, shared=True)
     index, whole = led
     prepared = prepare(cell, whole, soc0, 0.0, given=given, shared=True)
-    leads = "begins with" if whole is data else "continues"
-    said = f"{data.name} {leads} {seen[index].name}: the model runs through that first, and what comes after is judged."
+    said = (
+        f"{data.name} is judged from {stamp(float(whole.time_s[len(seen[index])]))} s on, after the rows of "
+        f"{seen[index].name} that were fitted; the model is run from {stamp(float(whole.time_s[0]))} s to get there."
+    )
     notes = (said, *(note for note in prepared.notes if note != prepared.start.sentence))
     return replace(prepared, lead_rows=len(seen[index]), continues=index, notes=notes)
 

@@ -182,8 +182,10 @@ def _chosen(
 def _likelier(answer: Answer) -> str:
     """Why the single particle is believed where both models were searched."""
     if answer.verdict.word == "unknown":  # and so is that of the porous electrode, else it would be believed
-        return ", which says as much with fewer or more usual effects, though neither model explains the data"
-    return ", which explains the data with fewer or more usual effects"
+        return (
+            ", because it says as much with fewer or likelier names, though neither model explains the data"
+        )
+    return ", because it explains these data with fewer or likelier names"
 
 
 def _notable(reduction: Reduction | None) -> TypeGuard[Reduction]:

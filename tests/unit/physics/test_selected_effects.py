@@ -36,5 +36,9 @@ def test_a_name_that_the_catalogue_does_not_have_is_told_as_a_sentence():
         "`aesi effects` lists them."
     )
     assert isinstance(caught.value, KeyError)
+    with pytest.raises(EffectError, match=r"; of that speaks series_resistance\. `aesi effects` lists them"):
+        CATALOGUE["contact"]
+    with pytest.raises(EffectError, match=r"'gremlins' in the catalogue\. `aesi effects` lists them"):
+        CATALOGUE["gremlins"]
     assert CATALOGUE.get("serie_resistance") is None
     assert "serie_resistance" not in CATALOGUE

@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from aesi.pipeline.report import style
 from aesi.pipeline.report.figures import before_and_after_maps, paper_figures
 from aesi.pipeline.report.plots import ensemble, hypotheses, maps, records, timeline
 from aesi.pipeline.report.views import BootstrapView
+from aesi.pipeline.report.write import discovery_figures
 
 
 def test_every_figure_of_the_paper_is_there(views):
@@ -237,7 +239,75 @@ def test_a_kind_nobody_foresaw_is_still_shown():
 def test_violin_medians_are_those_of_the_squared_residual():
     residual = np.random.default_rng(0).standard_normal(20_001) * 1e-3
     fig = maps.violin_figure({"m": residual}, {"m": "#0072B2"})
-    assert 10 ** np.median(fig.data[0].y) == pytest.approx(np.median((1e3 * residual) ** 2), rel=1e-6)
+    assert 10 ** np.median(fig.data[0].x) == pytest.approx(np.median((1e3 * residual) ** 2), rel=1e-6)
+
+
+def test_the_models_that_err_least_stand_side_by_side_and_the_rest_apart(views):
+    """Of twelve models names were clipped, colours came again, and the order said nothing."""
+    view = views.run_view(300)
+    given = view.traces[-1].predictions["ESPM + AESI I"]
+    shares = {"ESPM + AESI I": 0.75, "ESPM + a": 0.9, "ESPM + b": 0.8, "ESPM + c": 0.2, "ESPM + d": 0.5}
+
+    def with_all(trace):
+        made = {
+            name: replace(given, free_run_v=trace.physics_v + share * (trace.measured_v - trace.physics_v))
+            for name, share in shares.items()
+        }
+        return replace(trace, predictions=made)
+
+    figures = paper_figures(replace(view, traces=tuple(map(with_all, view.traces))))
+    names = [violin.name for violin in figures["violin"].data]  # from the lowest up
+    assert names == ["ESPM", "ESPM + d", "ESPM + AESI I", "ESPM + b", "ESPM + a"]
+    assert [violin.name for violin in figures["violin_rest"].data] == ["ESPM + c"]
+    colours = [violin.line.color for violin in figures["violin"].data]
+    assert colours == [style.PHYSICS, style.GREY, style.CHOSEN, style.GREY, style.GREY]
+
+
+def test_a_wide_band_flattened_the_errors(views):
+    trace = views.trace("t", "test", 500, np.random.default_rng(0))
+    given = trace.predictions["ESPM + AESI I"]
+    for half_v, cut in ((0.2, True), (1e-3, False)):
+        wide = replace(
+            given, free_run_lower_v=given.free_run_v - half_v, free_run_upper_v=given.free_run_v + half_v
+        )
+        fig = records.voltage_figure(
+            [replace(trace, predictions={"ESPM + AESI I": wide})], "ESPM + AESI I", "ESPM"
+        )
+        assert (fig.layout.yaxis2.range is not None) == cut
+        assert ("the band goes on beyond it" in fig.layout.meta["caption"]) == cut
+        if cut:
+            error = 1e3 * (trace.measured_v - trace.physics_v)
+            assert fig.layout.yaxis2.range[0] <= error.min() < error.max() <= fig.layout.yaxis2.range[1]
+            assert fig.layout.yaxis2.range[1] < 50.0
+
+
+def test_the_refit_was_left_out_of_the_residuals_beside_a_finding(views):
+    figures = discovery_figures(views.discovery_view(400))
+    for name in ("against_current", "against_soc"):
+        assert {"as declared", "recalibrated", "with the finding added"} <= {
+            t.name for t in figures[name].data
+        }
+    assert {"map_before", "map_recalibrated", "map_after"} <= set(figures)
+    without = discovery_figures(views.discovery_view(400, verdict="none"))
+    assert {name for name in without if name.startswith("map_")} == {"map_before", "map_recalibrated"}
+
+
+def test_what_was_measured_is_a_wider_black_line(views):
+    view = views.discovery_view(200)
+    fig = records.residual_figure(view.of("test"), {"before": "as declared", "after": "as written"})
+    widths = {t.name: (t.line.color, t.line.width) for t in fig.data}
+    assert widths["measured"][0] == "#000000"
+    assert widths["measured"][1] > widths["as written"][1]
+
+
+def test_a_prediction_outside_its_own_interval_is_explained(views):
+    trace = views.trace("t", "test", 500, np.random.default_rng(0))
+    fig = records.interval_figure([trace], "ESPM + AESI I")
+    assert "the middle of the interval is the better estimate" in fig.layout.meta["caption"]
+    colours = {
+        name: {t.line.color for t in fig.data if t.name == name} for name in ("interval", "predicted error")
+    }
+    assert not colours["interval"] & colours["predicted error"]
 
 
 def test_a_model_that_runs_empty_does_not_flatten_the_measured_voltage(views):

@@ -184,6 +184,18 @@ def test_bands_of_a_free_run_cover(evaluation):
     assert bands["average_width_v"] < 0.05
 
 
+def test_what_an_uncertain_start_is_worth_stands_beside_the_width_of_the_band(record):
+    loaded, _, models = fitted(record)
+    judged = next(one for one in models if one.bands is not None)
+    for worth_v in (None, 2e-3):
+        tests = tuple(
+            replace(one, start_v=None if worth_v is None else np.full(len(one), worth_v))
+            for one in loaded.split.test
+        )
+        (figures,) = evaluate_models([judged], replace(loaded.split, test=tests)).rows
+        assert figures["free_run_intervals"].get("start_v") == pytest.approx(worth_v)
+
+
 def test_bands_are_judged_at_every_horizon(evaluation):
     found = row(evaluation, "AESI I")
     assert list(found["bands_by_horizon"]) == ["1", "10", "60"]

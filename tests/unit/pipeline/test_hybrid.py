@@ -16,6 +16,7 @@ from aesi.physics.effects import CATALOGUE, activated
 from aesi.physics.folded import folded
 from aesi.pipeline.discovery.cases import case_of_files
 from aesi.pipeline.experiment.load import load
+from aesi.pipeline.export import export
 from aesi.pipeline.product.error_series import error_series
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.product.model_folder import SCHEMA
@@ -552,6 +553,29 @@ def test_what_a_discovery_had_written_into_the_cell_was_simulated_without_a_word
     assert "changed by series_resistance(resistance_ohm=0.002)" in repr(HybridModel.load(tmp_path / "found"))
 
 
+def test_what_was_fitted_beside_a_finding_was_told_with_its_values_as_if_found(model, record, tmp_path):
+    """`voltage_sensor_offset(offset_v=-6.574e-05)` stood first, before 8 mohm of contacts."""
+    offset = CATALOGUE["voltage_sensor_offset"].activate(offset_v=-6.6e-5)
+    held = ("series_resistance(resistance_ohm=0.008)", "solid_diffusivity(negative_factor=1.01)")
+    beside = ("voltage_sensor_offset", "solid_diffusivity")
+    found = HybridModel(model.cell, (offset,), held=held, beside=beside)
+    said: list[str] = []
+    simulate_file(found.save(tmp_path / "found"), record, tmp_path / "o.csv", say_notes=said.extend)
+    assert any(
+        note.endswith(
+            ": by a cell whose values hold series_resistance(resistance_ohm=0.008); with what was fitted beside: "
+            "voltage_sensor_offset, solid_diffusivity."
+        )
+        for note in said
+    )
+    lost = export(tmp_path / "found", tmp_path / "o.json").left
+    assert lost == ("voltage_sensor_offset, fitted beside what was found: BPX has no field for that.",)
+    alone = HybridModel(model.cell, (offset,)).save(tmp_path / "alone")
+    assert export(alone, tmp_path / "o.json").left == (
+        "voltage_sensor_offset (offset_v -6.6e-05 V): BPX has no field for it.",
+    )
+
+
 def test_what_a_model_was_found_to_be_worth_was_told_by_its_report_alone(model, record, tmp_path):
     found = replace(model, finding="it does not help; use the ESPM alone.")
     for use in (predict_file, simulate_file):
@@ -565,6 +589,30 @@ def test_round_off_at_a_full_charge_was_told_as_rows_beyond_it(model, data):
     for above, said in ((1e-12, False), (0.01, True)):
         told = reached(model.cell, data, voltage, np.linspace(1.0 + above, 0.9, len(data)))
         assert any("a state of charge outside 0 to 1" in note for note in told) == said
+
+
+def test_a_correction_that_harms_a_record_was_told_by_its_csv_alone(model, data):
+    soc = np.linspace(0.9, 0.5, len(data))
+    near, far = (data.voltage_v + sign * 1e-3 * size for sign, size in ((1, 2.0), (-1, 3.0)))
+    for ours, alone, end in (
+        (near, far, "at most 2.0 mV; the physics alone 3.00 mV RMSE."),
+        (
+            far,
+            near,
+            "at most 3.0 mV; the physics alone 2.00 mV RMSE: without the correction this record is met better.",
+        ),
+        (near, near, "at most 2.0 mV; the physics alone 2.00 mV RMSE."),
+        (near, None, "at most 2.0 mV."),
+    ):
+        assert reached(model.cell, data, ours, soc, alone)[1].endswith(end)
+
+
+def test_a_prediction_is_told_beside_the_physics_alone_where_the_two_know_the_same(model, record, tmp_path):
+    folder = model.save(tmp_path / "model")
+    for measured in (False, True):
+        said: list[str] = []
+        predict_file(folder, record, tmp_path / "o.csv", measured=measured, say_notes=said.extend)
+        assert any("; the physics alone " in note for note in said) != measured
 
 
 def test_a_voltage_of_no_cell_was_told_without_when_it_left_the_limits(model, data):

@@ -35,6 +35,11 @@ def test_records_with_the_same_note_share_it():
     assert together(notes) == ("a, b: resampled to 1 s", "b: 3 rows dropped: no voltage")
 
 
+def test_records_that_start_full_were_told_in_one_sentence_that_ran_on():
+    starts = [f"{name} rests at {v:.3f} V: a full charge." for name, v in (("C20", 4.194), ("1C", 4.193))]
+    assert together([*starts, starts[0], "a, b: x", "c: x"]) == (*starts, "a, b, c: x")
+
+
 def test_a_note_about_nothing_in_particular_stays_as_it_is():
     assert together(["The data could not be had.", "a: x"]) == ("a: x", "The data could not be had.")
     assert together([]) == ()

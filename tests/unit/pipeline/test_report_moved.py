@@ -31,7 +31,7 @@ def test_what_moved_is_named_with_how_far_and_what_ended_on_its_limit_is_said_so
     )
     assert text == (
         "Recalibrating moves solid diffusivity (negative) to 0.18 times declared (4.0 standard deviations of its "
-        "tolerance). At the end of what it may be: solid diffusivity (negative). That value is the limit's, not the "
+        "tolerance). Solid diffusivity (negative) stopped at its limit, so that its value is the limit's, not the "
         "data's."
     )
 
@@ -39,6 +39,18 @@ def test_what_moved_is_named_with_how_far_and_what_ended_on_its_limit_is_said_so
 def test_a_factor_that_moved_by_a_little_is_not_called_once_what_was_declared():
     moved = row("conductivity_factor", 1.04, 1.4, effect="electrolyte_transport")
     assert moved_summary([moved]) == "electrolyte transport (conductivity) 1.04 times declared"
+
+
+def test_what_was_put_on_top_of_the_file_was_told_as_all_of_it():
+    """`series resistance to 4.1 mohm` was of a file that declares contacts of its own."""
+    added = row("resistance_ohm", 4.1e-3, 1.2, True, "series_resistance") | {"declared": 0.0, "unit": "ohm"}
+    lower = row("a2_v", -5.6e-3, -1.3, True, "ocp_shape") | {"declared": 0.0, "unit": "V"}
+    (text,) = moved_findings(REFIT | {"effects": [], "own_parameters": {"recalibrated": [lower, added]}})
+    assert text == (
+        "Recalibrating moves ocp shape (a2) by -5.6 mV (1.3 standard deviations of its tolerance); series resistance "
+        "by +4.1 mohm (1.2 standard deviations of its tolerance). Ocp shape (a2) and series resistance stopped at "
+        "their limits, so that their values are the limits', not the data's."
+    )
 
 
 def test_with_a_finding_the_fit_beside_it_is_told_too():
@@ -113,8 +125,8 @@ def colder(written_k):
 def test_a_written_model_with_what_was_found_at_another_size_is_told_as_such():
     """The cold drive of a Panasonic: the finding was 11.8 degC, the model beside it ran at 13.3 degC."""
     assert moved_findings(colder(-11.7)) == [
-        "The model that is written was fitted with the declared parameters open, by which it carries over better, and "
-        "so has what was found at another size: ambient temperature 13.3 degC instead of 11.8 degC."
+        "Two fits, two sizes: the finding, with the file's parameters as declared, is ambient temperature 11.8 degC; "
+        "model/, with them refitted as well, has ambient temperature 13.3 degC."
     ]
     assert moved_findings(colder(-13.21)) == []  # the same as it is shown
     assert moved_findings(colder(-11.7) | {"written_parameters": {}}) == []  # something else is written
@@ -141,5 +153,6 @@ def test_another_size_is_told_in_the_units_of_the_finding():
     }
     (text,) = moved_findings(discovery)
     assert text.endswith(
-        "lithium inventory loss 9.0 % instead of 5.0 %; series resistance 6.00 mohm instead of 8.00 mohm."
+        "is lithium inventory loss 5.0 % and series resistance 8.00 mohm; model/, with them refitted as well, has "
+        "lithium inventory loss 9.0 % and series resistance 6.00 mohm."
     )

@@ -160,12 +160,12 @@ def test_a_continuation_was_said_to_start_at_the_first_row_of_what_it_continues(
     time = np.arange(900.0)
     whole = measured(cell, time, np.full(900, 5.0))
     seen = replace(whole.between(0, 600), name="first")
-    for test, leads in (
-        (replace(whole, name="all"), "all begins with first"),
-        (replace(whole.between(600, 900), name="rest"), "rest continues first"),
-    ):
+    for test in (replace(whole, name="all"), replace(whole.between(600, 900), name="rest")):
         told = prepare_test(cell, test, [seen], None).notes
-        assert told[0] == f"{leads}: the model runs through that first, and what comes after is judged."
+        assert told[0] == (
+            f"{test.name} is judged from 600 s on, after the rows of first that were fitted; the model is run from 0 s "
+            "to get there."
+        )
         assert not any("starts under" in note for note in told)
     alone = prepare_test(cell, replace(whole, name="all"), [], None).notes
     assert any("all starts under 5 A" in note for note in alone)

@@ -176,7 +176,7 @@ def _free_run_intervals(
         return {}
     residuals = [r.series.error_v - r.free.error_v for r in test]
     bands = [r.bands for r in test]
-    whole = _interval_figures(test, bands, residuals, one.bands.alpha)
+    whole = _interval_figures(test, bands, residuals, one.bands.alpha) | _start_figures(test)
     return {
         "free_run_intervals": whole | _inside_coverage(bands, residuals) | _left_out(one.bands.horizons[-1]),
         "bands_by_horizon": {
@@ -185,6 +185,14 @@ def _free_run_intervals(
             if band.horizon_s in ahead
         },
     }
+
+
+def _start_figures(test: Sequence[_Judged]) -> dict[str, float]:
+    """What a standard deviation of the states of charge that the records start from is worth, V RMS; nothing where all
+    of them are known."""
+    worth = [np.zeros(len(r.series)) if r.series.start_v is None else r.series.start_v for r in test]
+    start_v = rms(_joined(worth))
+    return {"start_v": start_v} if start_v > 0.0 else {}
 
 
 def _record_figures(one: Fitted, record: _Judged) -> dict[str, float | None]:

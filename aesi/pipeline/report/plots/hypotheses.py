@@ -9,6 +9,7 @@ import numpy as np
 
 from aesi.pipeline.report import style
 from aesi.pipeline.report.views import KIND_ORDER, Row
+from aesi.pipeline.report.words.discoveries import hypothesis_title
 from aesi.tracer.search.plausible import ALIKE_NATS
 
 if TYPE_CHECKING:
@@ -26,8 +27,9 @@ def ranking_figure(candidates: Sequence[Row], titles: Mapping[str, str], chosen:
     best = max(rows[0]["score"], 0.0)
     caption = (
         "How much less each hypothesis says of data that it has not seen than the one that says most, in nats: 2.3 "
-        f"are odds of ten to one. In the shaded part, up to {ALIKE_NATS:g}, two say the same, and what needs less to "
-        "say it is believed. What stands beside another effect shares the score of both."
+        f"are odds of ten to one. In the shaded part, up to {ALIKE_NATS:g}, two say the same. A further name is added "
+        "only where it says more than chance would at its step, so that a hypothesis of more names may lie ahead of "
+        "the star. What stands beside another effect shares the score of both."
     )
     fig = style.figure("Hypotheses, behind the best", caption, max(240, 130 + 20 * (len(rows) + 1)))
     behind = {_label(row, titles, chosen): best - row["score"] for row in rows} | {DECLARED: best}
@@ -114,15 +116,6 @@ def dependence_bars(rows: Sequence[Row], labels: Mapping[str, str]) -> Figure:
     fig.update_xaxes(title_text="variance explained, %", range=[0, 100])
     fig.update_layout(legend={"traceorder": "reversed"})
     return fig
-
-
-def hypothesis_title(row: Row, titles: Mapping[str, str]) -> str:
-    """An effect as it did best: by itself, or beside the others of its hypothesis, whose score it shares."""
-    name, *others = (
-        titles.get(effect, effect.replace("_", " "))
-        for effect in dict.fromkeys((row["effect"], *row.get("hypothesis", ())))
-    )
-    return f"{name}, beside {' and '.join(others)}" if others else name
 
 
 def _label(row: Row, titles: Mapping[str, str], chosen: Sequence[str]) -> str:

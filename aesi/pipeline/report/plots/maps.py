@@ -91,18 +91,24 @@ def dependence_figure(
 
 
 def violin_figure(residuals_v: Mapping[str, Array], colours: Mapping[str, str]) -> Figure:
-    """Distribution of squared residuals in free run, one violin a model, on a logarithmic axis."""
+    """Distribution of squared residuals in free run, one violin a model on a logarithmic axis, the one that errs least
+    on top."""
     caption = (
-        "Squared residuals of the voltage in free run on the test records, logarithmic axis; the box "
-        f"spans the quartiles. Drawn from {QUANTILES} quantiles of all samples."
+        "Squared residuals of the voltage in free run on the test records, logarithmic axis, the model of the least "
+        f"RMSE on top; the box spans the quartiles. Drawn from {QUANTILES} quantiles of all samples."
     )
-    fig = style.figure("Squared residuals by model", caption, 380, showlegend=False)
-    for name, residual in residuals_v.items():
-        square = np.maximum((residual * MV_PER_V) ** 2, SMALLEST_SQUARE_MV2)
+    squares = {
+        name: np.maximum((residual * MV_PER_V) ** 2, SMALLEST_SQUARE_MV2)
+        for name, residual in residuals_v.items()
+    }
+    fig = style.figure("Squared residuals by model", caption, 110 + 62 * len(squares), showlegend=False)
+    for name in sorted(squares, key=lambda one: float(np.mean(squares[one])), reverse=True):
+        square = squares[name]
         exponents = np.log10(np.quantile(square[np.isfinite(square)], np.linspace(0, 1, QUANTILES)))
         fig.add_violin(
-            y=exponents,
+            x=exponents,
             name=name,
+            orientation="h",
             box={"visible": True},
             meanline={"visible": False},
             points=False,
@@ -112,7 +118,7 @@ def violin_figure(residuals_v: Mapping[str, Array], colours: Mapping[str, str]) 
             spanmode="hard",
         )
     powers = list(range(-6, 8, 2))
-    fig.update_yaxes(
+    fig.update_xaxes(
         title_text="squared residual, mV²", tickvals=powers, ticktext=[f"10<sup>{p}</sup>" for p in powers]
     )
     return fig

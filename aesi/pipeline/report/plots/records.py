@@ -25,8 +25,8 @@ from aesi.pipeline.report.views import DiscoveryTrace, RecordTrace
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
-BESIDE_MEASURED = 0.1
-"""Room above and below the measured voltage on its axis, as a share of its span."""
+BESIDE_SERIES = 0.1
+"""Room above and below the series that an axis is made for, as a share of their span."""
 ROLE_NAMES = {"train": "I training", "valid": "II validation", "test": "III test"}
 
 
@@ -70,7 +70,9 @@ def voltage_figure(traces: Sequence[RecordTrace], chosen: str, physics: str) -> 
                 band(fig, item.x, low, high, f"band of {chosen}", style.BLUE, 2, first)
             line(fig, item.x, prediction.free_run_v, chosen, style.BLUE, first=first)
             line(fig, item.x, _error(trace, prediction.free_run_v), chosen, style.BLUE, 2, first=False)
-        line(fig, item.x, trace.measured_v, "measured", style.MEASURED, first=first, width=1.0)
+        line(
+            fig, item.x, trace.measured_v, "measured", style.MEASURED, first=first, width=style.MEASURED_WIDTH
+        )
     mark_outside(fig, placed, chosen)
     mark_records(fig, placed)
     fig.update_yaxes(title_text="voltage, V", row=1)
@@ -83,6 +85,14 @@ def voltage_figure(traces: Sequence[RecordTrace], chosen: str, physics: str) -> 
     )
     if any(trace.name.startswith("band") for trace in fig.data):
         caption += " The measurement lies inside the band where the band contains zero."
+        least, most = _roomy([t.y for t in fig.data if t.yaxis == "y2" and not t.name.startswith("band")])
+        if any(
+            np.nanmin(t.y) < least or np.nanmax(t.y) > most for t in fig.data if t.name.startswith("band")
+        ):
+            fig.update_yaxes(range=(least, most), row=2)
+            caption += (
+                " The axis spans the errors, and the band goes on beyond it: a double click shows all of it."
+            )
     return style.framed(
         fig, f"Voltage on the {_role_word(role)} records", caption, 560, hovermode="x unified"
     )
@@ -99,13 +109,13 @@ def residual_figure(traces: Sequence[DiscoveryTrace], labels: Mapping[str, str])
         for state in first_and_last:
             voltage = getattr(trace, f"{state}_v")
             line(fig, item.x, voltage, labels[state], style.STATE_COLOURS[state], 1, first=False)
-        line(fig, item.x, trace.measured_v, "measured", style.MEASURED, 1, i == 0, 1.0)
+        line(fig, item.x, trace.measured_v, "measured", style.MEASURED, 1, i == 0, style.MEASURED_WIDTH)
         line(fig, item.x, trace.current_a, "current", style.GREY, 2, i == 0, 1.0)
         for state, label in labels.items():
             error = (trace.measured_v - getattr(trace, f"{state}_v")) * MV_PER_V
             line(fig, item.x, error, label, style.STATE_COLOURS[state], 3, i == 0)
     mark_records(fig, placed)
-    low, high = _measured_range(traces)
+    low, high = _roomy([t.measured_v for t in traces])
     fig.update_yaxes(title_text="voltage, V", row=1)
     fig.update_yaxes(title_text="current, A", row=2)
     fig.update_yaxes(title_text="residual, mV", zeroline=True, row=3)
@@ -124,11 +134,11 @@ def residual_figure(traces: Sequence[DiscoveryTrace], labels: Mapping[str, str])
     )
 
 
-def _measured_range(traces: Sequence[DiscoveryTrace]) -> tuple[float, float]:
-    """(low, high), V, of an axis on which a simulation that runs empty does not flatten what was measured."""
-    low = min(float(np.nanmin(t.measured_v)) for t in traces)
-    high = max(float(np.nanmax(t.measured_v)) for t in traces)
-    room = BESIDE_MEASURED * (high - low)
+def _roomy(series: Sequence[Array]) -> tuple[float, float]:
+    """(low, high) of an axis that spans these series, with some room; what else is drawn does not flatten them."""
+    low = min(float(np.nanmin(y)) for y in series)
+    high = max(float(np.nanmax(y)) for y in series)
+    room = BESIDE_SERIES * (high - low)
     return low - room, high + room
 
 
@@ -151,7 +161,8 @@ def interval_figure(traces: Sequence[RecordTrace], model: str, zoom_s: float | N
     caption = (
         "Regime: one step ahead, the measured voltage of the step before is given. Test records. Top: "
         "measured error of the physics model, its prediction and interval. Bottom: the same with the "
-        "prediction taken off."
+        "prediction taken off. An interval follows the errors of the rows before it, so that the prediction may lie "
+        "outside: the middle of the interval is the better estimate there."
     )
     if zoom_s is not None:
         title += ", zoom"
@@ -166,11 +177,11 @@ def _add_interval(fig: Figure, item: Placed, model: str, first: bool) -> None:
     edges = (prediction.one_step_lower_v, prediction.one_step_upper_v)
     low, high, centre = (_estimate(trace, v) for v in (*edges, prediction.one_step_v))
     error = _error(trace, trace.physics_v)
-    band(fig, item.x, low, high, "interval", style.BLUE, first=first)
+    band(fig, item.x, low, high, "interval", style.INTERVAL, first=first)
     line(fig, item.x, error, "measured error", style.MEASURED, first=first, width=1.0)
     line(fig, item.x, centre, "predicted error", style.BLUE, first=first)
     line(fig, item.x, error - centre, "measured error", style.MEASURED, 2, False, 0.8)
-    band(fig, item.x, low - centre, high - centre, "interval", style.BLUE, 2, False, edge=1.2)
+    band(fig, item.x, low - centre, high - centre, "interval", style.INTERVAL, 2, False, edge=1.2)
 
 
 def _error(trace: RecordTrace, model_v: Array) -> Array:

@@ -7,11 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from aesi.constants import SECONDS_PER_HOUR
+from aesi.constants import MV_PER_V, SECONDS_PER_HOUR
 from aesi.numerics.typing import Array
-from aesi.pipeline.report.views import DiscoveryView
+from aesi.pipeline.digits import decimals
+from aesi.pipeline.report.views import DiscoveryView, Row
 from aesi.pipeline.report.words.sizes import finding_line, refit_does_as_well, unexplained_by, with_size
 from aesi.tracer.decide.written import AS_GOOD
+from aesi.tracer.likelihood.model_error import MEASURED_V
 
 LARGE_SHARE = 0.5
 """Share of the remaining error from which on a sentence says that a sparse correction could still explain more. A
@@ -21,10 +23,10 @@ CERTAIN = 0.99
 
 
 def discovery_finding(view: DiscoveryView) -> str:
-    """The verdict as one sentence; missing physics, wrong parameters and instrument faults are named as such, and so is
-    what speaks against it: a temperature that a record contradicts, a test part that does, and a written model that
-    does worse than another."""
-    return "; ".join([_verdict(view)[:-1], *_against(view.discovery)]) + "."
+    """The verdict, with missing physics, wrong parameters and instrument faults named as such, and what speaks against
+    it: a temperature that a record contradicts, a test part that does, a written model that does worse than another. By
+    how much it does, the sentences below say."""
+    return " ".join([_verdict(view), *(f"{raised(one)}." for one in _against(view.discovery))])
 
 
 def short_finding(discovery: Mapping[str, Any], sure: bool = False) -> str:
@@ -41,58 +43,58 @@ def _against(discovery: Mapping[str, Any]) -> list[str]:
     said = (
         f"the voltage of {listed(records)} contradicts its temperature" if records else "",
         "the test part contradicts it" if discovery.get("contradicted") else "",
-        _worse_on_test(discovery),
-        _worse_on_fit(discovery),
+        _worse_on_test(discovery) or _worse_on_fit(discovery),
     )
     return [one for one in said if one]
 
 
 def _worse_on_fit(discovery: Mapping[str, Any]) -> str:
     """Clause for a written model, other than the declared one, that leaves notably more of what it was fitted to
-    than the recalibrated one, with the figures; '' where it does not."""
-    states = {state: discovery.get(state, {}).get("fit", {}) for state in ("recalibrated", "after")}
-    if not all(states.values()) or _written_as(discovery) == "before":
+    than the recalibrated one; '' where it does not."""
+    left = _left_mv(discovery, "fit")
+    if not left.keys() >= {"recalibrated", "after"} or _written_as(discovery) == "before":
         return ""
-    left = {state: round(errors["rmse_mv"], 2) for state, errors in states.items()}
-    if left["after"] <= AS_GOOD * left["recalibrated"]:
-        return ""
-    ours, refit = left["after"], left["recalibrated"]
-    return f"of what was fitted the written model leaves {ours:.2f} mV, recalibrated {refit:.2f}"
+    worse = left["after"] > AS_GOOD * left["recalibrated"]
+    return f"{ALONE['recalibrated']} errs less on what was fitted" if worse else ""
+
+
+ALONE = {"before": "the declared model", "recalibrated": "a refit alone"}
+"""State of the model -> words for it beside what is written."""
 
 
 def _worse_on_test(discovery: Mapping[str, Any]) -> str:
     """Clause for a written model that leaves more of the test part than the declared or the recalibrated one, with
-    the figures to the hundredth of a mV; '' where it does not."""
-    left = {
-        state: round(discovery[state]["test"]["rmse_mv"], 2)
-        for state in ("before", "recalibrated", "after")
-        if discovery.get(state, {}).get("test")
-    }
-    words = {"before": "as declared", "recalibrated": "recalibrated"}
-    less = [
-        f"{left[state]:.2f} mV {said}"
-        for state, said in words.items()
-        if state in left and left[state] < left.get("after", 0.0)
-    ]
+    the advice not to use it where that is notably more; '' where it does not."""
+    left = _left_mv(discovery, "test")
+    less = [state for state in ALONE if state in left and left[state] < left.get("after", 0.0)]
     if not less:
         return ""
-    model = {
-        "before": "the declared model, which is what is written,",
-        "recalibrated": "the recalibrated model, which is what is written,",
-        None: "the written model",
-    }[_written_as(discovery)]
-    return f"on the test part {model} does worse, {left['after']:.2f} mV against {' and '.join(less)}"
+    verb = "errs" if len(less) == 1 else "err"
+    others = f"{listed([ALONE[state] for state in less])} {verb} less on the test part"
+    if _written_as(discovery) == "before":
+        return f"{others} than the declared model, which is what is written"
+    if left["after"] > AS_GOOD * min(left[state] for state in less):
+        return f"do not use the written model: {others}"
+    return f"{others} than the written model"
+
+
+def _left_mv(discovery: Mapping[str, Any], part: str) -> dict[str, float]:
+    """State of the model -> RMSE on a part, mV, to the hundredth; without the states that have no figure there."""
+    states = ("before", "recalibrated", "after")
+    rows = {state: (discovery.get(state) or {}).get(part) or {} for state in states}
+    return {state: round(row["rmse_mv"], 2) for state, row in rows.items() if row.get("rmse_mv") is not None}
 
 
 def _verdict(view: DiscoveryView) -> str:
     verdict, effects = view.discovery["verdict"], view.discovery["effects"]
     if verdict == "none":
-        return f"Nothing is missing from the declared model of {view.cell} that these data could show."
+        return f'Nothing is missing from the declared model of "{view.cell}" that these data could show.'
     if verdict == "unknown":
-        rest = unexplained_by(view.discovery) + (" beyond doubt" if _tried(view.discovery) else "")
+        rest = unexplained_by(view.discovery)
         if not effects:
-            return f"The declared model of {view.cell} misses something real{rest}."
-        return f"{_named(view, effects)}; and something real is left{rest}."
+            return f'The declared model of "{view.cell}" misses something real{rest}.'
+        names = [with_size(effect, view.discovery, _title(view.titles, effect)) for effect in effects]
+        return f"Named in part: {listed(names)}. Something real is left{rest}."
     sure = name_confidence(view.discovery)
     if refit_does_as_well(view.discovery):
         return (
@@ -136,18 +138,14 @@ def _written_as(discovery: Mapping[str, Any]) -> str | None:
     return next((s for s in ("before", "recalibrated") if discovery.get(s) == discovery.get("after")), None)
 
 
-def written_model(discovery: Mapping[str, Any]) -> str:
-    """Words for the content of `model/`, as the subject of a sentence."""
-    if (state := _written_as(discovery)) is not None:
-        return {"before": "the declared model, unchanged,", "recalibrated": "the recalibrated model"}[state]
-    return f"the model {states_of(discovery)['after']}"
-
-
-def unchanged_finding(discovery: Mapping[str, Any]) -> str:
-    """A sentence that all that is written is the declared model, and why; '' where something came of it."""
-    if _written_as(discovery) != "before":
-        return ""
-    text = "The model that is written is the declared one, unchanged"
+def written_finding(discovery: Mapping[str, Any]) -> str:
+    """A sentence on which model `model/` holds, and why it is the declared one where it is that."""
+    state = _written_as(discovery)
+    if state is None:
+        return f"model/ holds the model {states_of(discovery)['after']}."
+    if state == "recalibrated":
+        return "model/ holds the recalibrated model."
+    text = "model/ holds the declared model, unchanged"
     if (why := discovery.get("not_adopted")) is not None:
         return f"{text}. Not adopted: {why}."
     if discovery["verdict"] == "unknown":
@@ -174,13 +172,40 @@ def reason_finding(discovery: Mapping[str, Any]) -> str:
     if left > allowed:
         found = "with what was found added, " if discovery["effects"] else ""
         why = f"Why: {found}{amount}, and no more than {allowed:.2f} mV would count as explained."
-        if not _tried(discovery):
-            return why
-        return (
-            f"{why} The list of hypotheses says what came nearest, and why it was not accepted; data of another kind "
-            "(a slow discharge, pulses with rests, another temperature) would narrow it down."
-        )
+        return f"{why} {OF_MEASURED}" if _tried(discovery) else why
     return f"Why: {discovery['reason']}."
+
+
+OF_MEASURED = (
+    "Expect an unknown of a measured cell by itself: models like this one miss it by some "
+    f"{MV_PER_V * MEASURED_V:.0f} mV; a name beside it is the part that stands out."
+)
+"""Sentence on a verdict of `unknown`, which measured cells nearly always have."""
+
+
+def next_finding(discovery: Mapping[str, Any], titles: Mapping[str, str] | None = None) -> str:
+    """Sentences on what came nearest and on what to do next where effects were tried and leave something; '' else."""
+    if discovery["verdict"] != "unknown" or not _tried(discovery):
+        return ""
+    rows = [] if discovery["effects"] else discovery["candidates"]
+    best = max(rows, key=lambda row: float(row["score"]), default=None)
+    nearest = "" if best is None else f"Nearest, but not named: {hypothesis_title(best, titles or {})}"
+    remark = best.get("remark") if best else ""
+    nearest += f" ({remark})" if remark else ""
+    return (
+        f"{nearest}{'. ' if nearest else ''}Next: data of another kind (a slow discharge, pulses with rests, another "
+        "temperature) would narrow it down, and beside a record of the cell that is known to be good (--good) the "
+        "answer can be found or none; aesi run learns what is left"
+        f"{'' if discovery['effects'] else ', best from the declared file'}."
+    )
+
+
+def hypothesis_title(row: Row, titles: Mapping[str, str]) -> str:
+    """An effect as it did best: by itself, or beside the others of its hypothesis, whose score it shares."""
+    name, *others = (
+        _title(titles, effect) for effect in dict.fromkeys((row["effect"], *row.get("hypothesis", ())))
+    )
+    return f"{name}, beside {' and '.join(others)}" if others else name
 
 
 def span_finding(view: DiscoveryView) -> str:
@@ -188,10 +213,14 @@ def span_finding(view: DiscoveryView) -> str:
     if not view.traces:
         return ""
     hours = sum(float(t.time_s[-1] - t.time_s[0]) for t in view.traces) / SECONDS_PER_HOUR
-    current, soc = (_range(getattr(t, name) for t in view.traces) for name in ("current_a", "soc"))
+    (least, most), soc = (_range(getattr(t, name) for t in view.traces) for name in ("current_a", "soc"))
+    digits = decimals(max(abs(least), abs(most)))
+    least, most = (
+        round(end, digits) + 0.0 for end in (least, most)
+    )  # + 0.0: a rounded-away minus says nothing
     return (
         f"The data span {hours:.1f} h, {round(100 * soc[0])} to {round(100 * soc[1])} % state of charge and currents "
-        f"from {current[0]:.3g} to {current[1]:.3g} A (discharge positive); nothing is said beyond them."
+        f"from {least:g} to {most:g} A (discharge positive); nothing is said beyond them."
     )
 
 
@@ -209,14 +238,18 @@ def _named(view: DiscoveryView, effects: Sequence[str]) -> str:
         groups.setdefault(kinds.get(effect, "physics"), []).append(name)
     parts = []
     if "physics" in groups:
-        parts.append(f"the declared model of {view.cell} lacks {listed(groups['physics'])}")
+        parts.append(f'the declared model of "{view.cell}" lacks {listed(groups["physics"])}')
     if "parameter" in groups:
         names = listed(groups["parameter"])
-        subject = f"its {names}" if parts else f"{names} of {view.cell}"
+        subject = f"its {names}" if parts else f'{names} of "{view.cell}"'
         parts.append(f"{subject} {_verb(groups['parameter'])} not as declared")
     if "instrument" in groups:
         parts.append(f"the data, not the cell, show {listed(groups['instrument'])}")
-    text = "; ".join(parts)
+    return raised("; ".join(parts))
+
+
+def raised(text: str) -> str:
+    """With a capital letter, as a sentence begins."""
     return text[:1].upper() + text[1:]
 
 
@@ -229,39 +262,40 @@ def _verb(names: Sequence[str]) -> str:
 
 
 def discovery_consequence(view: DiscoveryView) -> str:
-    """A sentence on what the finding gains on data that chose nothing, apart from what any refit gains; '' where it
-    loses, which a warning says with the same figures."""
-    if _worse_on_test(view.discovery):
-        return ""
-    values = {
-        state: view.discovery.get(state, {}).get("test", {}).get("rmse_mv")
-        for state in ("before", "recalibrated", "after")
-    }
-    if any(value is None for value in values.values()):
-        return ""
-    after = states_of(view.discovery).get("after")
-    if after is None:
-        return (
-            f"On data that chose nothing the model as declared errs by {values['before']:.1f} mV RMSE, and with its "
-            f"own parameters refitted by {values['recalibrated']:.1f} mV; the noise floor is "
-            f"{view.discovery['noise_floor_mv']:.2f} mV."
-        )
+    """A sentence on what `model/` holds and what each state of the model leaves of data that chose nothing, of those
+    that were fitted where there are none; what a finding brings is the step from the refit to it."""
+    discovery = view.discovery
+    part = "test" if _left_mv(discovery, "test") else "fit"
+    where = {"test": "on data that chose nothing", "fit": "on the data that were fitted"}[part]
+    words = states_of(discovery)
+    errors = {state: (discovery.get(state) or {}).get(part, {}).get("rmse_mv") for state in words}
+    told = [f"{error:.1f} mV {words[state]}" for state, error in errors.items() if error is not None]
+    holds = written_finding(discovery)
+    if not told:
+        return holds
     return (
-        f"On data that chose nothing the model as declared errs by {values['before']:.1f} mV RMSE, the "
-        f"same model with its own parameters refitted by {values['recalibrated']:.1f} mV, and the model "
-        f"{after} by {values['after']:.1f} mV; the noise floor is "
-        f"{view.discovery['noise_floor_mv']:.2f} mV."
+        f"{holds} RMSE {where}: {', '.join(told)}; the noise floor is {discovery['noise_floor_mv']:.2f} mV."
     )
 
 
-def look_alike_finding(view: DiscoveryView) -> str:
+def look_alike_finding(discovery: Mapping[str, Any], titles: Mapping[str, str] | None = None) -> str:
     """A sentence on what else fits as well, beside the verdict."""
-    groups = [
-        [_title(view.titles, e) for e in group] for group in view.discovery.get("indistinguishable", [])
-    ]
+    groups = look_alikes_told(discovery, titles or {})
     if not groups:
         return ""
     return f"These data cannot tell apart {'; nor '.join(listed(group) for group in groups)}."
+
+
+def look_alikes_told(discovery: Mapping[str, Any], titles: Mapping[str, str]) -> list[list[str]]:
+    """The names of each group that the data cannot tell apart; what fits as well only beside others, with these."""
+    beside = {row["effect"]: row.get("hypothesis", ()) for row in discovery["candidates"]}
+    named = set(discovery["effects"])
+
+    def told(effect: str) -> str:
+        others = [_title(titles, one) for one in beside.get(effect, ()) if one not in {effect, *named}]
+        return _title(titles, effect) + (f" (beside {listed(others)})" if others else "")
+
+    return [[told(effect) for effect in group] for group in discovery.get("indistinguishable", [])]
 
 
 def closest_finding(view: DiscoveryView) -> str:

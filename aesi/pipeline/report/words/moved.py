@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from aesi.pipeline.report.views import Row
-from aesi.pipeline.report.words.discoveries import WITH_FINDING, states_of
+from aesi.pipeline.report.words.discoveries import WITH_FINDING, listed, raised, states_of
 from aesi.pipeline.report.words.sizes import TELLING, name_words, resized, rounded
 
 MOST_NAMED = 3
@@ -18,6 +18,8 @@ OF_A_RECORD = {
     "capacity_share": "the share of its capacity that the cell had in {}",
 }
 """Owner of a parameter that belongs to a record -> words in place of an effect."""
+PURE = ("dimensionless", "1")
+"""Units of plain numbers: of a parameter of an effect, of one of a record."""
 RECALIBRATING, BESIDE, WRITTEN = "Recalibrating", "Beside the finding the fit", "The model that is written"
 
 
@@ -37,10 +39,10 @@ def resized_finding(discovery: Mapping[str, Any]) -> str:
     sizes = [one for effect in discovery["effects"] for one in resized(effect, discovery)]
     if not sizes:
         return ""
-    told = "; ".join(f"{name} {there} instead of {found}" for name, there, found in sizes)
+    found, there = (listed([f"{name} {sizes_of[place]}" for name, *sizes_of in sizes]) for place in (1, 0))
     return (
-        "The model that is written was fitted with the declared parameters open, by which it carries over better, and "
-        f"so has what was found at another size: {told}."
+        f"Two fits, two sizes: the finding, with the file's parameters as declared, is {found}; model/, with them "
+        f"refitted as well, has {there}."
     )
 
 
@@ -54,25 +56,32 @@ def _sentence(words: str, rows: Sequence[Row]) -> str:
     text = f"{words} moves {named}{more}."
     ended = [parameter_words(row) for row in rows if row["at_limit"]]
     if ended:
-        text += (
-            f" At the end of what it may be: {'; '.join(ended)}. That value is the limit's, not the data's."
-        )
+        limit = "its limit, so that its value is the limit's"
+        if len(ended) > 1:
+            limit = "their limits, so that their values are the limits'"
+        text += f" {raised(listed(ended))} stopped at {limit}, not the data's."
     return text
 
 
 def _moved(row: Row) -> str:
     times = f"{abs(row['deviations']):.1f} standard deviations of its tolerance"
-    return f"{parameter_words(row)} to {moved_value(row)} ({times})"
+    return f"{parameter_words(row)} {'by' if _is_change(row) else 'to'} {moved_value(row)} ({times})"
+
+
+def _is_change(row: Row) -> bool:
+    """Whether a parameter is what an effect puts on top of what the file holds, none as declared."""
+    return row["declared"] == 0.0 and row["unit"] not in PURE
 
 
 def moved_value(row: Row) -> str:
-    """Words for where a parameter went: '0.42 times declared', '0.97 (declared 1)', '3.1 mohm'."""
+    """Words for where a parameter went, or by how much: '0.42 times declared', '0.97 (declared 1)', '+3.1 mohm'."""
     if row["unit"] == "dimensionless" and row["declared"] == 1.0:
         return f"{_apart(row['value'], 1.0, least=2)[0]} times declared"
-    if row["unit"] in ("dimensionless", "1"):
+    if row["unit"] in PURE:
         there, declared = _apart(row["value"], row["declared"])
         return f"{there} (declared {declared})"
-    return rounded(row["value"], row["unit"])
+    sign = "+" if _is_change(row) and row["value"] > 0.0 else ""
+    return sign + rounded(row["value"], row["unit"])
 
 
 def _apart(value: float, declared: float, least: int = 3) -> tuple[str, str]:

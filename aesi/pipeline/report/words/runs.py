@@ -97,44 +97,51 @@ def _bought(view: RunView) -> str:
             "The data-driven correction does not help here: in free run on the test records the error "
             f"grows from {first} mV to {last} mV. Use the {view.physics} alone."
         )
-    if corrected is None or view.corrected in (view.physics, view.chosen):
-        start = f"{first} mV"
+    share = own_share(view)
+    if share is None or corrected is None or view.corrected == view.physics:
+        start, less = (
+            f"{first} mV",
+            f"{reduction:.1f} % less mean squared error than the {view.physics} alone",
+        )
     else:  # else the correction would be credited with what the recalibration does
         between, last = _told(corrected, after)
         start = f"{before:.1f} mV of the {view.physics} and {between} mV of the {view.corrected}"
+        less = (
+            f"{share:.1f} % less mean squared error than the {view.corrected}, on which it was learnt ({reduction:.1f} "
+            f"% less than the {view.physics} as declared)"
+        )
     return (
         f"On test records that chose nothing, run without any measured voltage, {view.chosen} takes the "
-        f"voltage error from {start} to {last} mV RMSE: {reduction:.1f} % less mean squared "
-        f"error than the {view.physics} alone."
+        f"voltage error from {start} to {last} mV RMSE: {less}."
     )
 
 
-def corrected_finding(view: RunView) -> str:
-    """A sentence on what the correction gains beyond the physics that it was learned on. Where that is as declared,
-    beyond a mere refit of its parameters, or on what to do where the refit does better."""
-    corrected, model = view.model(view.corrected), view.model(view.chosen)
-    before, after = (_figure(row, "free_run", "test_rmse_mv") for row in (corrected, model))
-    if before is None or after is None:
+def own_share(view: RunView) -> float | None:
+    """By how much the correction lowers the mean squared error of the physics that it was learnt on, in free run on the
+    test records, per cent; negative where it raises it. None where there is no correction, or a figure is missing."""
+    before, after = (
+        _figure(view.model(name), "free_run", "test_rmse_mv") for name in (view.corrected, view.chosen)
+    )
+    if not before or after is None or view.chosen in (view.physics, view.corrected):
+        return None
+    return 100.0 * (1.0 - (after / before) ** 2)
+
+
+def refit_finding(view: RunView) -> str:
+    """A sentence on what the correction gains beyond a mere refit of the physics, where it was not learnt on that; or
+    on what to do where the refit does better."""
+    after = _figure(view.model(view.chosen), "free_run", "test_rmse_mv")
+    beyond = _figure(view.model(view.chosen), "free_run", "test_mser_recalibrated_pct")
+    refitted = _refitted_mv(view)
+    if view.corrected == view.chosen or after is None or beyond is None or refitted is None:
         return ""
-    if view.corrected in (view.physics, view.chosen):
-        beyond = _figure(model, "free_run", "test_mser_recalibrated_pct")
-        refitted = _refitted_mv(view)
-        if view.corrected == view.chosen or beyond is None or refitted is None:
-            return ""
-        if beyond < 0.0:  # by how much the refit errs less is in the first sentence
-            advice = f"Recalibrate the {view.physics} first (cell.start: recalibrated)."
-            return advice if _refit_better(view) else ""
-        return (
-            f"With its own parameters refitted to the training records and nothing learnt, the {view.physics} errs by "
-            f"{_told(refitted, after)[0]} mV there: the correction leaves {beyond:.1f} % less mean "
-            "squared error than that."
-        )
-    if after >= before:
-        return ""  # which the first sentence says
-    first, last = _told(before, after)
+    if beyond < 0.0:  # by how much the refit errs less is in the first sentence
+        advice = f"Recalibrate the {view.physics} first (cell.start: recalibrated)."
+        return advice if _refit_better(view) else ""
     return (
-        f"The correction was learnt on the {view.corrected}, which alone errs by {first} mV there; the correction "
-        f"takes that to {last} mV, {100.0 * (1.0 - (after / before) ** 2):.1f} % less mean squared error."
+        f"With its own parameters refitted to the training records and nothing learnt, the {view.physics} errs by "
+        f"{_told(refitted, after)[0]} mV there: the correction leaves {beyond:.1f} % less mean "
+        "squared error than that."
     )
 
 
@@ -251,7 +258,16 @@ def interval_finding(model: Row) -> str:
     free, wide = (_figure(model, "free_run_intervals", key) for key in ("coverage_pct", "average_width_v"))
     if free is None or wide is None:
         return text
-    return f"{text} The band in free run covers {free:.1f} % of them and is {1e3 * wide:.1f} mV wide."
+    start = _figure(model, "free_run_intervals", "start_v")
+    why = (
+        ""
+        if start is None
+        else (
+            f", because where a record starts is read from its voltage: a standard deviation of that is worth "
+            f"{1e3 * start:.1f} mV along it, and cell.soc0 gives a start that is known"
+        )
+    )
+    return f"{text} The band in free run covers {free:.1f} % of them and is {1e3 * wide:.1f} mV wide{why}."
 
 
 def _told(first: float, other: float) -> tuple[str, str]:
