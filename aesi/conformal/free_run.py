@@ -14,7 +14,11 @@ Barber, Candès, Ramdas & Tibshirani, Ann. Statist. 49 (2021) 486, doi:10.1214/2
 
 A quantile estimated from few pieces is exceeded too often by the next one. (2) widens the band as Student's t does for
 a normal error of unknown variance. Pieces that were cut from one left-out stretch of a drive err alike over a whole
-drive, so where it is said how many stretches there are, m is their number. At short horizons the errors within a piece
+drive, so where it is said how many stretches there are, m is their number. Halves of a repeat that are left out by
+themselves count as two. Were the error of a drive one level throughout, the bands of three drives would cover 85 % so
+instead of 90. On measured drives it is not: over the development splits of `aesi bench splits` that train on three
+parts of the NMC drive the bands of the declared model cover 92.7 % and score 93.7 mV, and 97.1 % and 112.3 mV with the
+number of drives for m. At short horizons the errors within a piece
 are independent over much shorter times: every FORGOTTEN horizons of a piece count as one.
 
 Only rows inside the range that their model was trained on are counted: a model fitted without the first piece of a

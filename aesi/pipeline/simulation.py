@@ -151,7 +151,8 @@ def predict_file(
 ) -> int:
     """Predict the voltage of the profile in `current`, write it with its band to `out`; the number of rows.
 
-    measured : one step ahead from the file's voltage; otherwise a free run.  say_notes : as in `simulate_file`.
+    measured : one step ahead from the file's voltage; otherwise a free run, which sees the first of it at most.
+    say_notes : as in `simulate_file`.
     Raises DataError where a measurement cannot be of this cell.
     """
     asked, say = asked or ProfileRequest(), say_notes or _silent
@@ -173,6 +174,7 @@ def predict_file(
     # One step ahead knows the voltage before each row, which the physics does not: its errors are no peers of these.
     alone_v = None if hybrid.correction is None or measured else prediction.physics_v
     say(reached(hybrid.cell, record, prediction.voltage_v, prediction.soc, alone_v))
+    say(_of_first(record, prediction, hybrid, measured))
     say(_of_band(record, prediction, hybrid, measured))
     return len(frame)
 
@@ -311,6 +313,17 @@ def _range_v(voltage_v: Array) -> str:
     return f"{np.min(voltage_v):.3f} to {np.max(voltage_v):.3f} V"
 
 
+def _of_first(record: Measurement, prediction: Prediction, model: HybridModel, measured: bool) -> list[str]:
+    """A sentence on the error that a free run of a corrected model begins with."""
+    if measured or model.correction is None:
+        return []
+    error_v = float(record.voltage_v[0] - prediction.physics_v[0])
+    if np.isfinite(error_v):
+        return [f"{record.name}: begins with the error of its first voltage, {MV_PER_V * error_v:+.1f} mV."]
+    words = "begins with what the correction says of it, since no voltage is measured there"
+    return [f"{record.name}: {words}; the band is that of a whole drive from its first row on."]
+
+
 def _of_band(record: Measurement, prediction: Prediction, model: HybridModel, measured: bool) -> list[str]:
     """Sentences on where the correction is used, and on what its band holds of the rows that have one."""
     if model.correction is None:
@@ -354,7 +367,7 @@ def _of_observed(record: Measurement, model: HybridModel, apart: BoolArray) -> l
     if np.any(gaps := model.after_gap(record.time_s)):
         said.append(
             f"{record.name}: {_percent(gaps)} of the rows are more than a step of {model.dt_s:g} s after the one "
-            "before; what is filled in between holds some of their own voltage, so that they are no predictions."
+            "before, from which they are predicted; the band is of a step."
         )
     return said
 

@@ -6,7 +6,8 @@ residual, and then
 
     e[k + 1] = g(U[k]) + memory (e[k] - g(U[k - 1]))
 
-which is stable, as memory < 1. (At the start of a record g(U[0]) stands for what came before.)
+which is stable, as memory < 1. (At the start of a record g(U[0]) stands for what came before, and where nothing was
+measured for the error there, too. A model with terms in the error then begins with none.)
 
 It lives in scaled variables (scaling.py). Inputs outside the trained range are held at its edge and flagged
 in `FreeRun.outside`; a prediction ten times beyond the trained range of the error is a divergence. What the model
@@ -91,10 +92,11 @@ class SparseModel:
         return self.k_step(series, 1)
 
     def free_run(self, series: ErrorSeries, error0_v: float | None = None) -> FreeRun:
-        """Prediction from `error0_v` (default: the measured error_v[0]) with its own feedback only."""
-        start = float(series.error_v[0]) if error0_v is None else error0_v
+        """Prediction from `error0_v` (default: the measured error_v[0], or where that is NaN what the inputs give) with
+        its own feedback only."""
+        start_v = float(series.error_v[0]) if error0_v is None else error0_v
         variables = self._variables(series)
-        error_v, diverged = self._freely(self._drive(variables, series), start)
+        error_v, diverged = self._freely(self._drive(variables, series), start_v)
         variables[:, 0] = error_v
         return FreeRun(
             error_v,
@@ -113,15 +115,15 @@ class SparseModel:
         """(n,) V, >= 0: how much a prediction leaves open by holding inputs at the edge of their trained range.
 
         It is how far the prediction would move if the terms went on beyond the edge with the slope they have there.
-        steps : of a prediction so far ahead (`k_step`), or None for a `free_run`.
+        steps : of a prediction so far ahead (`k_step`), or None for a `free_run`.  error0_v : as there.
         """
         variables = self._variables(series)
         further = self.scaling.cut_off(variables)
         if not further[:, 1:].any():
             return np.zeros(len(series))
-        start = float(series.error_v[0]) if error0_v is None else error0_v
+        start_v = float(series.error_v[0]) if error0_v is None else error0_v
         held, gone_on = (
-            self._freely(drive, start)[0] if steps is None else self._ahead(drive, series.error_v, steps)
+            self._freely(drive, start_v)[0] if steps is None else self._ahead(drive, series.error_v, steps)
             for drive in (self._drive(variables, series), self._drive(variables, series, further))
         )
         return np.abs(gone_on - held)
@@ -202,8 +204,9 @@ class SparseModel:
             return None
         return self.leverage.excess(evaluate_terms(self.library.terms, self.scaling.apply(variables)))
 
-    def _freely(self, drive: Array, start: float) -> tuple[Array, int]:
-        """(n,) V from the error `start`, and where the scaled run diverged, or -1."""
+    def _freely(self, drive: Array, start_v: float) -> tuple[Array, int]:
+        """(n,) V from the error `start_v`, NaN where it is not known, and where the scaled run diverged, or -1."""
+        start = self._unmeasured_v(drive) if np.isnan(start_v) else start_v
         scaled0 = float(self.scaling.error_to_scaled(np.array(start)))
         if self.has_feedback:
             scaled, diverged = free_run.run_one(
@@ -212,6 +215,10 @@ class SparseModel:
         else:
             scaled, diverged = free_run.held(free_run.remember(drive[0, :-1], self.memory, scaled0), scaled0)
         return np.append(start, self.scaling.error_to_volts(scaled)), diverged
+
+    def _unmeasured_v(self, drive: Array) -> float:
+        """V, the error at the first sample of a record of which nothing is measured."""
+        return 0.0 if self.has_feedback else float(self.scaling.error_to_volts(drive[0, :1])[0])
 
     def _ahead(self, drive: Array, error_v: Array, steps: int) -> Array:
         """(n,) V, each from the measured error `steps` samples earlier."""

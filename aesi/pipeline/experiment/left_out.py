@@ -71,11 +71,11 @@ class TrainingDrives:
         left out."""
         return len({name for name, _ in self.drives}) > 1
 
-    def under(self, physics: PhysicsModels) -> tuple[ErrorSeries, ...]:
-        """`Split.train` under that physics."""
-        records = self.records
+    def under(self, physics: PhysicsModels, piece: Piece) -> tuple[ErrorSeries, ...]:
+        """`Split.train` under physics that was fitted without the piece."""
+        records = self._without(piece)
         if not self.config.data.repeats:
-            records = {name: self.records[name] for name in self.roles["train"]}
+            records = {name: records[name] for name in self.roles["train"]}
         return training_part(self.config.data, series_under(physics, records, self.config)[0], self.roles)
 
     def left_out(self, fitted: PhysicsModels) -> tuple[PhysicsModels, LeftOutDrives]:
@@ -101,7 +101,7 @@ class TrainingDrives:
         return fitted.carried(carried_over(slopes)), LeftOutDrives(tuple(folds), tuple(wholes))
 
     def _left_out(self, physics: PhysicsModels, piece: Piece) -> HeldOutDrive:
-        return HeldOutDrive.of(self.under(physics), piece.drive, piece.rows)
+        return HeldOutDrive.of(self.under(physics, piece), piece.drive, piece.rows)
 
     def pieces(self) -> Pieces:
         """The pieces that are left out in turn."""
@@ -122,7 +122,7 @@ class TrainingDrives:
         return LeftOutDrives(made[0], made[1] if len(train) > 1 else ())
 
     def _refitted(self, fitted: PhysicsModels, piece: Piece) -> PhysicsModels:
-        others = without(self.records, *self._rows(piece))
+        others = self._without(piece)
         declared, cell = fitted.by_name[DECLARED], self.config.cell
         return physics_models(
             declared.cell,
@@ -136,7 +136,10 @@ class TrainingDrives:
         )
 
     def _slope(self, physics: PhysicsModels, piece: Piece) -> float:
-        """`slope_on` the piece; only the one record, under the two models that it takes, is simulated."""
+        """`slope_on` the piece; only the one record, under the two models that it takes, is simulated.
+
+        Both start by the declared cell's reading: what parameters take off is asked, not what a better start does.
+        """
         name, rows = self._rows(piece)
         record, hold = self.records[name], self.config.data.hold
         declared_v, recalibrated_v = (
@@ -144,6 +147,10 @@ class TrainingDrives:
             for model in (DECLARED, RECALIBRATED)
         )
         return slope_on(record.measurement.voltage_v[rows] - declared_v, recalibrated_v - declared_v)
+
+    def _without(self, piece: Piece) -> dict[str, FitRecord]:
+        """The records as a fit without the piece sees them."""
+        return without(self.records, *self._rows(piece))
 
     def _rows(self, piece: Piece) -> TrainingDrive:
         """The record that a piece is of, and its rows there."""
@@ -158,7 +165,7 @@ def series_under(
     series: dict[str, ErrorSeries] = {}
     empty = []
     for name, record in records.items():
-        whole, ran_empty = physics.series(record.measurement, record.soc0, config.data.dt_s, config.data.hold)
+        whole, ran_empty = physics.series(record, config.data.dt_s, config.data.hold)
         # Before the record is cut: a filtered current has to know what came before a piece.
         series[name] = with_inputs(whole, config.library.inputs or whole.input_names)
         if ran_empty:

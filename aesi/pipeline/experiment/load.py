@@ -11,11 +11,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from aesi.data.resample import to_even
+import numpy as np
+
+from aesi.data.resample import DENSE, is_even, is_sparse, to_even
 from aesi.data.virtual import DEFAULT_MIX
 from aesi.errors import ConfigError, DataAway, DataError, InputError, SimulationError
 from aesi.numerics.files.contents import contents
-from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
+from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, simulate
 from aesi.physics.belongs import check_measured
 from aesi.physics.depletion import RUN_ON
 from aesi.physics.effects import activated
@@ -23,7 +25,7 @@ from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.drives import by_role, cut_short, training_drives
 from aesi.pipeline.experiment.left_out import TrainingDrives, series_under
 from aesi.pipeline.experiment.physics_models import PhysicsModels, no_rows, physics_models
-from aesi.pipeline.experiment.recalibrate import FitRecord
+from aesi.pipeline.experiment.recalibrate import Beginning, FitRecord
 from aesi.pipeline.experiment.sources import (
     Sources,
     cell_path,
@@ -35,7 +37,7 @@ from aesi.pipeline.experiment.sources import (
 from aesi.pipeline.notes import of_contradiction, of_day, on_temperatures, temperature_sentence
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
-from aesi.records import ErrorSeries, Hold, LeftOutDrives, Role, Split, hold_sentence
+from aesi.records import ErrorSeries, Hold, LeftOutDrives, Measurement, Role, Split, hold_sentence
 
 DFN_NOTE = "The physics is the porous electrode: DFN in tables and figures, where others have ESPM."
 
@@ -120,7 +122,7 @@ def _load(config: ExperimentConfig) -> Loaded:
     file = declared_model(path).with_soh(config.cell.soh)
     given = replace(file, effects=(*file.effects, *_effects(config)), model=config.cell.model or file.model)
     sources = sources_of(config, path)
-    records, told = _on_grid(config, given, sources)
+    records, starts, told = _on_grid(config, given, sources)
     training = _training(config, records, sources.roles)
     physics, left_out = _physics(given, training)
     series, of_empty = _series(physics, training)
@@ -128,6 +130,7 @@ def _load(config: ExperimentConfig) -> Loaded:
     notes = [
         *given.cell.unread,
         *of_day(given.cell, config.cell.soh),
+        *_of_starts(physics, records, starts, config.data.hold),
         *told,
         *_of_repeats(config, records),
         *([DFN_NOTE] if given.model == "dfn" else []),
@@ -140,7 +143,10 @@ def _load(config: ExperimentConfig) -> Loaded:
         effects=given.effects,
         split=split,
         left_out=left_out or training.as_they_are(split.train),
-        soc0={name: chosen.soc0(record.soc0) for name, record in records.items()},
+        soc0={
+            name: physics.begin(physics.start, record, config.data.hold)[0]
+            for name, record in records.items()
+        },
         digests={name: measurement.digest for name, (measurement, _) in sources.records.items()},
         notes=tuple(notes),
         config=config,
@@ -157,6 +163,14 @@ def _training(
     for name, rows in drives:
         records[name].rows[rows] = True
     return TrainingDrives(config, records, drives, roles)
+
+
+def _of_starts(
+    physics: PhysicsModels, records: Mapping[str, FitRecord], starts: Mapping[str, InitialState], hold: Hold
+) -> list[str]:
+    """Sentences on where the records start under the physics.  starts : by the declared cell."""
+    own = {name: physics.own_reading(physics.start, record, hold) for name, record in records.items()}
+    return [with_keys((own[name] or start).sentence) for name, start in starts.items()]
 
 
 def _of_repeats(config: ExperimentConfig, records: Mapping[str, FitRecord]) -> list[str]:
@@ -212,15 +226,16 @@ def _declared_in(cell: Path, config: ExperimentConfig) -> str:
 
 def _on_grid(
     config: ExperimentConfig, given: HybridModel, sources: Sources
-) -> tuple[dict[str, FitRecord], list[str]]:
-    """The records in even rows, each with its state of charge at the first row and no row open to a fit yet; and
-    sentences on what was assumed and done to them.
+) -> tuple[dict[str, FitRecord], dict[str, InitialState], list[str]]:
+    """The records in even rows, with no row open to a fit yet; where they start by the declared cell; and sentences on
+    what else was assumed and done to them.
 
     Raises DataError where one cannot be of the cell.
     """
     cell, data = given.cell, config.data
     shared = config.cell.soc0 is not None and len(sources.records) > 1
     records: dict[str, FitRecord] = {}
+    starts: dict[str, InitialState] = {}
     notes: list[str] = []
     for name, (measurement, known_soc0) in sources.records.items():
         try:
@@ -228,21 +243,43 @@ def _on_grid(
         except DataError as error:
             raise DataError(with_keys(str(error))) from None
         declared = known_soc0 if config.cell.soc0 is None else config.cell.soc0
-        start = initial_state(
-            cell, measurement, declared, data.hold, given.effects, shared=shared, model=given.model
-        )
+        begins = Beginning(measurement, declared, shared)
+        start = starts[name] = begins.under(cell, given.effects, data.hold, given.model)
         held = hold_sentence(measurement.name, data.hold, data.declared_hold is not None, "data.hold: {}")
+        sampled = _of_sampling(measurement, data.dt_s)
         even = to_even(measurement, data.dt_s, data.hold)
         notes += [
-            with_keys(start.sentence),
             held,
+            *sampled,
             temperature_sentence(cell, measurement, given.effects),
             *map(with_keys, of_contradiction(given, even, start.soc, data.hold)),
             *map(with_keys, even.notes),
         ]
-        records[name] = no_rows(even, start.soc, start.read_sd)
+        records[name] = no_rows(even, start.soc, start.read_sd, begins)
     notes += on_temperatures(cell, (m.temperature_degc for m, _ in sources.records.values()), given.effects)
-    return records, notes
+    return records, starts, notes
+
+
+def _of_sampling(measurement: Measurement, dt_s: float) -> list[str]:
+    """A sentence on a record whose figures one step ahead know something of the row that they predict.
+
+    Raises DataError for one whose rows are so far apart that most of them would be filled in.
+    """
+    time_s = measurement.time_s
+    apart_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else dt_s
+    if is_sparse(time_s, dt_s):
+        raise DataError(
+            f"{measurement.name}: its rows are {apart_s:g} s apart and data.dt_s is {dt_s:g} s, so that most of what "
+            f"is fitted and judged would be filled in between rows; give data.dt_s: {apart_s:g}, or a record of "
+            "denser rows."
+        )
+    if is_even(time_s, dt_s) or apart_s < DENSE * dt_s:
+        return []
+    return [
+        f"{measurement.name}: its rows are not just {dt_s:g} s apart, and what is filled in between holds some of the "
+        "row that comes next: figures and intervals one step ahead come out too good; a data.dt_s of several rows, "
+        "over which they are averaged, avoids it."
+    ]
 
 
 def _refuse(physics: PhysicsModels, name: str, record: FitRecord, hold: Hold) -> None:
@@ -253,7 +290,7 @@ def _refuse(physics: PhysicsModels, name: str, record: FitRecord, hold: Hold) ->
             chosen.cell,
             data.time_s,
             data.current_a,
-            chosen.soc0(record.soc0),
+            physics.begin(physics.start, record, hold)[0],
             chosen.effects,
             data.temperature_degc,
             hold,

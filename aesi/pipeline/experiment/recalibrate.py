@@ -40,7 +40,7 @@ from aesi.calibration.ageing import LOSS_SD
 from aesi.errors import AesiError
 from aesi.numerics.bounded import descend, slope_within
 from aesi.numerics.typing import Array, BoolArray
-from aesi.physics import ActiveEffect, Cell, ModelName
+from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, initial_state
 from aesi.pipeline.product.deviations import (
     ALL,
     INITIAL_STATE,
@@ -82,16 +82,37 @@ GAIN = 0.05
 
 
 @dataclass(frozen=True, eq=False)
+class Beginning:
+    """What tells where a record starts.
+
+    measured : its rows as they were logged.  given : the state of charge that was given, or None; shared : for several.
+    """
+
+    measured: Measurement
+    given: float | None
+    shared: bool
+
+    def under(
+        self, cell: Cell, effects: tuple[ActiveEffect, ...], hold: Hold, model: ModelName
+    ) -> InitialState:
+        """Where it starts by that cell.  Raises DataError where its voltage belongs to no state of it."""
+        return initial_state(cell, self.measured, self.given, hold, effects, shared=self.shared, model=model)
+
+
+@dataclass(frozen=True, eq=False)
 class FitRecord:
-    """An evenly sampled record, its declared state of charge at the start, and the rows that a fit may look at.
+    """An evenly sampled record, its state of charge at the start by the declared cell, and the rows that a fit may look
+    at.
 
     soc0_sd : standard deviation of the start where it was read from a voltage; nought elsewhere.
+    begins : for another cell to tell where it starts; None where soc0 is all that is known.
     """
 
     measurement: Measurement
     soc0: float
     rows: BoolArray
     soc0_sd: float = 0.0
+    begins: Beginning | None = None
 
 
 def recalibrate(

@@ -102,12 +102,19 @@ class PhysicsStart:
         return same_rest(self.declared, self.cell, soc0 + self.shift)
 
     def simulate(self, record: Measurement, soc0: float, hold: Hold) -> Run:
-        """The record under this physics; where it runs empty, it is clipped (`simulate`) and `depleted` says so."""
+        """`run` of a record that was declared to start at soc0."""
+        return self.run(record, self.soc0(soc0), hold)
+
+    def run(self, record: Measurement, soc0: float, hold: Hold) -> Run:
+        """The record under this physics; where it runs empty, it is clipped (`simulate`) and `depleted` says so.
+
+        soc0 : in the windows of this cell.
+        """
         return simulate(
             self.cell,
             record.time_s,
             record.current_a,
-            self.soc0(soc0),
+            soc0,
             self.effects,
             record.temperature_degc,
             hold,
@@ -172,8 +179,8 @@ def start_v(
     """(n,) V, >= 0, how far the voltage_v (n,) of the record under the physics moves where it starts a deviation
     `soc0_sd` fuller or emptier, whichever is more: a knee lies to one side. No cell starts beyond full or empty.
 
-    soc0 : as of `PhysicsStart.simulate`.
+    soc0 : as of `PhysicsStart.run`.
     """
     others = {float(np.clip(soc0 + sign * soc0_sd, 0.0, 1.0)) for sign in (-1.0, 1.0)}
-    moved = [np.abs(physics.simulate(record, other, hold).voltage_v - voltage_v) for other in others]
+    moved = [np.abs(physics.run(record, other, hold).voltage_v - voltage_v) for other in others]
     return np.asarray(np.max(moved, axis=0))

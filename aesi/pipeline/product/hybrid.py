@@ -15,8 +15,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from aesi.conformal import Calibrated, FreeRunBands, calibrated_from_dict
-from aesi.data.resample import is_even, to_even
+from aesi.conformal import WHOLE_DRIVE, Calibrated, FreeRunBands, calibrated_from_dict
+from aesi.data.resample import after_gap, is_even, is_sparse, known_by, next_stamp, to_even
 from aesi.errors import CellError, DataError, InputError, SimulationError
 from aesi.numerics.typing import Array, BoolArray, Numbers
 from aesi.numerics.visited import Visited
@@ -35,11 +35,6 @@ from aesi.pipeline.written import EFFECTS, HEAD
 from aesi.records import ErrorSeries, FreeRun, Hold, Measurement
 from aesi.records.checked import numbers, row_words
 from aesi.sparse import SparseModel
-
-MOST_STEP = 1.5
-"""Most distance of two rows, in steps of the correction, at which the voltage a step before the later one is known
-from earlier rows: of what would be filled in, a third and more is the later row's own. A convention: loggers' stamps
-wander by less."""
 
 END_BEFORE = ", or end the record before that (--to-s on the command line)."
 """End of a sentence on a record that runs out: a correction and bands say nothing of a cell that has run out."""
@@ -102,13 +97,14 @@ class HybridModel:
         soc0: float | None = None,
         voltage_v: Numbers | None = None,
         temperature_degc: Numbers | None = None,
-        error0_v: float = 0.0,
+        error0_v: float | None = None,
     ) -> Prediction:
         """Voltage under a current, with its band.
 
         time_s, current_a : (n,) s, A (discharge positive).  voltage_v : (n,) V measured: one step ahead, each
-        sample predicted from those before it, the first by the physics alone and without a band; None: free run, from
-        the voltage error `error0_v` at the start.
+        sample predicted from those before it, the first by the physics alone and without a band; None: free run.
+        error0_v : V, measured minus physics at the first sample, that a free run begins with. Where it is not known
+        (None), it begins with what the inputs give, and the band is that of a whole drive from the first sample on.
         soc0 : state of charge at the first sample; None takes it from the first measured voltage at rest, else
         the model's own.  temperature_degc : as in `simulate`.
 
@@ -127,16 +123,19 @@ class HybridModel:
         soc0: float | None = None,
         *,
         one_step: bool = False,
-        error0_v: float = 0.0,
+        error0_v: float | None = None,
         soc0_sd: float = 0.0,
     ) -> Prediction:
-        """`predict` of a record, under its name: one step ahead of its voltage, or in free run, which sees none.
+        """`predict` of a record, under its name: one step ahead of its voltage, or in free run, which sees none after
+        the first.
 
+        error0_v : that a free run begins with; None takes it from the first voltage, as an experiment does that judges
+        a model, or where that is missing as `predict` does.
         soc0_sd : standard deviation of soc0, by what it is worth the band of a free run is wider. Raises InputError
-        for one that is no number from 0 to 1, and for an error0_v that is no voltage.
+        for one that is no number from 0 to 1, and for an error0_v that is not finite.
         """
-        if not np.isfinite(error0_v):
-            raise InputError(f"error0_v = {error0_v!r} is no voltage error to start from; give volts.")
+        if error0_v is not None and not np.isfinite(error0_v):
+            raise InputError(f"error0_v = {error0_v!r} is no voltage; give volts, or leave it out.")
         if not 0.0 <= soc0_sd <= 1.0:  # this way round, NaN fails too
             raise InputError(
                 f"soc0_sd = {soc0_sd!r} is no standard deviation of a state of charge; give 0 to 1."
@@ -148,19 +147,26 @@ class HybridModel:
                 f"voltage_v has no value at {record.time_s[row]:g} s ({row_words(row)}); predict the parts before "
                 "and after the gap as records of their own, or leave voltage_v out for a free run."
             )
-        if one_step:
+        from_first = error0_v is None and np.isfinite(measured[:1]).any()
+        if one_step or from_first:
             check_voltage(self.cell, record.take(slice(0, 1)))  # from which state and error start
+        if one_step:
             self._check_dense(record)
         else:
-            record = replace(record, voltage_v=np.full(len(record), np.nan))
+            seen = np.arange(len(record)) < (1 if from_first else 0)
+            record = replace(record, voltage_v=np.where(seen, measured, np.nan))
         soc0 = self._soc0(record, soc0, one_step)
         even = self._even(record)
         series = self._series(even, soc0)
+        own = series if even is record else self._series(record, soc0)
         if one_step:
+            if own is not series:
+                # Filled in between rows, it would hold the voltage of the very row that is predicted from it.
+                series = replace(series, error_v=known_by(own.time_s, own.error_v, series.time_s))
             prediction = self._one_step(series)
         else:
             prediction = self._free_run(self._with_slopes(series, even, soc0, soc0_sd), error0_v)
-        return prediction if even is record else self._back(prediction, record, soc0)
+        return prediction if own is series else _back(prediction, own, one_step=one_step)
 
     def save(self, folder: str | Path) -> Path:
         """Write the model to a folder, made where it is missing; returns the folder."""
@@ -215,23 +221,22 @@ class HybridModel:
         return self.soc0
 
     def _check_dense(self, record: Measurement) -> None:
-        gaps = self.after_gap(record.time_s)
-        if 2 * np.count_nonzero(gaps) > len(record):
+        if self.correction is not None and is_sparse(record.time_s, self.dt_s):
             apart_s = float(np.median(np.diff(record.time_s)))
             raise DataError(
                 f"{record.name}: its rows are {apart_s:g} s apart, and one step of the correction is {self.dt_s:g} s, "
-                "so that the voltage a step before a row would have to be filled in from that row itself; leave out "
-                "the measured voltage (--measured) for a free run, or give a record of denser rows."
+                "so that no voltage is known a step before a row; leave out the measured voltage (--measured) for a "
+                "free run, or give a record of denser rows."
             )
 
     def after_gap(self, time_s: Array) -> BoolArray:
-        """(n,) True for a row with none a step before it: what is filled in there is partly the row's own.
+        """(n,) True for a row with none a step before it, so that it is predicted from further back.
 
         time_s : (n,) s, of the rows.
         """
         if self.correction is None:
             return np.zeros(len(time_s), dtype=bool)
-        return np.concatenate([[False], np.diff(time_s) > MOST_STEP * self.dt_s])
+        return after_gap(time_s, self.dt_s)
 
     def _even(self, record: Measurement) -> Measurement:
         """The record at the step of correction and bands, or itself where that is nothing to do."""
@@ -277,8 +282,9 @@ class HybridModel:
         slopes = slopes_v(self.cell, self.effects, record, soc0, self.hold, self.model, series.model_v)
         return replace(series, slopes_v=slopes)
 
-    def _free_run(self, series: ErrorSeries, error0_v: float) -> Prediction:
+    def _free_run(self, series: ErrorSeries, error0_v: float | None) -> Prediction:
         n = len(series)
+        measured = error0_v is not None or np.isfinite(series.error_v[:1]).any()
         run, weight = FreeRun(np.zeros(n), None, np.zeros(n, dtype=bool)), np.full(n, np.nan)
         if self.correction is not None:
             run, weight = self.correction.free_run(series, error0_v), self.correction.kept(series)
@@ -286,7 +292,7 @@ class HybridModel:
         low = high = np.full(n, np.nan)
         if self.bands is not None:
             reach = 0.0 if self.correction is None else self.correction.reach(series, error0_v=error0_v)
-            band = self.bands.intervals(series, run, reach)
+            band = self.bands.intervals(series, run, reach, None if measured else WHOLE_DRIVE)
             low, high = band.lower_v, band.upper_v
         alpha = None if self.bands is None else self.bands.alpha
         return Prediction.of(series, run.error_v, low, high, run.outside, weight, alpha)
@@ -308,25 +314,28 @@ class HybridModel:
         outside = outside_trained(self.correction.outside(series), series, self.visited)
         return Prediction.of(series, error, low, high, outside, self.correction.kept(series), alpha)
 
-    def _back(self, prediction: Prediction, record: Measurement, soc0: float) -> Prediction:
-        """Onto the record's own rows: the physics simulated there, the correction and its band interpolated."""
-        physics = self._series(record, soc0)
-        time = record.time_s
 
-        def onto(values: Array) -> Array:
-            return np.interp(time, prediction.time_s, values)
+def _back(prediction: Prediction, own: ErrorSeries, *, one_step: bool) -> Prediction:
+    """Onto a record's own rows: the physics simulated there (`own`), the correction and its band interpolated.
 
-        return replace(
-            prediction,
-            time_s=time,
-            voltage_v=physics.model_v + onto(prediction.voltage_v - prediction.physics_v),
-            lower_v=physics.model_v + onto(prediction.lower_v - prediction.physics_v),
-            upper_v=physics.model_v + onto(prediction.upper_v - prediction.physics_v),
-            physics_v=physics.model_v,
-            soc=physics.soc,
-            outside=onto(prediction.outside.astype(float)) > 0,
-            weight=onto(prediction.weight),
-        )
+    one_step : those of the next stamp, a step before which the last row before this one, and not itself, is known.
+    """
+    later = next_stamp(own.time_s, prediction.time_s)
+
+    def onto(values: Array) -> Array:
+        return values[later] if one_step else np.interp(own.time_s, prediction.time_s, values)
+
+    return replace(
+        prediction,
+        time_s=own.time_s,
+        voltage_v=own.model_v + onto(prediction.voltage_v - prediction.physics_v),
+        lower_v=own.model_v + onto(prediction.lower_v - prediction.physics_v),
+        upper_v=own.model_v + onto(prediction.upper_v - prediction.physics_v),
+        physics_v=own.model_v,
+        soc=own.soc,
+        outside=onto(prediction.outside.astype(float)) > 0,
+        weight=onto(prediction.weight),
+    )
 
 
 @contextmanager

@@ -20,7 +20,8 @@ def prepared_series(
     """Training and validation records with their inputs, and a sentence for each input that was left out.
 
     inputs : names, by default those of the records; a library's own go first.
-    Raises DataError where there is nothing to learn.
+    Raises DataError where there is nothing to learn, or to judge by, and for a record of either that no fit, or no
+    figure, can be of.
     """
     if not split.train:
         raise DataError("there are no training records.")
@@ -35,11 +36,16 @@ def prepared_series(
         raise DataError("the voltage error is constant over the training records: there is nothing to learn.")
     if library is None:
         names, notes = _useful_inputs(train)
-    return (
-        tuple(with_inputs(record, names) for record in train),
-        tuple(with_inputs(record, names) for record in split.valid),
-        notes,
-    )
+    valid = [with_inputs(record, names) for record in split.valid]
+    for record in valid:
+        _check(record, train[0].dt_s)
+    # The first sample is given, and what is left of the others is told as a share of their squares.
+    if valid and not any(record.error_v[1:].any() for record in valid):
+        raise DataError(
+            "the voltage error is zero over the validation records, so that no share of it can be told; validate on "
+            "measured records, or on none."
+        )
+    return tuple(with_inputs(record, names) for record in train), tuple(valid), notes
 
 
 def _check(record: ErrorSeries, dt_s: float) -> None:

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aesi.data.resample import BetweenStamps, decimate, to_even
+from aesi.data.resample import BetweenStamps, after_gap, decimate, is_sparse, known_by, next_stamp, to_even
 from aesi.errors import DataError
 from aesi.records import Measurement
 
@@ -111,3 +111,18 @@ def test_a_ramp_declared_straight_between_rows_lost_charge_where_it_was_thinned(
     taken_ah, given_ah = (m.discharged_ah(m.hold_taken)[-1] for m in (few, ramp))
     assert taken_ah == pytest.approx(given_ah, rel=1e-12)
     assert "constant from here on" in few.notes[0]
+
+
+def test_what_rows_until_a_stamp_tell_is_their_average_or_the_last_one():
+    time_s, values = np.array([0.0, 0.4, 0.8, 1.0 + 1e-9, 3.5, 4.2]), np.array([1.0, 2.0, 4.0, 6.0, 8.0, 9.0])
+    stamps_s = np.arange(5.0)
+    # In (0, 1] lie three rows, the last of them at the stamp but for its last digits; in (1, 2] and (2, 3] none.
+    np.testing.assert_allclose(known_by(time_s, values, stamps_s), [1.0, 4.0, 6.0, 6.0, 8.0])
+    np.testing.assert_array_equal(next_stamp(time_s, stamps_s), [0, 1, 1, 1, 4, 4])
+
+
+def test_a_row_is_after_a_gap_where_none_is_a_step_before_it():
+    time_s = np.array([0.0, 1.0, 2.4, 5.0, 8.0])
+    np.testing.assert_array_equal(after_gap(time_s, 1.0), [False, False, False, True, True])
+    assert not is_sparse(time_s, 1.0)
+    assert is_sparse(time_s[2:], 1.0)

@@ -64,9 +64,37 @@ def test_the_band_of_a_free_run_is_wider_by_what_the_start_is_uncertain_by(model
         model.predict_record(data, SOC0, soc0_sd=float("nan"))
 
 
-def test_an_error_at_the_start_that_is_no_number_made_a_voltage_of_none(model, data):
-    with pytest.raises(InputError, match="error0_v = nan is no voltage error"):
-        model.predict(data.time_s, data.current_a, SOC0, error0_v=float("nan"))
+def test_a_free_run_without_a_measurement_began_as_if_the_error_were_measured_to_be_nought(model, data):
+    correction = replace(model.correction, memory=0.999)  # what it begins with lasts
+    lasting = replace(model, correction=correction)
+    under_load = data.take(slice(100, None))  # at rest the correction says nothing
+    drive = under_load.time_s, under_load.current_a, SOC0
+    free = lasting.predict(*drive)
+    given = free.voltage_v - free.physics_v
+    # By the inputs alone, from the first row on: an error that is measured to be that moves nothing.
+    told = lasting.predict(*drive, error0_v=float(given[0]))
+    np.testing.assert_allclose(told.voltage_v, free.voltage_v, atol=1e-12)
+    nought = lasting.predict(*drive, error0_v=0.0)
+    assert np.abs(nought.voltage_v - free.voltage_v).max() > 5e-3
+    # The first row has the band of a whole drive, as where a measurement lies long before.
+    width, known = (each.upper_v - each.lower_v for each in (free, told))
+    assert width[0] > 1.1 * known[0]
+    np.testing.assert_allclose(width[700:], known[700:], rtol=1e-9)
+    with pytest.raises(InputError, match="error0_v = nan is no voltage"):
+        lasting.predict(*drive, error0_v=float("nan"))
+
+
+def test_a_free_run_of_a_record_begins_with_its_first_voltage_and_sees_no_other(model, data):
+    record = replace(data, voltage_v=data.voltage_v + 0.004)
+    run = model.predict_record(record, SOC0)
+    assert run.voltage_v[0] == pytest.approx(record.voltage_v[0])
+    alone = replace(record, voltage_v=np.r_[record.voltage_v[0], np.full(len(data) - 1, np.nan)])
+    np.testing.assert_array_equal(model.predict_record(alone, SOC0).voltage_v, run.voltage_v)
+    between = record.take(slice(0, None, 5))  # brought to the model's step and back
+    alone = replace(between, voltage_v=np.r_[between.voltage_v[0], np.full(len(between) - 1, np.nan)])
+    run = model.predict_record(between, SOC0)
+    np.testing.assert_array_equal(model.predict_record(alone, SOC0).voltage_v, run.voltage_v)
+    assert np.isfinite(run.voltage_v).all()
 
 
 def test_the_folder_holds_no_pickle_and_predicts_the_same(model, data, tmp_path):
@@ -146,6 +174,20 @@ def test_one_step_of_rows_further_apart_than_a_step_saw_the_row_that_it_predicts
     pd.DataFrame(rows).to_csv(tmp_path / "sparse.csv", index=False)
     with pytest.raises(DataError, match="sparse: its rows are 2 s apart"):
         predict_file(folder, tmp_path / "sparse.csv", tmp_path / "out.csv", measured=True)
+
+
+@pytest.mark.parametrize("every_s", [0.3, 0.76, 1.1, 1.49])
+def test_one_step_of_rows_near_a_step_apart_saw_the_row_that_it_predicts(model, every_s):
+    time_s, current_a, voltage_v = linear_drive(model, every_s, seconds=200.0)
+    before = model.predict(time_s, current_a, SOC0, voltage_v)
+    for row in range(60, 70):
+        moved = voltage_v.copy()
+        moved[row] += 0.01
+        after = model.predict(time_s, current_a, SOC0, moved)
+        for name in ("voltage_v", "lower_v", "upper_v"):
+            was, now = (getattr(each, name)[: row + 1] for each in (before, after))
+            np.testing.assert_allclose(now, was, atol=1e-12)
+        assert np.abs(after.voltage_v - before.voltage_v).max() > 1e-5  # but later ones do
 
 
 def test_the_first_row_had_the_band_of_one_step_though_nothing_was_measured_before_it(model, data):
@@ -230,7 +272,9 @@ def test_a_cold_record_had_no_correction_and_nothing_said_so(fading, data, tmp_p
     )
     assert table["outside"].all()
     assert table["weight"].max() < 1e-3
-    np.testing.assert_allclose(table["voltage_v"], table["physics_v"], atol=1e-4)
+    np.testing.assert_allclose(
+        table["voltage_v"][1:], table["physics_v"][1:], atol=1e-4
+    )  # the first is measured
     assert "0 % of itself: this is the physics model and its last measured error." in predicted(0.0, True)[1]
 
     table, said = predicted(18.0)

@@ -1,13 +1,28 @@
 """What a run saves: a model with its own bands, or none."""
 
 import numpy as np
+import pandas as pd
 import pytest
-from small_experiment import SOC0, build_problem, conformalise, experiment, final_models, fitted, write_record
+from small_experiment import (
+    BPX,
+    SOC0,
+    build_problem,
+    conformalise,
+    evaluate,
+    experiment,
+    final_models,
+    fitted,
+    load,
+    write_record,
+)
 
 from aesi.data import read_measurement
 from aesi.errors import FitError
+from aesi.physics import Cell, initial_state
 from aesi.pipeline.experiment.judging.evaluate import evaluate_models
 from aesi.pipeline.experiment.outputs import Result, hybrid, notes
+from aesi.pipeline.simulation import predict_file, simulate_file
+from aesi.sparse import Genome
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +64,56 @@ def test_physics_that_is_saved_keeps_its_bands(record):
     one = result(record, "ESPM recalibrated", "ESPM")
     assert not [note for note in notes(one) if "saved model" in note]
     assert covered(hybrid(one), record) > 0.8
+
+
+@pytest.fixture(scope="module")
+def of_files(tmp_path_factory):
+    """A run that recalibrates on two records and is judged by a third, all of which begin at rest; and that one."""
+    folder = tmp_path_factory.mktemp("files")
+    one, two, three = (write_record(folder, f"{name}.csv", seed) for seed, name in enumerate("abc"))
+    config = experiment(
+        one,
+        data={"kind": "files", "train": [str(one), str(two)], "test": [str(three)], "hold": "backward"},
+        cell={"bpx": str(BPX), "start": "recalibrated"},
+        models=["ESPM", "AESI I"],
+    )
+    loaded = load(config)
+    problem = build_problem(loaded, config)
+    chosen = evaluate(problem, Genome.whole(problem.library, 1.0, 1e-3, 0.5, 1, 1, feedback=False))
+    judged = conformalise(
+        final_models(problem, chosen, config).fitted, problem, chosen, config, loaded.left_out
+    )
+    evaluation = evaluate_models(judged, loaded.split)
+    return Result(config, loaded, problem, chosen, [], judged, evaluation, "", 0.0), three
+
+
+def test_a_saved_model_started_elsewhere_than_the_run_that_judged_it(of_files, tmp_path):
+    one, test = of_files
+    folder = hybrid(one).save(tmp_path / "model")
+    (figures,) = (row for row in one.evaluation.rows if row["name"] == "AESI I")
+    data, out = read_measurement(test), tmp_path / "out.csv"
+    predict_file(folder, test, out)
+    predicted = pd.read_csv(out)
+    left = data.voltage_v - predicted.voltage_v
+    assert 1e3 * np.sqrt(np.mean(left**2)) == pytest.approx(figures["free_run"]["test_rmse_mv"], rel=1e-6)
+    inside = (data.voltage_v >= predicted.lower_v) & (data.voltage_v <= predicted.upper_v)
+    assert 100 * inside[1:].mean() == pytest.approx(figures["free_run_intervals"]["coverage_pct"], abs=0.1)
+    # A simulation by the saved model is of the same physics from the same start.
+    simulate_file(folder, test, tmp_path / "alone.csv")
+    (series,) = one.loaded.split.test
+    np.testing.assert_allclose(pd.read_csv(tmp_path / "alone.csv").voltage_v, series.model_v, atol=1e-7)
+    np.testing.assert_allclose(predicted.physics_v, series.model_v, atol=1e-7)
+    assert [note for note in one.loaded.notes if note.startswith("c ") and f"{series.soc[0]:.4f}" in note]
+
+
+def test_records_that_were_fitted_to_start_where_the_fit_has_them(of_files):
+    one, _ = of_files
+    seen, again = one.loaded.split.train[0], one.loaded.left_out.parts[0].series
+    declared = initial_state(Cell.from_bpx(BPX), read_measurement(one.config.data.train[0])).soc
+    assert seen.soc[0] == pytest.approx(declared, abs=1e-3)
+    # Left out, it starts where physics that has not seen it reads it to, as a test does.
+    assert again.name == seen.name
+    assert again.soc[0] != seen.soc[0]
 
 
 def test_the_ensemble_of_a_run_is_the_one_that_it_names_best(record):

@@ -10,7 +10,13 @@ from aesi.pipeline.experiment.fit import Fitted, build_problem
 from aesi.pipeline.experiment.judging.evaluate import evaluate_models
 from aesi.pipeline.experiment.judging.validation import validation_mser
 from aesi.pipeline.experiment.load import load
-from aesi.pipeline.experiment.physics_models import DECLARED, PHYSICS_NAMES, RECALIBRATED, PhysicsModels
+from aesi.pipeline.experiment.physics_models import (
+    DECLARED,
+    PHYSICS_NAMES,
+    RECALIBRATED,
+    PhysicsModels,
+    no_rows,
+)
 from aesi.pipeline.product.deviations import PhysicsStart
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Measurement
@@ -51,7 +57,7 @@ def test_a_series_knows_from_when_on_a_physics_model_ran_out():
     models = PhysicsModels(dict.fromkeys((DECLARED, RECALIBRATED), whole), DECLARED)
     time_s = np.arange(1800.0)
     record = Measurement(time_s, np.full(1800, 30.0), np.full(1800, 3.5))
-    series, empty = models.series(record, 0.3, 1.0, "linear")
+    series, empty = models.series(no_rows(record, 0.3), 1.0, "linear")
     assert empty
     run = whole.simulate(record, 0.3, "linear")
     first = int(np.argmax(run.series["depleted"] > 0.0))
@@ -59,7 +65,7 @@ def test_a_series_knows_from_when_on_a_physics_model_ran_out():
     np.testing.assert_array_equal(series.runs, time_s < first)
     assert series.take(slice(0, first)).runs.all()
     assert not series.take(slice(first, None)).runs.any()
-    full, empty = models.series(record, 0.9, 1.0, "linear")
+    full, empty = models.series(no_rows(record, 0.9), 1.0, "linear")
     assert (empty, full.ran_out_s) == (False, None)
 
 

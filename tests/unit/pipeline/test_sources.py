@@ -127,6 +127,28 @@ def test_one_state_of_charge_was_believed_for_every_record_of_a_run(tmp_path):
     assert any("later" in note and "not the 0.8 that was given" in note for note in loaded.notes)
 
 
+def test_rows_that_were_filled_in_between_those_of_a_record_were_fitted_and_judged_as_if_measured(tmp_path):
+    import pandas as pd
+
+    rows = pd.read_csv(write_record(tmp_path))
+    apart = tmp_path / "apart.csv"
+    rows.iloc[::10].to_csv(apart, index=False)
+    with pytest.raises(
+        DataError, match=r"apart: its rows are 10 s apart and data.dt_s is 1 s.*data.dt_s: 10,"
+    ):
+        load(experiment(apart))
+    data = {"kind": "files", "record": str(apart), "dt_s": 10.0}
+    repeats = {"period_s": PERIOD_S, "train": [1, 3, 5], "test": [2, 4]}
+    assert not [
+        note for note in load(experiment(apart, data=data | {"repeats": repeats})).notes if "too good" in note
+    ]
+    stamps_s = np.arange(0.0, rows["time_s"].iloc[-1], 1.25)
+    near = {name: np.interp(stamps_s, rows["time_s"], rows[name]) for name in rows} | {"time_s": stamps_s}
+    pd.DataFrame(near).to_csv(apart, index=False)
+    (told,) = (note for note in load(experiment(apart)).notes if "too good" in note)
+    assert told.startswith("apart: its rows are not just 1 s apart")
+
+
 def test_a_unit_that_was_declared_wrongly_was_told_in_options_that_a_run_does_not_have(tmp_path):
     config = experiment(write_record(tmp_path))
     data = config.data.model_copy(update={"units": {"time_s": "min"}})

@@ -227,6 +227,27 @@ def test_nan_is_refused_with_its_place():
         Problem.build(with_column(broken), SMALL)
 
 
+@pytest.mark.parametrize(
+    ("error_v", "sentence"),
+    [
+        (
+            np.where(np.arange(200) == 150, np.nan, 1e-3),
+            "v: error_v is not a number in row 151, counted from 1",
+        ),
+        (np.zeros(200), "the voltage error is zero over the validation records"),
+    ],
+)
+def test_a_fault_of_a_validation_record_was_told_as_a_divergence_of_every_candidate(error_v, sentence):
+    valid = replace(make_record(200), name="v", error_v=error_v)
+    with pytest.raises(DataError, match=sentence):
+        Problem.build(Split((make_record(300),), (valid,), ()), SMALL)
+
+
+def test_a_validation_record_of_one_row_divided_by_nothing():
+    with pytest.raises(DataError, match="1 samples are too few"):
+        Problem.build(Split((make_record(300),), (make_record(300).take(slice(0, 1)),), ()), SMALL)
+
+
 def test_a_library_larger_than_the_data_is_refused():
     with pytest.raises(DataError, match="needs more than the 99 training samples"):
         Problem.build(Split((make_record(100),), (), ()), Options(p_c=5, d=5))
