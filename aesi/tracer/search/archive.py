@@ -110,9 +110,10 @@ def _told(value: object) -> str:
     """A value, the same in every process: a dataclass by all of its fields, whatever its repr leaves out, a function by
     its code and what it is bound to."""
     if is_dataclass(value) and not isinstance(value, type):
-        return (
+        text = (
             f"{type(value).__name__} {[(one.name, _told(getattr(value, one.name))) for one in fields(value)]}"
         )
+        return f"{text} {_code(type(value).__call__)}" if callable(value) else text
     if isinstance(value, partial):
         bound = [_told(one) for one in (*value.args, *chain.from_iterable(sorted(value.keywords.items())))]
         return f"{_told(value.func)} of {bound}"

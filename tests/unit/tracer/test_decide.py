@@ -518,6 +518,22 @@ def test_of_three_names_that_one_cause_stands_for_the_third_was_lost(monkeypatch
     assert in_one(path, None)[1] == (cause.id, *names)
 
 
+def test_an_effect_that_is_a_dataclass_with_other_code_is_another_effect(tmp_path):
+    def acting(body):
+        file = tmp_path / "acting.py"
+        file.write_text(
+            "from dataclasses import dataclass\n@dataclass(frozen=True)\nclass Acting:\n    by: float = 1.0\n"
+            f"    def __call__(self, model, **values):\n        return {body}\n"
+        )
+        scope = {}
+        exec(compile(file.read_text(), str(file), "exec"), scope)
+        return replace(CATALOGUE["series_resistance"], on_model=scope["Acting"]())
+
+    one, same, other = (identity(acting(body)) for body in ("model", "model", "None"))
+    assert one == same
+    assert one != other
+
+
 def test_an_archive_knows_an_effect_by_what_it_is(path, tmp_path):
     effect = CATALOGUE["series_resistance"]
     wider = {k: replace(p, bounds=(0.0, 0.2)) for k, p in effect.parameters.items()}
