@@ -81,9 +81,24 @@ def after_gap(time_s: Array, dt_s: float) -> BoolArray:
     return np.concatenate([[False], np.diff(time_s) > MOST_STEP * dt_s])
 
 
-def is_sparse(time_s: Array, dt_s: float) -> bool:
-    """Whether most rows have none a step of dt_s before them, so that most steps would be filled in."""
-    return bool(2 * np.count_nonzero(after_gap(time_s, dt_s)) > len(time_s))
+def is_sparse(time_s: Array, current_a: Array, dt_s: float) -> bool:
+    """Whether most of the charge flows up to rows with none a step of dt_s before them, so that most of what a current
+    does would be filled in. A rest may be written as seldom as it likes."""
+    moved = np.abs(current_a[1:]) * np.diff(time_s)
+    return bool(2.0 * moved[after_gap(time_s, dt_s)[1:]].sum() > moved.sum())
+
+
+def shared_by_steps(time_s: Array, dt_s: float) -> float:
+    """What straight lines between rows give at a step of dt_s and at the step before it by the same rows: the share of
+    their weights that is common, in the mean over the record. Nought where each step has a row of its own."""
+    stamps = even_stamps(time_s, dt_s)
+    before = np.clip(np.searchsorted(time_s, stamps, side="right") - 1, 0, len(time_s) - 2)
+    of_next = np.clip((stamps - time_s[before]) / (time_s[before + 1] - time_s[before]), 0.0, 1.0)
+    of_row, moved = 1.0 - of_next, np.diff(before)
+    same_rows = np.minimum(of_row[1:], of_row[:-1]) + np.minimum(of_next[1:], of_next[:-1])
+    next_row = np.minimum(of_row[1:], of_next[:-1])
+    common = np.where(moved == 0, same_rows, np.where(moved == 1, next_row, 0.0))
+    return float(common.mean()) if len(common) else 0.0
 
 
 def known_by(time_s: Array, values: Array, stamps_s: Array) -> Array:

@@ -101,7 +101,7 @@ def initial_state(
     seen = _as_cell_saw(record, active)
     if unknown.any():
         seen = seen.take(slice(0, int(np.argmax(unknown))))
-    start = _Start(cell, seen, hold, active, model, potentials_v)
+    start = _Start(cell, seen, hold, active, model, potentials_v, float(record.current_a[0]))
     if soc0 is not None:
         try:
             read = start.read()
@@ -159,11 +159,12 @@ class _Start:
         effects: tuple[ActiveEffect, ...],
         model_name: ModelName,
         potentials_v: float,
+        written_a: float,
     ) -> None:
         self.declared, self.record, self.effects = cell, record, effects
         self.model = model_with(cell, effects)
         self.cell = self.model.cell
-        self.current_a = float(record.current_a[0])
+        self.current_a, self.written_a = float(record.current_a[0]), written_a
         self.open_circuit = OpenCircuit.at_start(self.cell, record, potentials_v)
         self.model_name, self.hold = model_name, hold
         self.load = LoadedStart(self.open_circuit, record, hold, model_name)
@@ -230,7 +231,8 @@ class _Start:
         first = self._freed_of_series(terminal, self.current_a)
         drops = [self.load.drop(first, self.current_a, before_s) for before_s in FLOWED_S]
         begun = terminal + drops[0]
-        said = f"starts under {self.current_a:.3g} A at {self.record.voltage_v[0]:.3f} V"
+        written = "" if self.written_a == self.current_a else f" ({self.written_a:.3g} A as written)"
+        said = f"starts under {self.current_a:.3g} A{written} at {self.record.voltage_v[0]:.3f} V"
         if self.open_circuit.charged(begun, drops[0]):
             words = (
                 f"{said}, and with the {1e3 * drops[0]:.0f} mV that the model drops at once at {begun:.3f} V"

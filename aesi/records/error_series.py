@@ -131,7 +131,8 @@ class ErrorModel(Protocol):
         ...
 
     def free_run(self, series: ErrorSeries, error0_v: float | None = None) -> FreeRun:
-        """Prediction from `error0_v` (default: the measured error_v[0]) with its own feedback only."""
+        """Prediction from `error0_v` with its own feedback only; by default from the measured error_v[0], and where
+        that is NaN from what the inputs give."""
         ...
 
     def k_step(self, series: ErrorSeries, steps: int) -> Array:

@@ -2,21 +2,23 @@
 
 A program that brings a record to another step writes straight lines between its rows, the row before, after or nearest,
 or means over the rows of a step. Each is made again of one record at the times of the other, with both clocks alike, or
-both beginning at their first rows, and compared where current or voltage move, to the coarser of the two files'
-decimals. A part that was resampled and whose clock was moved as well is not told.
+both beginning at their first rows, and compared where the current moves or the voltage bends, to the coarser of the two
+files' decimals: along a smooth slide two tests of one kind are alike. So a smooth slide alone is not told, nor a part
+that was resampled and whose clock was moved as well.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from aesi.numerics.typing import Array, BoolArray, IntArray
-from aesi.records.rows import FEWEST_ROWS, Overlap, Rows
+from aesi.records.rows import FEWEST_ROWS, MOVES, Overlap, Rows
 
 RESAMPLED_SHARE = 0.95
-"""Of the rows that move, that have to agree. Of 3,157 pairs of 128 measured and virtual records of one cell eight are
+"""Share of the telling rows that has to agree. Of 3,157 pairs of 128 measured and virtual records of one cell eight are
 one test in two archives and agree in all; the others in 0.02 at most, in 0.39 where one is read off straight lines
 every 60 s in 0.01 A and 1 mV, and in 0.21 where one is means over 60 s. The 128, each resampled to 0.7, 2.5 and 10
 times its step, agree with themselves in all rows, in 0.93 at least of means over 10 steps (below this 2 of 113)."""
@@ -30,7 +32,9 @@ PROBED_SHARE = 0.8
 MEANS_FROM = 1.5
 """Times the step of the finer record, from which the coarser may be means of it."""
 EDGE = 1e-6
-"""Of a step: on the edge of a mean."""
+"""Share of a step within which a row is at a time of the other record, or on the edge of a mean."""
+Ways = Callable[[Rows, Rows, Array, IntArray, list[int]], Iterator[BoolArray]]
+"""One array for each way to resample."""
 
 
 def resampled(one: Rows, other: Rows) -> Overlap | None:
@@ -47,28 +51,50 @@ def resampled(one: Rows, other: Rows) -> Overlap | None:
 
 def _in_the_other(one: Rows, other: Rows, digits: list[int]) -> Overlap | None:
     """The rows of `other` sought between those of `one`."""
-    moving = other.moving(*digits) & np.isfinite(other.voltage_v)
+    telling = _telling(other, digits)
     for ahead_s in sorted({0.0, float(other.time_s[0] - one.time_s[0])}):
         time = other.time_s - ahead_s
-        rows = np.flatnonzero(moving & (time >= one.time_s[0]) & (time <= one.time_s[-1]))
-        if len(rows) < FEWEST_ROWS:
-            continue
-        probed = rows[np.unique(np.linspace(0, len(rows) - 1, PROBED).astype(int))]
-        shares = [float(agree.mean()) for agree in _agreeing(one, other, time, probed, digits)]
-        best = int(np.argmax(shares))
-        if shares[best] < PROBED_SHARE:
-            continue
-        agree = list(_agreeing(one, other, time, rows, digits))[best]
-        share, told = float(agree.mean()), other.time_s[rows[agree]]
-        if share >= RESAMPLED_SHARE and len(told) >= FEWEST_ROWS:
-            return Overlap(len(told), share, float(told[0]), float(told[-1]), ahead_s, resampled=True)
+        inside = np.flatnonzero(telling & (time >= one.time_s[0]) & (time <= one.time_s[-1]))
+        after = np.clip(np.searchsorted(one.time_s, time[inside]), 1, len(one.time_s) - 1)
+        apart = np.minimum(
+            np.abs(one.time_s[after] - time[inside]), np.abs(time[inside] - one.time_s[after - 1])
+        )
+        # A row at a time of the other is made of none but that, and is compared more sharply where rows are shared.
+        for ways, rows in ((_between, inside[apart > EDGE * one.step_s]), (_averaged, inside)):
+            found = _agreement(one, other, time, rows, digits, ways)
+            if found is not None:
+                return replace(found, ahead_s=ahead_s)
     return None
 
 
-def _agreeing(
-    one: Rows, other: Rows, time_s: Array, rows: IntArray, digits: list[int]
-) -> Iterator[BoolArray]:
-    """(rows,) which rows of `other` are what `one` is at their times, one array a way to resample."""
+def _agreement(
+    one: Rows, other: Rows, time_s: Array, rows: IntArray, digits: list[int], ways: Ways
+) -> Overlap | None:
+    """What the two share by the best of these ways to resample; None where that is too little."""
+    if len(rows) < FEWEST_ROWS:
+        return None
+    probed = rows[np.unique(np.linspace(0, len(rows) - 1, PROBED).astype(int))]
+    shares = [float(agree.mean()) for agree in ways(one, other, time_s, probed, digits)]
+    if max(shares, default=0.0) < PROBED_SHARE:
+        return None
+    agree = list(ways(one, other, time_s, rows, digits))[int(np.argmax(shares))]
+    share, told = float(agree.mean()), other.time_s[rows[agree]]
+    if share < RESAMPLED_SHARE or len(told) < FEWEST_ROWS:
+        return None
+    return Overlap(len(told), share, float(told[0]), float(told[-1]), 0.0, resampled=True)
+
+
+def _telling(rows: Rows, digits: list[int]) -> BoolArray:
+    """(n,) True where the current moves or the voltage bends, by more than their decimals."""
+    of_current, of_voltage = digits
+    bends = np.zeros(len(rows.time_s), dtype=bool)
+    bends[1:] = np.abs(np.diff(rows.current_a)) > MOVES * 10.0**-of_current
+    bends[2:] |= np.abs(np.diff(rows.voltage_v, 2)) > MOVES * 10.0**-of_voltage
+    return np.asarray(bends & rows.moving(*digits) & np.isfinite(rows.voltage_v))
+
+
+def _between(one: Rows, other: Rows, time_s: Array, rows: IntArray, digits: list[int]) -> Iterator[BoolArray]:
+    """(rows,) which rows of `other` lie on straight lines between those of `one`; which are the one before or after."""
     at, wanted = time_s[rows], (other.current_a[rows], other.voltage_v[rows])
     before = np.clip(np.searchsorted(one.time_s, at, side="right") - 1, 0, len(one.time_s) - 2)
     share = (at - one.time_s[before]) / (one.time_s[before + 1] - one.time_s[before])
@@ -77,8 +103,15 @@ def _agreeing(
     yield _equal([low for low, _ in ends], wanted, digits) | _equal(
         [high for _, high in ends], wanted, digits
     )
+
+
+def _averaged(
+    one: Rows, other: Rows, time_s: Array, rows: IntArray, digits: list[int]
+) -> Iterator[BoolArray]:
+    """(rows,) which rows of `other` are means of those of `one` over a step, that ends, begins or lies around them."""
     if other.step_s <= MEANS_FROM * one.step_s:
         return
+    at, wanted = time_s[rows], (other.current_a[rows], other.voltage_v[rows])
     for begin in (0.0, -other.step_s, -0.5 * other.step_s):
         yield np.any([_equal(mean, wanted, digits) for mean in _means(one, other.step_s, at + begin)], axis=0)
 

@@ -292,7 +292,7 @@ def discover(
 
 
 def _discover_experiment(experiment: Path, overrides: list[str], out: Path | None, prefect: bool) -> None:
-    """Raises InputError where the finding of the experiment would be written over a file that it names."""
+    """The job of an experiment file. Raises InputError where its finding would be written over a file that it names."""
     options.say_reading([experiment])
     from aesi.pipeline.experiment.sources import named_files
     from flows.jobs.discovery import finding_folder

@@ -28,6 +28,7 @@ WHOLE_TIME = r"total|test|cumul|elapsed"
 NO_TEMPERATURE = r"time|/dt|set\b|limit|circuit"
 """Of the names of what only looks like a temperature."""
 RATE_OR_POWER = r"\bc[-_ ]?rate\b|\bpower\b|\bleistung\b"
+"""Of the names of multiples of a current, which is none of them."""
 UNIT = re.compile(
     r"[\[(<]\s*([^\])>]+?)\s*[\])>]\s*$|[/#]\s*([^/#\[\](){}]+?)\s*$|[_ ]\s*([^/_ \[\](){}]+)\s*$"
 )

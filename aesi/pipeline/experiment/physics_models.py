@@ -8,7 +8,8 @@
 The correction is learned on one of them (`cell.start`). Errors that calibrate bands, and the validation figure, have
 to come from drives that the physics had not seen either, so everything is fitted once more without each training drive.
 
-A record that the recalibration has seen starts where the fit has it. Any other one starts where the recalibrated cell
+A record that the recalibration has seen starts where the fit has it, one whose start is given there. Any other one
+starts where the recalibrated cell
 reads it to start, as it will once it is saved: its potentials are nearer than the declared ones. Trained on two drives
 of an LG M50 with an undeclared hysteresis, potential, loss of lithium, diffusivity or loss of material, it leaves 3.2,
 18.0, 21.2, 8.7 and 5.4 mV RMS of six others that begin at rest; from the declared cell's reading 3.6, 28.7, 22.8, 8.9
@@ -22,6 +23,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aesi.errors import DataError
 from aesi.physics import ActiveEffect, Cell, InitialState, ModelName
 from aesi.pipeline.experiment.recalibrate import Beginning, FitRecord, recalibrate
 from aesi.pipeline.product.deviations import (
@@ -75,13 +77,16 @@ class PhysicsModels:
     def own_reading(self, name: str, record: FitRecord, hold: Hold) -> InitialState | None:
         """Where the named physics itself reads the record to start; None where it starts as declared.
 
-        Baselines do that: what is fitted of them may be the shift of just this reading.
-        Raises DataError where the voltage belongs to no state of the cell.
+        Baselines start as declared: what is fitted of them may be the shift of just this reading. So does a record
+        whose start is given, and one whose voltage belongs to no state of the cell as recalibrated.
         """
         if name != RECALIBRATED or record.begins is None or record.rows.any():
             return None
         each = self.by_name[name]
-        return record.begins.under(each.cell, each.effects, hold, each.model)
+        try:
+            return record.begins.under(each.cell, each.effects, hold, each.model)
+        except DataError:  # by the declared cell it does
+            return None
 
     def run(self, name: str, record: FitRecord, hold: Hold) -> Run:
         """The record under the named physics, from where that has it start."""

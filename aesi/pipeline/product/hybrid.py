@@ -102,9 +102,12 @@ class HybridModel:
         """Voltage under a current, with its band.
 
         time_s, current_a : (n,) s, A (discharge positive).  voltage_v : (n,) V measured: one step ahead, each
-        sample predicted from those before it, the first by the physics alone and without a band; None: free run.
+        sample predicted from those before it, the first by the physics alone and without a band; None: free run. Of
+        rows denser than the model's step it is their mean over a step that is predicted, and the band is of that:
+        single rows scatter more.
         error0_v : V, measured minus physics at the first sample, that a free run begins with. Where it is not known
-        (None), it begins with what the inputs give, and the band is that of a whole drive from the first sample on.
+        (None), it begins with what the inputs give, and the band is that of a whole drive from the first sample on. One
+        step ahead it has no use.
         soc0 : state of charge at the first sample; None takes it from the first measured voltage at rest, else
         the model's own.  temperature_degc : as in `simulate`.
 
@@ -221,7 +224,7 @@ class HybridModel:
         return self.soc0
 
     def _check_dense(self, record: Measurement) -> None:
-        if self.correction is not None and is_sparse(record.time_s, self.dt_s):
+        if self.correction is not None and is_sparse(record.time_s, record.current_a, self.dt_s):
             apart_s = float(np.median(np.diff(record.time_s)))
             raise DataError(
                 f"{record.name}: its rows are {apart_s:g} s apart, and one step of the correction is {self.dt_s:g} s, "

@@ -5,7 +5,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aesi.data.resample import BetweenStamps, after_gap, decimate, is_sparse, known_by, next_stamp, to_even
+from aesi.data.resample import (
+    BetweenStamps,
+    after_gap,
+    decimate,
+    is_sparse,
+    known_by,
+    next_stamp,
+    shared_by_steps,
+    to_even,
+)
 from aesi.errors import DataError
 from aesi.records import Measurement
 
@@ -124,5 +133,26 @@ def test_what_rows_until_a_stamp_tell_is_their_average_or_the_last_one():
 def test_a_row_is_after_a_gap_where_none_is_a_step_before_it():
     time_s = np.array([0.0, 1.0, 2.4, 5.0, 8.0])
     np.testing.assert_array_equal(after_gap(time_s, 1.0), [False, False, False, True, True])
-    assert not is_sparse(time_s, 1.0)
-    assert is_sparse(time_s[2:], 1.0)
+    current_a = np.array([1.0, 1.0, 1.0, 1.0, 1.0])
+    assert is_sparse(time_s, current_a, 1.0)
+    assert not is_sparse(time_s[:3], current_a[:3], 1.0)
+
+
+def test_a_rest_that_is_written_seldom_was_counted_against_a_dense_drive():
+    time_s = np.r_[np.arange(1000.0), 1000.0 + 60.0 * np.arange(1200)]
+    current_a = np.r_[np.full(1000, 3.0), np.zeros(1200)]
+    assert not is_sparse(time_s, current_a, 1.0)
+    assert is_sparse(time_s, np.full_like(current_a, 3.0), 1.0)
+    assert is_sparse(np.cumsum(np.tile([0.1, 0.1, 60.0], 100)), np.ones(300), 1.0)  # a third of its rows
+
+
+def test_steps_share_rows_where_rows_are_further_apart_than_steps():
+    time_s = np.arange(100.0)
+    assert shared_by_steps(time_s, 1.0) == pytest.approx(0.0, abs=1e-12)
+    assert shared_by_steps(time_s, 0.5) == pytest.approx(
+        0.5
+    )  # half of each second step is the row of the step before
+    # Of rows at 0, 1.25, 2.5, 3.75 and 5, steps at 1 to 5 share 0.2, 0.4, 0.6, 0.4 and 0.2 with the step before.
+    assert shared_by_steps(1.25 * time_s, 1.0) == pytest.approx(0.36, abs=0.01)
+    jitter = time_s + 0.01 * np.sin(time_s)
+    assert 0.0 < shared_by_steps(jitter, 1.0) < 0.02

@@ -167,3 +167,37 @@ def test_two_cycles_of_a_virtual_cell_on_other_times_are_two_tests():
         run = simulate(cell, time, np.interp(time, np.arange(1500.0), current), 0.8 - 0.005 * k)
         cycles.append(Measurement(time, np.round(run.current_a, 2), np.round(run.voltage_v, 3), name=f"{k}"))
     check_distinct(cycles)
+
+
+@pytest.mark.parametrize("noise_v", [1e-4, 3e-4, 5e-4])
+def test_two_runs_of_one_drive_whose_voltages_are_written_to_a_millivolt_were_taken_for_one(noise_v):
+    cell = Cell.from_bpx(CELLS / "lg_m50_chen2020.bpx.json")
+    current = np.repeat(np.random.default_rng(1).normal(0.4, 0.8, 200), 10) * cell.capacity_ah
+    time = np.arange(float(len(current)))
+    voltage = simulate(cell, time, current, soc0=0.8).voltage_v
+    rng = np.random.default_rng(2)
+    first, second = (
+        Measurement(
+            time, np.round(current, 3), np.round(voltage + noise_v * rng.normal(size=len(time)), 3), name=name
+        )
+        for name in ("first", "second")
+    )
+    check_distinct([first], [second])
+
+
+@pytest.mark.parametrize("c_rate", [0.05, 1.0])
+def test_discharges_of_two_cells_of_one_make_were_taken_for_one(c_rate):
+    cell = Cell.from_bpx(CELLS / "lg_m50_chen2020.bpx.json")
+    time = np.linspace(0.0, 3000.0 / c_rate, 3000)
+    current = np.full(len(time), c_rate * cell.nominal_capacity_ah)
+    rng = np.random.default_rng(3)
+    first, second = (
+        Measurement(
+            time,
+            current,
+            np.round(simulate(one, time, current, soc0=1.0).voltage_v + 3e-4 * rng.normal(size=len(time)), 3),
+            name=name,
+        )
+        for one, name in ((cell, "first"), (replace(cell, contact_resistance_ohm=1e-4), "second"))
+    )
+    check_distinct([first], [second])
