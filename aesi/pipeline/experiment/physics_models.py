@@ -9,11 +9,10 @@ The correction is learned on one of them (`cell.start`). Errors that calibrate b
 to come from drives that the physics had not seen either, so everything is fitted once more without each training drive.
 
 A record that the recalibration has seen starts where the fit has it, one whose start is given there. Any other one
-starts where the recalibrated cell
-reads it to start, as it will once it is saved: its potentials are nearer than the declared ones. Trained on two drives
-of an LG M50 with an undeclared hysteresis, potential, loss of lithium, diffusivity or loss of material, it leaves 3.2,
-18.0, 21.2, 8.7 and 5.4 mV RMS of six others that begin at rest; from the declared cell's reading 3.6, 28.7, 22.8, 8.9
-and 5.4.
+starts where the recalibrated cell reads it to start, as it will once it is saved: its potentials are nearer than the
+declared ones. Trained on two drives of an LG M50 with an undeclared hysteresis, potential, loss of lithium, diffusivity
+or loss of material, it leaves 3.2, 18.0, 21.2, 8.7 and 5.4 mV RMS of six others that begin at rest; from the declared
+cell's reading 3.6, 28.7, 22.8, 8.9 and 5.4.
 """
 
 from __future__ import annotations
