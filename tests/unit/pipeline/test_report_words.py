@@ -317,6 +317,10 @@ def test_a_declared_model_that_is_written_unchanged_was_shown_as_a_third_one(vie
     assert "as written" not in text
     assert "model/ holds the declared model, unchanged" in text[: text.index("</header>")]
     assert discoveries.written_finding(view.discovery) == "model/ holds the recalibrated model."
+    other = view.discovery | {"after": {"test": {"rmse_mv": 1.0}}, "effects": [], "written": ["porosity"]}
+    assert discoveries.written_finding(other) == (
+        "model/ holds a recalibrated model with porosity, in place of what no hypothesis explains."
+    )
 
 
 def test_a_model_that_is_written_beside_a_refit_and_does_better_was_not_shown(views):

@@ -141,8 +141,12 @@ def _written_as(discovery: Mapping[str, Any]) -> str | None:
 def written_finding(discovery: Mapping[str, Any]) -> str:
     """A sentence on which model `model/` holds, and why it is the declared one where it is that."""
     state = _written_as(discovery)
+    if state is None and states_of(discovery)["after"] == WITH_FINDING:
+        return f"model/ holds the model {WITH_FINDING}."
     if state is None:
-        return f"model/ holds the model {states_of(discovery)['after']}."
+        names = listed([_title({}, name) for name in discovery.get("written", discovery["effects"])])
+        beside = f" with {names}, in place of what no hypothesis explains" if names else ", by another fit"
+        return f"model/ holds a recalibrated model{beside}."
     if state == "recalibrated":
         return "model/ holds the recalibrated model."
     text = "model/ holds the declared model, unchanged"
