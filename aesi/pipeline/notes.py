@@ -21,7 +21,7 @@ from aesi.records import Hold, Measurement, at_its_temperature
 
 SEPARATOR = ": "
 MERE_NAMES = re.compile(r"[^\s,]+(, [^\s,]+)*")
-"""What notes share: names of records, which hold no space."""
+"""What notes share: names of records that hold no space. A note of another stays by itself, as sentences do."""
 TELLING_K = 5.0
 """K from a cell's reference temperature beyond which activation energies tell: with 20 kJ/mol rates differ by a
 sixth. A convention."""
