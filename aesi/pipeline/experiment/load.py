@@ -251,9 +251,8 @@ def _on_grid(
         begins = Beginning(measurement, declared, shared)
         start = starts[name] = begins.under(cell, given.effects, data.hold, given.model)
         held = hold_sentence(measurement.name, data.hold, data.declared_hold is not None, "data.hold: {}")
-        even = to_even(
-            measurement, data.dt_s, data.hold
-        )  # which refuses steps that would make too many rows or none
+        # First, since it refuses a step that would make too many rows, or none.
+        even = to_even(measurement, data.dt_s, data.hold)
         sampled = _of_sampling(measurement, data.dt_s, judges=name in judging)
         notes += [
             held,
