@@ -15,7 +15,6 @@ from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.data.convert import write_csv
 from aesi.data.current import CurrentProfile, read_current
 from aesi.data.reading import Reading, record_name
-from aesi.data.resample import DENSE
 from aesi.errors import DataError, InputError, SimulationError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, BoolArray
@@ -358,11 +357,6 @@ def _of_observed(record: Measurement, model: HybridModel, apart: BoolArray) -> l
         said.append(
             f"{record.name}: in {_percent(apart)} of the rows voltage_v lies outside its own band, which follows the "
             "errors of the rows before; the middle of lower_v and upper_v is the better estimate there."
-        )
-    if float(np.median(np.diff(record.time_s))) < DENSE * model.dt_s:
-        said.append(
-            f"{record.name}: its rows are denser than the model's step of {model.dt_s:g} s, of whose averages the band "
-            "is: single rows scatter more."
         )
     if np.any(gaps := model.after_gap(record.time_s)):
         said.append(

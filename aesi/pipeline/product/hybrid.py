@@ -16,7 +16,7 @@ from typing import Any, Self
 import numpy as np
 
 from aesi.conformal import WHOLE_DRIVE, Calibrated, FreeRunBands, calibrated_from_dict
-from aesi.data.resample import after_gap, is_even, is_sparse, known_by, next_stamp, to_even
+from aesi.data.resample import is_even, is_sparse, to_even
 from aesi.errors import CellError, DataError, InputError, SimulationError
 from aesi.numerics.typing import Array, BoolArray, Numbers
 from aesi.numerics.visited import Visited
@@ -29,11 +29,13 @@ from aesi.physics.effects import active_effect
 from aesi.pipeline.product.deviations import PhysicsStart, slopes_v, start_v
 from aesi.pipeline.product.error_series import error_series
 from aesi.pipeline.product.model_folder import part_file, read_model, write_model
+from aesi.pipeline.product.one_step import rows_ahead
 from aesi.pipeline.product.prediction import Prediction
 from aesi.pipeline.product.trained import outside_trained, trained_on
 from aesi.pipeline.written import EFFECTS, HEAD
 from aesi.records import ErrorSeries, FreeRun, Hold, Measurement
 from aesi.records.checked import numbers, row_words
+from aesi.records.steps import after_gap, next_stamp
 from aesi.sparse import SparseModel
 
 END_BEFORE = ", or end the record before that (--to-s on the command line)."
@@ -102,9 +104,9 @@ class HybridModel:
         """Voltage under a current, with its band.
 
         time_s, current_a : (n,) s, A (discharge positive).  voltage_v : (n,) V measured: one step ahead, each
-        sample predicted from those before it, the first by the physics alone and without a band; None: free run. Of
-        rows denser than the model's step it is their mean over a step that is predicted, and the band is of that:
-        single rows scatter more.
+        sample predicted from those before it, the first by the physics alone and without a band; None: free run. Rows
+        denser than the model's step are predicted from the mean of those in the step before; the band is of single
+        rows.
         error0_v : V, measured minus physics at the first sample, that a free run begins with. Where it is not known
         (None), it begins with what the inputs give, and the band is that of a whole drive from the first sample on. One
         step ahead it has no use.
@@ -161,15 +163,11 @@ class HybridModel:
         soc0 = self._soc0(record, soc0, one_step)
         even = self._even(record)
         series = self._series(even, soc0)
-        own = series if even is record else self._series(record, soc0)
+        own = None if even is record else self._series(record, soc0)
         if one_step:
-            if own is not series:
-                # Filled in between rows, it would hold the voltage of the very row that is predicted from it.
-                series = replace(series, error_v=known_by(own.time_s, own.error_v, series.time_s))
-            prediction = self._one_step(series)
-        else:
-            prediction = self._free_run(self._with_slopes(series, even, soc0, soc0_sd), error0_v)
-        return prediction if own is series else _back(prediction, own, one_step=one_step)
+            return self._one_step(replace(series, own=own))
+        prediction = self._free_run(self._with_slopes(series, even, soc0, soc0_sd), error0_v)
+        return prediction if own is None else _back(prediction, own)
 
     def save(self, folder: str | Path) -> Path:
         """Write the model to a folder, made where it is missing; returns the folder."""
@@ -301,32 +299,35 @@ class HybridModel:
         return Prediction.of(series, run.error_v, low, high, run.outside, weight, alpha)
 
     def _one_step(self, series: ErrorSeries) -> Prediction:
-        n = len(series)
+        """Of the record's own rows, each as the last one of its step, a step before which it, too, is not known."""
+        own = series if series.own is None else series.own
         if self.correction is None:
+            n = len(own)
             none = np.full(n, np.nan)
-            return Prediction.of(series, np.zeros(n), none, none, np.zeros(n, dtype=bool), none, None)
-        error = self.correction.one_step(series)
+            return Prediction.of(own, np.zeros(n), none, none, np.zeros(n, dtype=bool), none, None)
+        known, ahead = series.as_known, rows_ahead(self.correction, series)
+        step = next_stamp(own.time_s, series.time_s)
+        error = self.correction.one_step(known)
         error[0] = 0.0  # nothing was measured before the first sample
-        low = high = np.full(n, np.nan)
+        low = high = np.full(len(own), np.nan)
         if self.intervals is not None:
-            residual = series.error_v - error
+            residual = ahead.left_v
             residual[0] = np.nan
-            band = self.intervals.intervals(residual, series.current_a)
-            low, high = (np.concatenate([[np.nan], bound[1:]]) for bound in (band.lower_v, band.upper_v))
+            band = self.intervals.intervals(residual, ahead.current_a)
+            at = np.searchsorted(ahead.stamps, step)
+            low, high = (np.where(step == 0, np.nan, bound[at]) for bound in (band.lower_v, band.upper_v))
         alpha = None if self.intervals is None else self.intervals.alpha
-        outside = outside_trained(self.correction.outside(series), series, self.visited)
-        return Prediction.of(series, error, low, high, outside, self.correction.kept(series), alpha)
+        outside = outside_trained(self.correction.outside(known), known, self.visited)
+        kept = self.correction.kept(known)
+        return Prediction.of(own, error[step], low, high, outside[step], kept[step], alpha)
 
 
-def _back(prediction: Prediction, own: ErrorSeries, *, one_step: bool) -> Prediction:
-    """Onto a record's own rows: the physics simulated there (`own`), the correction and its band interpolated.
-
-    one_step : those of the next stamp, a step before which the last row before this one, and not itself, is known.
-    """
-    later = next_stamp(own.time_s, prediction.time_s)
+def _back(prediction: Prediction, own: ErrorSeries) -> Prediction:
+    """Of a free run, onto a record's own rows: the physics simulated there (`own`), the correction and its band
+    interpolated."""
 
     def onto(values: Array) -> Array:
-        return values[later] if one_step else np.interp(own.time_s, prediction.time_s, values)
+        return np.interp(own.time_s, prediction.time_s, values)
 
     return replace(
         prediction,
