@@ -100,6 +100,7 @@ class HybridModel:
         voltage_v: Numbers | None = None,
         temperature_degc: Numbers | None = None,
         error0_v: float | None = None,
+        soc0_sd: float = 0.0,
     ) -> Prediction:
         """Voltage under a current, with its band.
 
@@ -112,6 +113,8 @@ class HybridModel:
         step ahead it has no use.
         soc0 : state of charge at the first sample; None takes it from the first measured voltage at rest, else
         the model's own.  temperature_degc : as in `simulate`.
+        soc0_sd : how far soc0 may be off, one standard deviation, by which the band of a free run is wider: nought
+        takes it as exact, and a band around a start that is not covers next to nothing.
 
         Raises DataError where the record cannot be simulated, its first voltage is no such cell's, soc0 is unknown, or
         one step ahead is asked for of rows that are further apart than the correction's step.
@@ -120,7 +123,7 @@ class HybridModel:
         measured = np.full(np.shape(time_s), np.nan) if free else numbers(voltage_v, "voltage_v")
         warm = _each_row(temperature_degc, np.shape(time_s))
         record = Measurement(time_s, current_a, measured, warm, "the record")
-        return self.predict_record(record, soc0, one_step=not free, error0_v=error0_v)
+        return self.predict_record(record, soc0, one_step=not free, error0_v=error0_v, soc0_sd=soc0_sd)
 
     def predict_record(
         self,
@@ -136,8 +139,8 @@ class HybridModel:
 
         error0_v : that a free run begins with; None takes it from the first voltage, as an experiment does that judges
         a model, or where that is missing as `predict` does.
-        soc0_sd : standard deviation of soc0, by what it is worth the band of a free run is wider. Raises InputError
-        for one that is no number from 0 to 1, and for an error0_v that is not finite.
+        soc0_sd : as in `predict`. Raises InputError for one that is no number from 0 to 1, and for an error0_v that is
+        not finite.
         """
         if error0_v is not None and not np.isfinite(error0_v):
             raise InputError(f"error0_v = {error0_v!r} is no voltage; give volts, or leave it out.")
@@ -275,13 +278,17 @@ class HybridModel:
         """The series with the slopes that the band needs of the physics: a simulation for each parameter left open,
         and one for the start."""
         if self.bands is not None and soc0_sd > 0.0:
-            physics = PhysicsStart(self.cell, self.cell, self.effects, model=self.model)
-            begins_v = start_v(physics, record, soc0, soc0_sd, self.hold, series.model_v)
-            series = replace(series, start_v=begins_v)
+            series = replace(series, start_v=self.start_worth_v(record, soc0, soc0_sd, series.model_v))
         if self.bands is None or self.bands.root is None:
             return series
         slopes = slopes_v(self.cell, self.effects, record, soc0, self.hold, self.model, series.model_v)
         return replace(series, slopes_v=slopes)
+
+    def start_worth_v(self, record: Measurement, soc0: float, soc0_sd: float, physics_v: Array) -> Array:
+        """(n,) V, >= 0, how far the physics_v (n,) of the record moves where it starts `soc0_sd` off soc0; see
+        `start_v`."""
+        physics = PhysicsStart(self.cell, self.cell, self.effects, model=self.model)
+        return start_v(physics, record, soc0, soc0_sd, self.hold, physics_v)
 
     def _free_run(self, series: ErrorSeries, error0_v: float | None) -> Prediction:
         n = len(series)
