@@ -22,7 +22,7 @@ from aesi.over_time import stamp
 from aesi.physics import ModelName
 from aesi.physics.arguments import check_choice, check_soc
 from aesi.physics.cell import Soh
-from aesi.pipeline.calibrate import check_records, effects_left, scaled_to
+from aesi.pipeline.calibrate import check_records, effects_left, scaled_to, start_cell
 from aesi.pipeline.discovery.budget import within_budget
 from aesi.pipeline.discovery.cold import with_cold_admitted
 from aesi.pipeline.discovery.discover import Case, run_case
@@ -116,6 +116,7 @@ def calibrate(
     temperatures_degc: Mapping[str, float] | None = None,
     dates: Mapping[str, date] | None = None,
     as_of: date | None = None,
+    cut_offs_v: tuple[float, float] | None = None,
     priors: Mapping[str, tuple[float, float]] | None = None,
     spectra: Spectra = (),
     hold: Hold | None = None,
@@ -126,6 +127,7 @@ def calibrate(
     cell, data, soc0, hold : as for `discover`; the records may be of any temperatures together.
     temperatures_degc : of records without a temperature column, by name.  dates : days of the records, by name; those
     of other days may be of another age.  as_of : day of the file's state; None takes the last with a load.
+    cut_offs_v : (lower, upper) V between which this cell is cycled; None takes those of its file.
     priors : (value, standard deviation) of parameters that are known from elsewhere, by their names in the report and
     in its units (of a factor, times the start file's); the deviation is that of the natural logarithm for factors,
     double layers and the thermal conductivity.
@@ -141,7 +143,7 @@ def calibrate(
     _check_priors(priors)
     _check_days(dates or {}, as_of)
     given = declared_model(cell)
-    declared = given.cell
+    declared = start_cell(given.cell, cut_offs_v)
     measurements = _read_all(_listed(data), hold)
     check_records(measurements, temperatures_degc)
     scaled = scaled_to(declared, measurements, temperatures_degc)  # refused before anything is fitted

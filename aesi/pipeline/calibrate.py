@@ -51,12 +51,14 @@ class Request:
     conditions : of the records. Where they name no model, the model of a saved model is fitted, or the one that the
     file was fitted with, else "espm".
     impedance : spectra to hold the result against, beside those among the conditions, which are fitted.
+    cut_offs_v : (lower, upper) V between which the records' cell is cycled; None takes those of the file.
     posterior : steps of each walker, 0 for none; seed : of these.
     title : name of the cell that is written.
     """
 
     conditions: Conditions = field(default_factory=Conditions)
     impedance: tuple[Spectrum, ...] = ()
+    cut_offs_v: tuple[float, float] | None = None
     posterior: int = 0
     seed: int = 0
     title: str | None = None
@@ -66,7 +68,15 @@ def check_request(cell: Path, request: Request) -> None:
     """Raises CellError, DataError or InputError, one sentence, for a request that can be refused without a record."""
     check_posterior(request.posterior)
     check_distinct_spectra(request.conditions.spectra, request.impedance)
-    check_names(declared_model(cell).cell, request.conditions.priors)
+    check_names(start_cell(declared_model(cell).cell, request.cut_offs_v), request.conditions.priors)
+
+
+def start_cell(cell: Cell, cut_offs_v: tuple[float, float] | None) -> Cell:
+    """The cell that a calibration starts from, between (lower, upper) V where these are given.
+
+    Raises CellError for cut-offs that no cell has.
+    """
+    return cell if cut_offs_v is None else cell.with_cut_offs(*cut_offs_v)
 
 
 def calibrate_files(
@@ -88,7 +98,7 @@ def calibrate_files(
     check_posterior(asked.posterior)
     check_distinct_spectra(conditions.spectra, asked.impedance)
     given = declared_model(cell)
-    declared, model = given.cell, conditions.model or given.model
+    declared, model = start_cell(given.cell, asked.cut_offs_v), conditions.model or given.model
     start = scaled_to(declared, measurements, conditions.temperatures_degc)
     check_spectra(start, (*conditions.spectra, *asked.impedance))
     found = calibrate(declared, measurements, replace(conditions, model=model), on_step=on_step)

@@ -93,6 +93,12 @@ def calibrate(
     cell: options.CellOption,
     data: Annotated[list[Path], typer.Option("--data", help="Measurement to fit; may be given again.")],
     out: Annotated[Path, typer.Option(help="BPX file to write; a report is written beside it.")],
+    cut_offs: Annotated[
+        str | None,
+        typer.Option(
+            help="LOWER:UPPER, V, between which this cell is cycled, where the start file has others."
+        ),
+    ] = None,
     soc0: options.Soc0 = None,
     temperature: Annotated[
         list[str] | None,
@@ -153,14 +159,14 @@ def calibrate(
     days, day = options.dates(dates, data), options.day("--as-of", as_of)
     ends = options.by_file("--until", until, data)
     witnesses, spectra = options.spectra(impedance), options.spectra(fit_impedance)
-    priors = options.priors(prior)
+    priors, limits = options.priors(prior), options.cut_offs(cut_offs)
     options.say_reading(data)
     from aesi.calibration import Conditions
     from aesi.pipeline.calibrate import Request, check_request
     from flows.jobs.calibration import calibrate as flow
 
     conditions = Conditions(soc0, temperatures, days, day, model, spectra=spectra, priors=priors)
-    request = Request(conditions, witnesses, posterior, seed, title)
+    request = Request(conditions, witnesses, limits, posterior, seed, title)
     check_request(cell, request)
     records = options.measurements(data, reading, hold, ends)
     flow(cell, records, out, request)

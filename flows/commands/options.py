@@ -298,6 +298,17 @@ def priors(pairs: list[str] | None) -> dict[str, tuple[float, float]]:
     return out
 
 
+def cut_offs(text: str | None) -> tuple[float, float] | None:
+    """`--cut-offs LOWER:UPPER` as two voltages."""
+    if text is None:
+        return None
+    try:
+        lower, upper = map(_finite, text.split(":"))
+    except ValueError:
+        raise InputError(f"--cut-offs {text}: has to read LOWER:UPPER, in V, such as 2.5:4.2.") from None
+    return lower, upper
+
+
 def day(option: str, text: str | None) -> date | None:
     """A day that an option gives."""
     try:

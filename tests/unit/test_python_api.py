@@ -14,7 +14,7 @@ import aesi
 from aesi.calibration import calibrate as fit_cell
 from aesi.data.read import examined
 from aesi.data.spectra import read_spectra
-from aesi.errors import DataError, InputError
+from aesi.errors import CellError, DataError, InputError
 from aesi.physics.effects import CATALOGUE
 from aesi.pipeline import api
 from aesi.records import Spectrum
@@ -450,3 +450,12 @@ def test_files_of_one_name_in_two_folders_had_one_name_in_python(cell, record, m
         file.parent.mkdir()
         replace(record, voltage_v=record.voltage_v + shift).to_frame().to_csv(file, index=False)
     assert [one.name for one in aesi.calibrate(cell, files).errors] == ["cold drive", "warm drive"]
+
+
+def test_a_cell_with_other_cut_offs_needed_a_start_file_of_its_own(cell, record, monkeypatch):
+    monkeypatch.setattr("aesi.pipeline.api.fit_cell", partial(fit_cell, evaluations=1))
+    found = aesi.calibrate(cell, record, cut_offs_v=(2.6, 4.15)).cell
+    assert (found.lower_voltage_v, found.upper_voltage_v) == (2.6, 4.15)
+    assert aesi.calibrate(cell, record).cell.upper_voltage_v == cell.upper_voltage_v
+    with pytest.raises(CellError, match=r"the lower cut-off \(4.15 V\) has to be"):
+        aesi.calibrate(cell, record, cut_offs_v=(4.15, 2.6))

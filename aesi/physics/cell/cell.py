@@ -6,11 +6,12 @@ Sign convention of the whole package: current is positive on discharge.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from typing import Any, Self
 
 from aesi.physics.cell.bpx_read import read_bpx
+from aesi.physics.cell.bpx_values import check_values
 from aesi.physics.cell.bpx_write import write_bpx
 from aesi.physics.cell.parts import CellParameters
 from aesi.physics.cell.relations import hashed_once
@@ -33,6 +34,18 @@ class Cell(CellParameters):
         Raises CellError, one sentence, for a file that fails the schema or lacks a field this model needs.
         """
         return cls(**vars(read_bpx(source, fitted)))
+
+    def with_cut_offs(self, lower_v: float, upper_v: float) -> Self:
+        """The cell with other cut-off voltages, V: what is empty and full of a cell that is cycled between these.
+
+        Stoichiometry limits stay, so that until a calibration has moved them a state of charge of 0 or 1 is still at
+        the cut-offs before.
+
+        Raises CellError for cut-offs that no cell has, and for an upper one far from the voltage of the full cell.
+        """
+        cell = replace(self, lower_voltage_v=lower_v, upper_voltage_v=upper_v)
+        check_values(cell, self.name)
+        return cell
 
     def to_bpx(self) -> dict[str, Any]:
         """The cell as a BPX 1.x dict; `Cell.from_bpx` gives the cell back."""

@@ -104,6 +104,8 @@ def test_usage_errors_are_exit_code_2(call, arguments):
         ([*CALIBRATE, "--temperature", "e.csv=10"], "--temperature e.csv=...: there is no such record"),
         ([*CALIBRATE, "--prior", "contact.resistance=nan:0.1"], "VALUE has to be a finite number, and SD,"),
         ([*CALIBRATE, "--prior", "contact.resistance=0.1:0"], "its standard deviation, one above 0"),
+        ([*CALIBRATE, "--cut-offs", "2.5-4.2"], "--cut-offs 2.5-4.2: has to read LOWER:UPPER, in V"),
+        ([*CALIBRATE, "--cut-offs", "2.5:inf"], "--cut-offs 2.5:inf: has to read LOWER:UPPER, in V"),
         (["run", "."], ". is a folder; give an experiment file"),
         (
             ["run", "e.yaml", "--set", "seed=1", "--set", "seed=2"],
@@ -370,6 +372,8 @@ def test_a_workspace_that_may_not_be_written_to_says_where_else_it_can_be(
             "no such parameter in this fit. There are negative.capacity, positive.capacity,",
         ),
         ("--posterior", "2", "--posterior 2: at least 4 samples"),
+        ("--cut-offs", "4.2:2.5", "the lower cut-off (4.2 V) has to be"),
+        ("--cut-offs", "2500:4200", "the upper cut-off is 4200 V; one of them is in another unit"),
     ],
 )
 def test_what_no_fit_can_be_asked_for_was_told_after_it_was_announced(

@@ -604,3 +604,14 @@ def test_days_that_are_none_are_named(content, days, sentence):
 def test_a_state_of_health_that_is_no_share_is_refused(lg_m50, soh):
     with pytest.raises(CellError, match="share of the cell file"):
         lg_m50.with_soh(soh)
+
+
+def test_cut_offs_of_another_cell_are_taken_or_refused(content):
+    cell = Cell.from_bpx(content)
+    narrow = cell.with_cut_offs(2.8, 4.1)
+    assert narrow == replace(cell, lower_voltage_v=2.8, upper_voltage_v=4.1)
+    assert narrow.to_bpx()["Parameterisation"]["Cell"]["Upper voltage cut-off [V]"] == 4.1
+    with pytest.raises(CellError, match=r"the lower cut-off \(4.1 V\) has to be"):
+        cell.with_cut_offs(4.1, 2.8)
+    with pytest.raises(CellError, match="the upper cut-off is 4200 V; one of them is in another unit"):
+        cell.with_cut_offs(2800.0, 4200.0)
