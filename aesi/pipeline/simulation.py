@@ -15,7 +15,6 @@ from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.data.convert import write_csv
 from aesi.data.current import CurrentProfile, read_current
 from aesi.data.reading import Reading, record_name
-from aesi.data.resample import DENSE
 from aesi.errors import DataError, InputError, SimulationError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, BoolArray
@@ -45,6 +44,8 @@ if TYPE_CHECKING:
 
 DIGITS = 9
 """Significant digits of what is written, except for the time (or the frequency)."""
+TOLD_SD = 0.01
+"""Of charge, for which it is told how many volts a start is worth. A convention."""
 SayNotes = Callable[[Iterable[str]], None]
 
 
@@ -59,6 +60,7 @@ class ProfileRequest:
     reading : how the file is read.
     self_heating : the cell warms itself, by the thermal data of its file.
     soh : share of the file's capacity that the cell had then, or the day of the test; None takes all of it.
+    soc0_sd : for `predict_file` alone: how far soc0 may be off, one standard deviation; None takes it as exact.
     run_on : for `simulate_file` alone: go on where a surface or the electrolyte runs empty or full, as `simulate` does
     with on_depletion="clip".
     """
@@ -69,6 +71,7 @@ class ProfileRequest:
     self_heating: bool = False
     soh: Soh | None = None
     run_on: bool = False
+    soc0_sd: float | None = None
 
 
 def simulate_file(
@@ -153,9 +156,14 @@ def predict_file(
 
     measured : one step ahead from the file's voltage; otherwise a free run, which sees the first of it at most.
     say_notes : as in `simulate_file`.
-    Raises DataError where a measurement cannot be of this cell.
+    Raises DataError where a measurement cannot be of this cell, InputError for a doubt about a start that is not given,
+    or that no band has a use for.
     """
     asked, say = asked or ProfileRequest(), say_notes or _silent
+    if asked.soc0_sd is not None and (asked.soc0 is None or measured):
+        raise InputError(
+            "--soc0-sd says how far the --soc0 of a free run may be off; give it with --soc0 and without --measured."
+        )
     profile = read_current(current, asked.reading)
     say(profile.notes)
     if measured and profile.voltage_v is None:
@@ -165,9 +173,9 @@ def predict_file(
     used = replace(saved, hold=asked.hold or saved.hold)
     placed = _placed(used, profile, current, asked, say, saved=True)
     hybrid, record = placed.model, placed.record
-    start = placed.start
+    start, soc0_sd = placed.start, placed.start.read_sd if asked.soc0_sd is None else asked.soc0_sd
     with _doubting(start, say):
-        prediction = hybrid.predict_record(record, start.soc, one_step=measured, soc0_sd=start.read_sd)
+        prediction = hybrid.predict_record(record, start.soc, one_step=measured, soc0_sd=soc0_sd)
     frame = prediction.to_frame()
     frame.insert(1, "current_a", profile.current_a)
     _write(out, frame)
@@ -175,6 +183,8 @@ def predict_file(
     alone_v = None if hybrid.correction is None or measured else prediction.physics_v
     say(reached(hybrid.cell, record, prediction.voltage_v, prediction.soc, alone_v))
     say(_of_first(record, prediction, hybrid, measured))
+    if hybrid.bands is not None and not measured and start.basis == "given" and asked.soc0_sd is None:
+        say([_of_exact(record, prediction, hybrid, start.soc)])
     say(_of_band(record, prediction, hybrid, measured))
     return len(frame)
 
@@ -324,6 +334,16 @@ def _of_first(record: Measurement, prediction: Prediction, model: HybridModel, m
     return [f"{record.name}: {words}; the band is that of a whole drive from its first row on."]
 
 
+def _of_exact(record: Measurement, prediction: Prediction, model: HybridModel, soc0: float) -> str:
+    """A sentence on what a band around a given start leaves out: that the start may be off."""
+    worth_v = model.start_worth_v(record, soc0, TOLD_SD, prediction.physics_v)
+    return (
+        f"{record.name}: the band takes the start at {soc0:.4g} as exact; {TOLD_SD:g} of charge more or less is worth "
+        f"{MV_PER_V * rms(worth_v):.1f} mV RMS along this record, and --soc0-sd widens the band by how far the start "
+        "may be off."
+    )
+
+
 def _of_band(record: Measurement, prediction: Prediction, model: HybridModel, measured: bool) -> list[str]:
     """Sentences on where the correction is used, and on what its band holds of the rows that have one."""
     if model.correction is None:
@@ -358,11 +378,6 @@ def _of_observed(record: Measurement, model: HybridModel, apart: BoolArray) -> l
         said.append(
             f"{record.name}: in {_percent(apart)} of the rows voltage_v lies outside its own band, which follows the "
             "errors of the rows before; the middle of lower_v and upper_v is the better estimate there."
-        )
-    if float(np.median(np.diff(record.time_s))) < DENSE * model.dt_s:
-        said.append(
-            f"{record.name}: its rows are denser than the model's step of {model.dt_s:g} s, of whose averages the band "
-            "is: single rows scatter more."
         )
     if np.any(gaps := model.after_gap(record.time_s)):
         said.append(

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aesi.data.resample import DENSE, is_sparse, shared_by_steps, to_even
+from aesi.data.resample import DENSE, is_sparse, off_rows, to_even
 from aesi.data.virtual import DEFAULT_MIX
 from aesi.errors import ConfigError, DataAway, DataError, InputError, SimulationError
 from aesi.numerics.files.contents import contents
@@ -41,9 +41,8 @@ from aesi.records import ErrorSeries, Hold, LeftOutDrives, Measurement, Role, Sp
 
 DFN_NOTE = "The physics is the porous electrode: DFN in tables and figures, where others have ESPM."
 
-TOLD_OF_SHARED = 0.05
-"""Share of a step that the step before has, too, from which it is told: rows a hundredth of a step off their place make
-one or two hundredths. A convention."""
+TOLD_OFF = 0.05
+"""Steps by which a row is off its stamp, in the mean, from which it is told. A convention."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,7 +252,7 @@ def _on_grid(
         held = hold_sentence(measurement.name, data.hold, data.declared_hold is not None, "data.hold: {}")
         # First, since it refuses a step that would make too many rows, or none.
         even = to_even(measurement, data.dt_s, data.hold)
-        sampled = _of_sampling(measurement, data.dt_s, judges=name in judging)
+        sampled = _of_sampling(measurement, even, data.dt_s, judges=name in judging)
         notes += [
             held,
             *sampled,
@@ -266,8 +265,8 @@ def _on_grid(
     return records, starts, notes
 
 
-def _of_sampling(measurement: Measurement, dt_s: float, *, judges: bool) -> list[str]:
-    """A sentence on a record whose figures one step ahead know something of the row that they predict.
+def _of_sampling(measurement: Measurement, even: Measurement, dt_s: float, *, judges: bool) -> list[str]:
+    """A sentence on a record whose even rows are not those that were measured.
 
     judges : of a test record, whose free run needs no dense voltage.
     Raises DataError for another whose rows are so far apart that most of it would be filled in.
@@ -280,13 +279,15 @@ def _of_sampling(measurement: Measurement, dt_s: float, *, judges: bool) -> list
             f"is fitted and judged would be filled in between rows; give data.dt_s: {apart_s:g}, or a record of "
             "denser rows."
         )
-    share = shared_by_steps(time_s, dt_s)
-    if share <= TOLD_OF_SHARED or apart_s < DENSE * dt_s:
+    if apart_s < DENSE * dt_s:
+        of_what = "averages over a step, about which single rows scatter more"
+    elif off_rows(time_s, even.time_s) > TOLD_OFF:
+        of_what = "voltages filled in between rows, which scatter less than rows do"
+    else:
         return []
     return [
-        f"{measurement.name}: its rows do not lie every {dt_s:g} s, and {share:.0%} of what is filled in at a step was "
-        "known at the step before: errors and intervals one step ahead come out too small (those of a free run do "
-        "not); a data.dt_s of several rows, over which they are averaged, avoids it."
+        f"{measurement.name}: its rows do not lie every {dt_s:g} s. In free run, errors and bands are of {of_what}; "
+        "one step ahead they are of rows as measured."
     ]
 
 
