@@ -10,6 +10,7 @@ import numpy as np
 
 from aesi.numerics.typing import Array, BoolArray
 from aesi.over_time import extent
+from aesi.records.horizons import steps_ahead
 from aesi.records.measurement import digest
 
 INPUT_NAMES = ("I", "c_sp", "c_sn", "c_e0", "c_eL")
@@ -66,8 +67,9 @@ class ErrorSeries:
         return np.full(len(self), np.nan) if self.temperature_degc is None else self.temperature_degc
 
     def steps(self, horizon_s: float) -> int:
-        """Samples that a prediction so far ahead goes over, at least one."""
-        return max(1, round(horizon_s / self.dt_s))
+        """Samples that a prediction so far ahead goes over.  Raises InputError for a horizon that the step does not
+        divide."""
+        return steps_ahead(horizon_s, self.dt_s)
 
     @property
     def digest(self) -> str:

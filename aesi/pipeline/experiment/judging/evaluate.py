@@ -26,10 +26,8 @@ from aesi.pipeline.experiment.physics_models import DECLARED
 from aesi.pipeline.product.trained import outside_trained, trained_figures, trained_on
 from aesi.pipeline.report.views import ModelVoltage, RecordTrace
 from aesi.records import ROLES, ErrorSeries, FreeRun, Role, Split
+from aesi.records.horizons import in_whole_steps
 from aesi.sparse import SparseModel
-
-HORIZONS_S = (1.0, 10.0, 60.0)
-"""Horizons of the tables, s: a sample, a manoeuvre, a minute."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +112,7 @@ def _row(one: Fitted, judged: Mapping[Role, Sequence[_Judged]], seconds: float) 
         "k_step": _k_step(ahead, test),
         "test_records": {r.series.name: _record_figures(one, r) for r in test},
         "k_step_persistence": {
-            _seconds(h): _persistence_mv(test, test[0].series.steps(h)) for h in HORIZONS_S
+            _seconds(h): _persistence_mv(test, test[0].series.steps(h)) for h in _of_tables(test)
         },
         **_one_step_intervals(one, test),
         **_free_run_intervals(one, test, ahead),
@@ -216,13 +214,18 @@ def _ahead(one: Fitted, test: Sequence[_Judged]) -> dict[float, list[Array]]:
     """Horizon in s -> (n,) V a test record: what a prediction from a measurement that long before left of the
     error; NaN where there is none so early."""
     finite = () if one.bands is None else (b.horizon_s for b in one.bands.horizons if isfinite(b.horizon_s))
-    horizons = sorted({*HORIZONS_S, *finite})
+    horizons = sorted({*_of_tables(test), *finite})
     return {h: [error_ahead(one.model, r.series, h) for r in test] for h in horizons}
+
+
+def _of_tables(test: Sequence[_Judged]) -> tuple[float, ...]:
+    """Horizons, s, at which every model is judged: those of the tables that the records' step divides."""
+    return in_whole_steps(test[0].series.dt_s)
 
 
 def _k_step(ahead: Mapping[float, Sequence[Array]], test: Sequence[_Judged]) -> dict[str, float]:
     figures = {}
-    for horizon in HORIZONS_S:
+    for horizon in _of_tables(test):
         left = _joined(each[test[0].series.steps(horizon) :] for each in ahead[horizon])
         figures[_seconds(horizon)] = MV_PER_V * rmse(left, np.zeros(len(left)))
     return figures
