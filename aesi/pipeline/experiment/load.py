@@ -16,7 +16,6 @@ import numpy as np
 from aesi.data.resample import DENSE, is_sparse, shared_by_steps, to_even
 from aesi.data.virtual import DEFAULT_MIX
 from aesi.errors import ConfigError, DataAway, DataError, InputError, SimulationError
-from aesi.numerics.files.contents import contents
 from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, simulate
 from aesi.physics.belongs import check_measured
 from aesi.physics.depletion import RUN_ON
@@ -35,6 +34,7 @@ from aesi.pipeline.experiment.sources import (
     with_keys,
 )
 from aesi.pipeline.notes import of_contradiction, of_day, on_temperatures, temperature_sentence
+from aesi.pipeline.product.contents import contents
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import ErrorSeries, Hold, LeftOutDrives, Measurement, Role, Split, hold_sentence
