@@ -186,8 +186,8 @@ def _of_repeats(config: ExperimentConfig, records: Mapping[str, FitRecord]) -> l
 
 
 def _physics(given: HybridModel, training: TrainingDrives) -> tuple[PhysicsModels, LeftOutDrives | None]:
-    """The physics, and the training drives under physics that has not seen them; None where it is the same for all:
-    as declared, or of a single drive."""
+    """The physics, and the training drives under physics that has not seen them; None of a single drive, without which
+    there is nothing to fit to. Also where the declared cell is corrected: what is fitted stands beside it."""
     config = training.config
     physics = physics_models(
         given.cell,
@@ -198,7 +198,7 @@ def _physics(given: HybridModel, training: TrainingDrives) -> tuple[PhysicsModel
         model=given.model,
         own_charges=training.of_several_records,
     )
-    if config.cell.start == "recalibrated" and len(training.drives) > 1:
+    if len(training.drives) > 1:
         return training.left_out(physics)
     return physics, None
 
