@@ -23,7 +23,7 @@ from aesi.physics.effects import activated
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.drives import by_role, cut_short, training_drives
 from aesi.pipeline.experiment.left_out import TrainingDrives, series_under
-from aesi.pipeline.experiment.physics_models import PhysicsModels, no_rows, physics_models
+from aesi.pipeline.experiment.physics_models import FREE, PhysicsModels, no_rows, physics_models
 from aesi.pipeline.experiment.recalibrate import Beginning, FitRecord
 from aesi.pipeline.experiment.sources import (
     Sources,
@@ -137,6 +137,7 @@ def _load(config: ExperimentConfig) -> Loaded:
         *_of_starts(physics, records, starts, config.data.hold),
         *told,
         *_of_repeats(config, records),
+        *_of_single(training),
         *([DFN_NOTE] if given.model == "dfn" else []),
         *of_empty,
     ]
@@ -183,6 +184,19 @@ def _of_repeats(config: ExperimentConfig, records: Mapping[str, FitRecord]) -> l
         return []
     (cut,) = records.values()
     return cut_short(cut.measurement.time_s, config.data.repeats)
+
+
+def _of_single(training: TrainingDrives) -> list[str]:
+    """A sentence on fitted physics where there is no second drive to fit it to without the first."""
+    config = training.config
+    fitted = config.cell.start == "recalibrated" or set(config.models) & set(FREE)
+    if len(training.drives) > 1 or not fitted:
+        return []
+    return [
+        "One drive trains, so that the physics fitted to it has seen the rows on which its intervals and bands are "
+        "calibrated: they may come out too narrow, also around a correction of it; a second drive, or a second repeat, "
+        "has them calibrated on what was left out."
+    ]
 
 
 def _physics(given: HybridModel, training: TrainingDrives) -> tuple[PhysicsModels, LeftOutDrives | None]:
