@@ -24,7 +24,7 @@ class ErrorSeries:
     error_v : (n,) V, V_measured - V_model.  inputs : (n, n_inputs) SI, columns `input_names`.
     soc : (n,).  model_v : (n,) V, the physics model's voltage (so V_measured = model_v + error_v).
     physics : name -> (n,) V, what other physics models say of the same record, for comparison.
-    temperature_degc : (n,) of the cell, where it was measured.
+    temperature_degc : (n,) of the cell, as measured, else as the physics had it; None where neither is known.
     slopes_v : (n, k) V, by how much a deviation of each parameter moves the physics model's voltage, where known.
     start_v : (n,) V, >= 0, what a standard deviation of the state of charge that it starts from is worth, where that
     was read from a voltage; None elsewhere.
@@ -63,7 +63,7 @@ class ErrorSeries:
 
     @property
     def degc_or_nan(self) -> Array:
-        """(n,) degC of the cell, NaN where it was not measured."""
+        """(n,) degC of the cell, NaN where it is not known."""
         return np.full(len(self), np.nan) if self.temperature_degc is None else self.temperature_degc
 
     def steps(self, horizon_s: float) -> int:

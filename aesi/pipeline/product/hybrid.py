@@ -342,6 +342,7 @@ def _back(prediction: Prediction, own: ErrorSeries, *, one_step: bool) -> Predic
         soc=own.soc,
         outside=onto(prediction.outside.astype(float)) > 0,
         weight=onto(prediction.weight),
+        temperature_degc=own.temperature_degc,
     )
 
 

@@ -268,6 +268,19 @@ def fading(model, data):
     return replace(model, correction=replace(model.correction, fade=Fade(1.0, region), leverage=None))
 
 
+def test_a_record_without_a_temperature_counted_as_of_the_trained_one(fading, data):
+    region = fading.correction.fade.region
+    cold = replace(region, visited=replace(region.visited, temperature_degc=(0.0, 0.0)))
+    at_nought = replace(fading, correction=replace(fading.correction, fade=Fade(1.0, cold)))
+    assert data.temperature_degc is None  # the physics takes it at the 25 degC of the cell's file
+    stated = replace(data, temperature_degc=np.full(len(data), 25.0))
+    runs = [at_nought.predict_record(one, SOC0) for one in (data, stated)]
+    assert all(run.outside.all() for run in runs)
+    np.testing.assert_allclose(runs[0].weight, runs[1].weight)
+    assert runs[0].weight.max() < 0.01
+    np.testing.assert_allclose(runs[0].temperature_degc, 25.0)
+
+
 def test_a_cold_record_had_no_correction_and_nothing_said_so(fading, data, tmp_path):
     folder = fading.save(tmp_path / "model")
     rows = {"time_s": data.time_s, "current_a": data.current_a, "voltage_v": data.voltage_v}
