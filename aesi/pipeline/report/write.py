@@ -33,7 +33,7 @@ def write_run_report(path: str | Path, view: RunView) -> Path:
     for section in sections.SECTIONS:
         figures.update(section.figures(view))
     chosen, physics, corrected = (
-        NOT_COMPARED | (view.model(name) or {"name": name})
+        {**NOT_COMPARED, **(view.model(name) or {"name": name})}
         for name in (view.chosen, view.physics, view.corrected)
     )
     return write_page(
