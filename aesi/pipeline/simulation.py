@@ -351,7 +351,11 @@ def _of_band(record: Measurement, prediction: Prediction, model: HybridModel, me
         said = [f"the model carries no learnt correction: one step ahead is the same as a free run{empty}."]
     else:
         figures = trained_figures(
-            prediction.outside, record.temperature_degc, model.correction, model.visited, prediction.weight
+            prediction.outside,
+            prediction.temperature_degc,
+            model.correction,
+            model.visited,
+            prediction.weight,
         )
         said = [trained_sentence(record.name, figures, one_step=measured)]
         if model.correction.fade is not None and model.correction.fade.amplitude == 0.0:

@@ -10,6 +10,7 @@ import numpy as np
 
 from aesi.numerics.typing import Array, BoolArray
 from aesi.over_time import extent
+from aesi.records.horizons import steps_ahead
 from aesi.records.measurement import digest
 from aesi.records.steps import known_by, rows_until
 
@@ -24,7 +25,7 @@ class ErrorSeries:
     error_v : (n,) V, V_measured - V_model.  inputs : (n, n_inputs) SI, columns `input_names`.
     soc : (n,).  model_v : (n,) V, the physics model's voltage (so V_measured = model_v + error_v).
     physics : name -> (n,) V, what other physics models say of the same record, for comparison.
-    temperature_degc : (n,) of the cell, where it was measured.
+    temperature_degc : (n,) of the cell, as measured, else as the physics had it; None where neither is known.
     slopes_v : (n, k) V, by how much a deviation of each parameter moves the physics model's voltage, where known.
     start_v : (n,) V, >= 0, what a standard deviation of the state of charge that it starts from is worth, where that
     was read from a voltage; None elsewhere.
@@ -66,12 +67,13 @@ class ErrorSeries:
 
     @property
     def degc_or_nan(self) -> Array:
-        """(n,) degC of the cell, NaN where it was not measured."""
+        """(n,) degC of the cell, NaN where it is not known."""
         return np.full(len(self), np.nan) if self.temperature_degc is None else self.temperature_degc
 
     def steps(self, horizon_s: float) -> int:
-        """Samples that a prediction so far ahead goes over, at least one."""
-        return max(1, round(horizon_s / self.dt_s))
+        """Samples that a prediction so far ahead goes over.  Raises InputError for a horizon that the step does not
+        divide."""
+        return steps_ahead(horizon_s, self.dt_s)
 
     @property
     def digest(self) -> str:

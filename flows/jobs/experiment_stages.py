@@ -132,18 +132,17 @@ class ExperimentJob:
         evaluation: EvaluatedModels,
     ) -> Result:
         seconds = time.monotonic() - self.started
-        rows = found.rows()
         return Result(
             loaded.config,
             loaded,
             problem,
             found.chosen,
-            rows,
+            found.rows(),
             fitted,
             evaluation,
             self.tracker.run_id,
             seconds,
-            failed=len(found.result.trials) - len(rows),
+            failed=found.result.failed,
             unfitted=models.unfitted,
         )
 

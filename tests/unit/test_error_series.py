@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from aesi.errors import InputError
 from aesi.records import ErrorSeries
+from aesi.records.horizons import in_whole_steps
 
 N = 5
 SERIES = ErrorSeries(
@@ -13,9 +15,21 @@ SERIES = ErrorSeries(
 )
 
 
-@pytest.mark.parametrize(("horizon_s", "steps"), [(0.1, 1), (0.5, 1), (10.0, 20)])
-def test_a_horizon_is_so_many_samples_and_at_least_one(horizon_s, steps):
-    assert SERIES.steps(horizon_s) == steps
+@pytest.mark.parametrize(("horizon_s", "dt_s", "steps"), [(0.5, 0.5, 1), (10.0, 0.5, 20), (60.0, 0.1, 600)])
+def test_a_horizon_is_so_many_samples(horizon_s, dt_s, steps):
+    assert replace(SERIES, dt_s=dt_s).steps(horizon_s) == steps
+
+
+@pytest.mark.parametrize("horizon_s", [0.1, 0.7])
+def test_a_horizon_that_the_step_does_not_divide_was_rounded_to_one_that_it_does(horizon_s):
+    with pytest.raises(InputError, match=rf"{horizon_s} s ahead is no whole number of steps of 0\.5 s"):
+        SERIES.steps(horizon_s)
+
+
+def test_the_tables_have_those_horizons_that_the_step_divides():
+    assert [in_whole_steps(dt_s) for dt_s in (0.1, 2.0, 30.0, 7.0)] == [
+        (1.0, 10.0, 60.0), (10.0, 60.0), (60.0,), (),
+    ]  # fmt: skip
 
 
 def test_a_temperature_that_was_not_measured_is_not_a_number():

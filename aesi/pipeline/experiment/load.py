@@ -16,7 +16,6 @@ import numpy as np
 from aesi.data.resample import DENSE, is_sparse, off_rows, to_even
 from aesi.data.virtual import DEFAULT_MIX
 from aesi.errors import ConfigError, DataAway, DataError, InputError, SimulationError
-from aesi.numerics.files.contents import contents
 from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, simulate
 from aesi.physics.belongs import check_measured
 from aesi.physics.depletion import RUN_ON
@@ -24,7 +23,7 @@ from aesi.physics.effects import activated
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.drives import by_role, cut_short, training_drives
 from aesi.pipeline.experiment.left_out import TrainingDrives, series_under
-from aesi.pipeline.experiment.physics_models import PhysicsModels, no_rows, physics_models
+from aesi.pipeline.experiment.physics_models import FREE, PhysicsModels, no_rows, physics_models
 from aesi.pipeline.experiment.recalibrate import Beginning, FitRecord
 from aesi.pipeline.experiment.sources import (
     Sources,
@@ -35,6 +34,7 @@ from aesi.pipeline.experiment.sources import (
     with_keys,
 )
 from aesi.pipeline.notes import of_contradiction, of_day, on_temperatures, temperature_sentence
+from aesi.pipeline.product.contents import contents
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import ErrorSeries, Hold, LeftOutDrives, Measurement, Role, Split, hold_sentence
@@ -136,6 +136,7 @@ def _load(config: ExperimentConfig) -> Loaded:
         *_of_starts(physics, records, starts, config.data.hold),
         *told,
         *_of_repeats(config, records),
+        *_of_single(training),
         *([DFN_NOTE] if given.model == "dfn" else []),
         *of_empty,
     ]
@@ -184,9 +185,22 @@ def _of_repeats(config: ExperimentConfig, records: Mapping[str, FitRecord]) -> l
     return cut_short(cut.measurement.time_s, config.data.repeats)
 
 
+def _of_single(training: TrainingDrives) -> list[str]:
+    """A sentence on fitted physics where there is no second drive to fit it to without the first."""
+    config = training.config
+    fitted = config.cell.start == "recalibrated" or set(config.models) & set(FREE)
+    if len(training.drives) > 1 or not fitted:
+        return []
+    return [
+        "One drive trains, so that the physics fitted to it has seen the rows on which its intervals and bands are "
+        "calibrated: they may come out too narrow, also around a correction of it; a second drive, or a second repeat, "
+        "has them calibrated on what was left out."
+    ]
+
+
 def _physics(given: HybridModel, training: TrainingDrives) -> tuple[PhysicsModels, LeftOutDrives | None]:
-    """The physics, and the training drives under physics that has not seen them; None where it is the same for all:
-    as declared, or of a single drive."""
+    """The physics, and the training drives under physics that has not seen them; None of a single drive, without which
+    there is nothing to fit to. Also where the declared cell is corrected: what is fitted stands beside it."""
     config = training.config
     physics = physics_models(
         given.cell,
@@ -197,7 +211,7 @@ def _physics(given: HybridModel, training: TrainingDrives) -> tuple[PhysicsModel
         model=given.model,
         own_charges=training.of_several_records,
     )
-    if config.cell.start == "recalibrated" and len(training.drives) > 1:
+    if len(training.drives) > 1:
         return training.left_out(physics)
     return physics, None
 

@@ -6,7 +6,8 @@
     ESPM recalibrated             all of `aesi.pipeline.experiment.recalibrate`
 
 The correction is learned on one of them (`cell.start`). Errors that calibrate bands, and the validation figure, have
-to come from drives that the physics had not seen either, so everything is fitted once more without each training drive.
+to come from drives that the physics had not seen either, so everything is fitted once more without each training drive,
+where there are several.
 
 A record that the recalibration has seen starts where the fit has it, one whose start is given there. Any other one
 starts where the recalibrated cell reads it to start, as it will once it is saved: its potentials are nearer than the

@@ -139,8 +139,10 @@ class HybridModel:
 
         error0_v : that a free run begins with; None takes it from the first voltage, as an experiment does that judges
         a model, or where that is missing as `predict` does.
-        soc0_sd : as in `predict`. Raises InputError for one that is no number from 0 to 1, and for an error0_v that is
-        not finite.
+        soc0 : None reads it, with what it is uncertain by, from the voltage that the record begins with, also for a
+        free run; where it has none it is the model's own.
+        soc0_sd : standard deviation of a soc0 that is not read, by what it is worth the band of a free run is wider.
+        Raises InputError for one that is no number from 0 to 1, and for an error0_v that is not finite.
         """
         if error0_v is not None and not np.isfinite(error0_v):
             raise InputError(f"error0_v = {error0_v!r} is no voltage; give volts, or leave it out.")
@@ -158,12 +160,13 @@ class HybridModel:
         from_first = error0_v is None and np.isfinite(measured[:1]).any()
         if one_step or from_first:
             check_voltage(self.cell, record.take(slice(0, 1)))  # from which state and error start
+        if soc0 is None:
+            soc0, soc0_sd = self._begins(record, soc0_sd)
         if one_step:
             self._check_dense(record)
         else:
             seen = np.arange(len(record)) < (1 if from_first else 0)
             record = replace(record, voltage_v=np.where(seen, measured, np.nan))
-        soc0 = self._soc0(record, soc0, one_step)
         even = self._even(record)
         series = self._series(even, soc0)
         own = None if even is record else self._series(record, soc0)
@@ -215,14 +218,15 @@ class HybridModel:
                 **read,
             )
 
-    def _soc0(self, record: Measurement, soc0: float | None, measured: bool) -> float:
-        if soc0 is not None:
-            return soc0
-        if measured:
-            return initial_state(self.cell, record, None, self.hold, self.effects, model=self.model).soc
+    def _begins(self, record: Measurement, soc0_sd: float) -> tuple[float, float]:
+        """State of charge at the first row and its standard deviation, by its voltage; the model's own without one, and
+        the deviation that was given."""
+        if np.isfinite(record.voltage_v[:1]).any():
+            read = initial_state(self.cell, record, None, self.hold, self.effects, model=self.model)
+            return read.soc, read.read_sd
         if self.soc0 is None:
             raise DataError("a free run needs soc0, the state of charge at the first sample; give it.")
-        return self.soc0
+        return self.soc0, soc0_sd
 
     def _check_dense(self, record: Measurement) -> None:
         if self.correction is not None and is_sparse(record.time_s, record.current_a, self.dt_s):
@@ -346,6 +350,7 @@ def _back(prediction: Prediction, own: ErrorSeries) -> Prediction:
         soc=own.soc,
         outside=onto(prediction.outside.astype(float)) > 0,
         weight=onto(prediction.weight),
+        temperature_degc=own.temperature_degc,
     )
 
 

@@ -47,13 +47,14 @@ def write_record(
     return path
 
 
-def experiment(record: Path, **changes: object) -> ExperimentConfig:
+def experiment(record: Path, dt_s: float = 1.0, **changes: object) -> ExperimentConfig:
     """Train on repeats 1, 3 and 5 of the record, test on 2 and 4."""
     content = {
         "name": "small",
         "data": {
             "kind": "files",
             "record": str(record),
+            "dt_s": dt_s,
             "repeats": {"period_s": PERIOD_S, "train": [1, 3, 5], "test": [2, 4]},
         },
         "cell": {"bpx": str(BPX), "soc0": SOC0, "start": "declared"},
@@ -72,9 +73,9 @@ def experiment(record: Path, **changes: object) -> ExperimentConfig:
 
 
 @cache
-def fitted(record: Path) -> tuple[Loaded, Candidate, tuple]:
+def fitted(record: Path, dt_s: float = 1.0) -> tuple[Loaded, Candidate, tuple]:
     """The experiment loaded, one candidate without feedback, and the models with their intervals."""
-    config = experiment(record)
+    config = experiment(record, dt_s)
     loaded = load(config)
     problem = build_problem(loaded, config)
     chosen = evaluate(problem, Genome.whole(problem.library, 1.0, 1e-3, 0.5, 1, 1, feedback=False))

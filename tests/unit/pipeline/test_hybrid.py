@@ -12,6 +12,7 @@ from small_experiment import SOC0, experiment, fitted, write_record
 import aesi
 from aesi.data.resample import to_even
 from aesi.errors import DataError, InputError, SimulationError
+from aesi.physics import initial_state
 from aesi.physics.effects import CATALOGUE, activated
 from aesi.physics.folded import folded
 from aesi.pipeline.discovery.cases import case_of_files
@@ -62,6 +63,20 @@ def test_the_band_of_a_free_run_is_wider_by_what_the_start_is_uncertain_by(model
     assert wide > 1.2 * narrow
     with pytest.raises(InputError, match="soc0_sd = nan is no standard deviation"):
         model.predict_record(data, SOC0, soc0_sd=float("nan"))
+
+
+def test_a_free_run_of_a_record_with_a_voltage_began_where_the_training_did(model, data):
+    elsewhere = replace(data, voltage_v=model.predict(data.time_s, data.current_a, soc0=0.6).voltage_v)
+    read = initial_state(model.cell, elsewhere, None, "backward")
+    assert abs(read.soc - 0.6) < 0.02 < abs(read.soc - model.soc0)
+    run, told = (
+        model.predict_record(elsewhere),
+        model.predict_record(elsewhere, read.soc, soc0_sd=read.read_sd),
+    )
+    for name in ("voltage_v", "lower_v", "upper_v", "soc"):
+        np.testing.assert_array_equal(getattr(run, name), getattr(told, name))
+    unmeasured = replace(data, voltage_v=np.full(len(data), np.nan))
+    assert model.predict_record(unmeasured).soc[0] == pytest.approx(model.soc0)
 
 
 def test_a_free_run_without_a_measurement_began_as_if_the_error_were_measured_to_be_nought(model, data):
@@ -275,6 +290,19 @@ def fading(model, data):
     scaled = model.correction.scaling.apply(variables)[:, 1:]
     region = TrainedRegion.of(scaled, even.soc, np.full(len(even), 24.0))
     return replace(model, correction=replace(model.correction, fade=Fade(1.0, region), leverage=None))
+
+
+def test_a_record_without_a_temperature_counted_as_of_the_trained_one(fading, data):
+    region = fading.correction.fade.region
+    cold = replace(region, visited=replace(region.visited, temperature_degc=(0.0, 0.0)))
+    at_nought = replace(fading, correction=replace(fading.correction, fade=Fade(1.0, cold)))
+    assert data.temperature_degc is None  # the physics takes it at the 25 degC of the cell's file
+    stated = replace(data, temperature_degc=np.full(len(data), 25.0))
+    runs = [at_nought.predict_record(one, SOC0) for one in (data, stated)]
+    assert all(run.outside.all() for run in runs)
+    np.testing.assert_allclose(runs[0].weight, runs[1].weight)
+    assert runs[0].weight.max() < 0.01
+    np.testing.assert_allclose(runs[0].temperature_degc, 25.0)
 
 
 def test_a_cold_record_had_no_correction_and_nothing_said_so(fading, data, tmp_path):

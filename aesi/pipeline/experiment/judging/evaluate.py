@@ -27,10 +27,8 @@ from aesi.pipeline.product.one_step import RowsAhead, rows_ahead
 from aesi.pipeline.product.trained import outside_trained, trained_figures, trained_on
 from aesi.pipeline.report.views import ModelVoltage, RecordTrace
 from aesi.records import ROLES, ErrorSeries, FreeRun, Role, Split
+from aesi.records.horizons import in_whole_steps
 from aesi.sparse import SparseModel
-
-HORIZONS_S = (1.0, 10.0, 60.0)
-"""Horizons of the tables, s: a sample, a manoeuvre, a minute."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,9 +221,10 @@ def _ahead(one: Fitted, test: Sequence[_Judged]) -> dict[float, list[Array]]:
 
 
 def _k_step(one: Fitted, test: Sequence[_Judged]) -> dict[str, dict[str, float]]:
-    """Errors of measured rows on the test part by horizon, and those of holding the last error for so long."""
+    """Errors of measured rows on the test part by horizon, and those of holding the last error for so long, at the
+    horizons of the tables that the records' step divides."""
     ours, held = {}, {}
-    for horizon in HORIZONS_S:
+    for horizon in in_whole_steps(test[0].series.dt_s):
         rows = [rows_ahead(one.model, r.series, r.series.steps(horizon)) for r in test]
         ours[_seconds(horizon)] = _rms_mv(each.judged_v for each in rows)
         held[_seconds(horizon)] = _rms_mv(each.persistence_v for each in rows)
