@@ -27,3 +27,9 @@ def counted(reasons: Mapping[str, int]) -> str:
     told = [f"{count} x {reason}" for reason, count in frequent[:MOST_TOLD]]
     others = sum(count for _, count in frequent[MOST_TOLD:])
     return "; ".join([*told, *([f"{others} x something else"] if others else [])])
+
+
+def candidates_failed(failed: Mapping[str, int], evaluated: int) -> list[str]:
+    """A sentence on the candidates of a search that failed; none where none did.  failed : reason -> how many."""
+    total = sum(failed.values())
+    return [f"{total} of {evaluated} candidates failed: {counted(failed)}."] if total else []

@@ -25,7 +25,7 @@ from aesi.pipeline.report.figures import paper_figures
 from aesi.pipeline.report.views import BootstrapView, RecordTrace, RunView
 from aesi.pipeline.report.words.runs import run_finding
 from aesi.pipeline.written import FIGURES, MODEL, PAPER_FIGURES, REPORT, SUMMARY, TABLES
-from aesi.records.failed import counted
+from aesi.records.failed import candidates_failed
 from aesi.sparse import ENSEMBLES, Candidate, Problem, SparseModel
 from aesi.sparse.ranking import svd_ranking
 
@@ -126,12 +126,10 @@ def notes(result: Result) -> tuple[str, ...]:
     """Sentences on the data, on terms and models left out, and on intervals that were not calibrated."""
     without_intervals = (note for one in result.fitted for note in one.notes)
     alone = f"The saved model is the {result.corrected} alone, without bands: {result.best} cannot be kept with it."
-    told = [alone] if not result.kept else []
-    if result.failed:
-        failed = f"{result.evaluated - len(result.candidates)} of {result.evaluated} candidates failed"
-        told.append(f"{failed}: {counted(result.failed)}.")
+    told = () if result.kept else (alone,)
+    failed = candidates_failed(result.failed, result.evaluated)
     return together(
-        (*result.loaded.notes, *result.problem.notes, *result.unfitted, *without_intervals, *told)
+        (*result.loaded.notes, *result.problem.notes, *result.unfitted, *without_intervals, *failed, *told)
     )
 
 
