@@ -8,8 +8,8 @@ Every split trains on some drives of a cell and is tested, in free run, on drive
     panasonic  the same for the Panasonic NCR18650PF
     m50t       each half (odd and even repeats) of the LG M50T's UDDS in turn
 
-Every second split of the other cells is a development split: rules and defaults may be chosen by a look at those. The others
-judge, and they alone are tested at other temperatures as well.
+Every second split of the other cells is a development split: rules and defaults may be chosen by a look at those. The
+others judge, and they alone are tested at other temperatures as well.
 """
 
 from __future__ import annotations
