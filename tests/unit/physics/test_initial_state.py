@@ -377,6 +377,40 @@ def test_a_rest_of_a_fast_logger_was_read_by_its_first_minutes():
     assert initial_state(cell, fast).soc == pytest.approx(soc, abs=0.01)
 
 
+def test_a_drive_cut_in_the_cold_was_a_full_charge_by_the_drop_of_another_file():
+    """At 3.06 V and 64 % of charge, by 1.2 V of drop: 1 +/- 0.008."""
+    true, other = (
+        Cell.from_bpx(CELLS / f"panasonic_ncr18650pf{suffix}.bpx.json") for suffix in ("", "_25degc")
+    )
+    time = np.arange(0.0, 600.0)
+    current, degc = np.full(600, true.capacity_ah), np.full(600, -20.0)
+    run = simulate(true, time, current, 0.7, temperature_degc=degc, hold="backward")
+    cut = record(time[200:] - 200.0, current[200:], run.voltage_v[200:], degc[200:])
+    found = initial_state(other, cut)
+    assert found.basis == "load"
+    assert abs(found.soc - float(run.series["soc"][200])) < 2.5 * found.sd
+
+
+def test_a_charge_that_still_flows_at_the_upper_cut_off_was_a_full_one():
+    """C/13 of a constant-voltage phase brings 1.3 % yet, and was read as 1 +/- 0.004."""
+    cell = Cell.from_bpx(CELLS / "panasonic_ncr18650pf.bpx.json")
+    time = np.arange(0.0, 60.0)
+    current = np.full(60, -cell.capacity_ah / 13.0)
+    charging = record(time, current, np.full(60, cell.upper_voltage_v))
+    assert initial_state(cell, charging).basis == "load"
+    assert initial_state(cell, replace(charging, current_a=0.01 * current)).basis == "full charge"
+
+
+def test_a_voltage_beyond_full_was_known_to_the_least_of_all_deviations():
+    open_circuit, spread_v = OpenCircuit(LG_M50), 0.08
+    end_v = float(open_circuit.ocv[-1])
+    sds = [open_circuit.reading(end_v + beyond_v, spread_v)[1] for beyond_v in (0.0, 0.01, 0.02)]
+    assert sds == sorted(sds)
+    assert sds[-1] > 1.2 * sds[0]
+    reached = open_circuit.soc_at(end_v - spread_v - 0.02)
+    assert sds[-1] == pytest.approx(0.5 * (open_circuit.soc[-1] - reached))
+
+
 def test_a_voltage_of_another_cell_is_refused():
     with pytest.raises(DataError, match=r"2\.5"):
         initial_state(LG_M50, resting(1.9))
