@@ -143,8 +143,10 @@ def _fitted_twice(told: _Told, evaluations: int) -> tuple[Array, Cell, tuple[str
     """
     model = told.model
     x = _descended(told, evaluations, np.zeros(model.layout.size))
-    found, of_heat = with_heat(rewound(model, x), model.records)
-    if of_heat:  # how fast a winding follows its case is of the file, which is fitted as it is simulated
+    plain = rewound(model, x)
+    found, of_heat = with_heat(plain, model.records)
+    if found is not plain:
+        # How fast a winding follows its case is of the file, which is fitted as it is simulated.
         model.take_heat_of(found)
         x = _descended(told, evaluations, x)
         found = rewound(model, x)

@@ -32,7 +32,7 @@ from aesi.physics.effect import ActiveEffect, Record, as_cell_saw, instruments_f
 from aesi.physics.rest.open_circuit import CHARGED_V, GIVEN_SD, GOOD_READING_V, READING_V, OpenCircuit
 from aesi.physics.rest.voltage import first_rows_v, freed_of_instruments, freed_of_series
 from aesi.physics.simulation import ModelName, model_with
-from aesi.physics.start.load import FLOWED_S, LoadedStart
+from aesi.physics.start.load import DROP_ERROR, FLOWED_S, LoadedStart
 from aesi.physics.start.relaxing import Rest, resting_rows, settled_voltage
 from aesi.physics.start.state import Basis, InitialState
 from aesi.records import Hold, Measurement
@@ -233,7 +233,7 @@ class _Start:
         begun = terminal + drops[0]
         written = "" if self.written_a == self.current_a else f" ({self.written_a:.3g} A as written)"
         said = f"starts under {self.current_a:.3g} A{written} at {self.record.voltage_v[0]:.3f} V"
-        if self.open_circuit.charged(begun, drops[0]):
+        if self._ended_full(first, begun, drops[0]):
             words = (
                 f"{said}, and with the {1e3 * drops[0]:.0f} mV that the model drops at once at {begun:.3f} V"
             )
@@ -245,6 +245,16 @@ class _Start:
             f"state of charge {soc:.3f} +/- {sd:.3f}; give --soc0 if it is known."
         )
         return InitialState(self._declared(soc), sd, "load", words)
+
+    def _ended_full(self, first_v: float, begun_v: float, drop_v: float) -> bool:
+        """Has a charge ended at the upper cut-off before this load?  first_v : V, without what is in series.
+
+        Not where one still flows. Nor by a drop that the model may have wrong by more than a full cell falls, of a cell
+        that is far from full by what was read: 1.2 V in the cold made a full one of 3.06 V and a charge of 0.64.
+        """
+        known = DROP_ERROR * drop_v <= CHARGED_V
+        near = 1.0 - self.open_circuit.soc_at(first_v) <= OTHER_STATE_LOADED
+        return self.current_a > 0.0 and (known or near) and self.open_circuit.charged(begun_v, drop_v)
 
     def _freed_of_series(self, terminal_v: float, current_a: float = 0.0) -> float:
         return freed_of_series(self.open_circuit, self.model, self.effects, terminal_v, current_a)

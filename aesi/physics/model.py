@@ -144,6 +144,21 @@ def of_record(model: EspmModel, measured: bool) -> EspmModel:
     return model if heat == model.heat else replace(model, heat=heat)
 
 
+def case_temperature_k(model: EspmModel, winding_k: Array) -> Array:
+    """(n,) K of the case of a cell with a heat balance, which a thermocouple would show where the winding has
+    `winding_k`.
+
+        (T - T_case)/R = G (T - T_amb)      R from winding to case, G from winding to surroundings, through the case
+
+    Without a balance, or a resistance R, it has the temperature of its winding; one that R lets less through than G
+    (R G > 1) has that of its surroundings.
+    """
+    if model.heat is None:
+        return winding_k
+    between = min(model.heat.conductance_w_k * model.cell.winding_resistance_k_w, 1.0)
+    return winding_k - between * (winding_k - model.cell.ambient_temperature_k)
+
+
 def heat_numbers(model: EspmModel) -> Array:
     """(3,) heat capacity J/K (0 for none), conductance W/K, surroundings K where no case was measured."""
     if model.heat is None:

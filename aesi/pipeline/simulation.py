@@ -24,7 +24,9 @@ from aesi.physics.belongs import check_belongs
 from aesi.physics.cell import Soh
 from aesi.physics.depletion import ran_out
 from aesi.physics.effects.self_heating import of_file
+from aesi.physics.model import case_temperature_k
 from aesi.physics.rest.open_circuit import GIVEN_SD
+from aesi.physics.simulation import model_with
 from aesi.pipeline.notes import (
     of_another_model,
     of_contradiction,
@@ -123,7 +125,7 @@ def simulate_file(
             on_depletion="clip" if asked.run_on else "raise",
             model=used.model,
         )
-    _write_run(out, run, profile.temperature_degc, declared.cell)
+    _write_run(out, run, profile.temperature_degc, used)
     say(reached(used.cell, placed.record, run.voltage_v, run.series["soc"]))
     if asked.run_on and np.any(run.series["depleted"]):
         at = int(np.argmax(run.series["depleted"]))
@@ -131,15 +133,16 @@ def simulate_file(
     return run
 
 
-def _write_run(out: Path, run: Run, measured_degc: Array | None, cell: Cell) -> None:
+def _write_run(out: Path, run: Run, measured_degc: Array | None, used: HybridModel) -> None:
     """Write the columns of a run.
 
-    Beside `temperature_k` stands `temperature_degc`, which files are read by: the case's where it was measured, else
-    the model's, unless that is the cell file's all along.
+    Beside `temperature_k`, the winding's, stands `temperature_degc`, which files are read by: the case's, as it was
+    measured or else by the model, unless that is the cell file's all along.
     """
     degc = measured_degc
-    if degc is None and np.any(run.series["temperature_k"] != cell.initial_temperature_k):
-        degc = run.series["temperature_k"] - ZERO_CELSIUS_K
+    winding_k = run.series["temperature_k"]
+    if degc is None and np.any(winding_k != used.cell.initial_temperature_k):
+        degc = case_temperature_k(model_with(used.cell, used.effects), winding_k) - ZERO_CELSIUS_K
     columns = {"time_s": run.time_s, "current_a": run.current_a, "voltage_v": run.voltage_v, **run.series}
     write_table(out, columns if degc is None else columns | {"temperature_degc": degc})
 

@@ -89,7 +89,9 @@ class OpenCircuit:
         return voltage_v >= self.cell.upper_voltage_v - CHARGED_V and as_read <= highest + BEYOND_V
 
     def reading(self, voltage_v: float, spread_v: float) -> tuple[float, float]:
-        """State of charge of an open-circuit voltage, and half of what the voltage +/- `spread_v` spans."""
+        """State of charge of an open-circuit voltage, and half of what the voltage +/- `spread_v` spans; beyond the
+        range, of what its end does with as much more as it is away.
+        """
         if not self.admits(voltage_v, spread_v):
             low, high = np.interp([0.0, 1.0], self.soc, self.ocv)
             of_record = f"{self.name}: " if self.name else ""
@@ -98,7 +100,10 @@ class OpenCircuit:
                 f"the open-circuit potentials and stoichiometry limits of {self.cell.name} allow; check that the "
                 "record belongs to this cell, or give --soc0."
             )
-        ends = np.interp([voltage_v - spread_v, voltage_v + spread_v], self.ocv, self.soc)
+        # Beyond full and empty the potentials say as little as they are far from it, and not that it is known.
+        inside_v = float(np.clip(voltage_v, self.ocv[0], self.ocv[-1]))
+        spread_v += abs(voltage_v - inside_v)
+        ends = np.interp([inside_v - spread_v, inside_v + spread_v], self.ocv, self.soc)
         sd = max(0.5 * float(ends[1] - ends[0]), GIVEN_SD)
         return self.soc_at(voltage_v), sd
 

@@ -3,6 +3,7 @@
 import json
 import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -390,6 +391,21 @@ def test_self_heating_that_a_measured_temperature_leaves_idle_was_told_as_simula
     assert "self_heating has nothing to add" in said[True]
     assert "with self_heating(" not in said[True]
     assert "with self_heating(" in said[False]
+
+
+def test_the_temperature_that_a_simulation_wrote_was_the_windings_and_heated_it_once_more(tmp_path):
+    """Read again as its case's, it made 36 of 33 degC after 3C, and 29 mV of the same cell."""
+    cell = Path(__file__).resolve().parents[3] / "experiments" / "cells" / "lg_18650hg2.bpx.json"
+    assert aesi.Cell.from_bpx(cell).winding_resistance_k_w > 0.1
+    profile, once, twice = (tmp_path / f"{name}.csv" for name in ("profile", "once", "twice"))
+    time = np.arange(0.0, 600.0)
+    pd.DataFrame({"time_s": time, "current_a": np.where(time < 10, 0.0, 8.0)}).to_csv(profile, index=False)
+    first = simulate_file(cell, profile, once, ProfileRequest(soc0=0.95, hold="backward", self_heating=True))
+    winding = first.series["temperature_k"]
+    assert winding[-1] > winding[0] + 5.0
+    again = simulate_file(cell, once, twice, ProfileRequest(soc0=0.95, hold="backward"))
+    np.testing.assert_allclose(again.series["temperature_k"], winding, atol=0.02)
+    np.testing.assert_allclose(again.voltage_v, first.voltage_v, atol=2e-4)
 
 
 @pytest.mark.parametrize("use", [simulate_file, predict_file])
