@@ -144,6 +144,21 @@ def of_record(model: EspmModel, measured: bool) -> EspmModel:
     return model if heat == model.heat else replace(model, heat=heat)
 
 
+def case_k(model: EspmModel, winding_k: Array) -> Array | None:
+    """(n,) K of the case, whose temperature nobody measured, of a cell whose winding is at `winding_k` (n,).
+
+        T_case = T_amb + (1 - R G) (T - T_amb)
+
+    A record of it is simulated as the model was: `of_record` conducts to the case what G gives off. None where no case
+    lies between winding and surroundings, since the balance gives off more than the winding conducts, G R >= 1.
+    """
+    if model.heat is None:
+        return winding_k
+    share = model.cell.case_share(model.heat.conductance_w_k)
+    ambient_k = model.cell.ambient_temperature_k
+    return ambient_k + share * (winding_k - ambient_k) if share > 0.0 else None
+
+
 def heat_numbers(model: EspmModel) -> Array:
     """(3,) heat capacity J/K (0 for none), conductance W/K, surroundings K where no case was measured."""
     if model.heat is None:
