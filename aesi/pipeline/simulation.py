@@ -24,7 +24,7 @@ from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, initial_st
 from aesi.physics.belongs import check_belongs
 from aesi.physics.cell import Soh
 from aesi.physics.depletion import ran_out
-from aesi.physics.effects.self_heating import of_file
+from aesi.physics.effects.self_heating import assumed, of_file
 from aesi.physics.model import case_k
 from aesi.physics.rest.open_circuit import GIVEN_SD
 from aesi.physics.simulation import model_with
@@ -221,8 +221,12 @@ def _placed(
 
     saved : it is one of a folder, whose hold it has where none is asked for.
     """
+    cooling: tuple[str, ...] = ()
     if asked.self_heating:
-        model = replace(model, effects=warmed(model.cell, model.effects))
+        heated = warmed(model.cell, model.effects)
+        if heated != model.effects and profile.temperature_degc is None:
+            cooling = assumed(model.cell)
+        model = replace(model, effects=heated)
     record = _record(profile, file, asked.hold)
     check_belongs(model.cell, [record])
     start = _start(model, record, asked.soc0)
@@ -236,6 +240,7 @@ def _placed(
             *on_temperatures(model.cell, [record.temperature_degc], model.effects),
             *of_contradiction(model, record, start.soc, model.hold),
             *_with_effects(record, model),
+            *cooling,
             *([f"when this model was made: {model.finding}"] if model.finding else []),
         ]
     )
