@@ -34,6 +34,7 @@ from aesi.calibration.result import (
 )
 from aesi.calibration.rewind import capacities, rewound
 from aesi.calibration.shapes import Shapes
+from aesi.calibration.silicon import SILICON_V
 from aesi.calibration.start import one_branch, size_assumed, sized, tell_the_size, with_activation
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError, FitError
@@ -350,7 +351,8 @@ def _of_own(model: Model, x: Array) -> tuple[str, ...]:
         if abs(silicon - 1.0) > NOTED_SILICON:
             how = "fits with" if record.slow else "has, by the slow records before and after it,"
             out.append(
-                f"{record.name}: {how} {100 * silicon:.0f} % of the silicon in the negative electrode."
+                f"{record.name}: {how} {100 * silicon:.0f} % of the capacity of the negative electrode above "
+                f"{SILICON_V:g} V (silicon, if it has any)."
             )
     return tuple(out)
 

@@ -24,7 +24,9 @@ as of graphite in O'Kane et al., Phys. Chem. Chem. Phys. 24 (2022) 7909 (35), al
 them."""
 OPEN_SHARE = 1e-3
 """Share of the largest current of a record below which no current flows (the relay is open), whatever the cycler
-reads."""
+reads. More would take the end of a charge at constant voltage for a rest: that of an LG M50T ends at 1 % of the
+largest current. The noise that hides in the small current of a slow record is another matter, see
+`aesi.calibration.records.zero.steadily_flowing`."""
 FULL_WINDOW_V = 0.15
 """A discharge is a full one if it starts within this of the upper limit and ends within twice this of the lower."""
 ALL_OF_IT = 0.95

@@ -144,19 +144,19 @@ def of_record(model: EspmModel, measured: bool) -> EspmModel:
     return model if heat == model.heat else replace(model, heat=heat)
 
 
-def case_temperature_k(model: EspmModel, winding_k: Array) -> Array:
-    """(n,) K of the case of a cell with a heat balance, which a thermocouple would show where the winding has
-    `winding_k`.
+def case_k(model: EspmModel, winding_k: Array) -> Array | None:
+    """(n,) K of the case, whose temperature nobody measured, of a cell whose winding is at `winding_k` (n,).
 
-        (T - T_case)/R = G (T - T_amb)      R from winding to case, G from winding to surroundings, through the case
+        T_case = T_amb + (1 - R G) (T - T_amb)
 
-    Without a balance, or a resistance R, it has the temperature of its winding; one that R lets less through than G
-    (R G > 1) has that of its surroundings.
+    A record of it is simulated as the model was: `of_record` conducts to the case what G gives off. None where no case
+    lies between winding and surroundings, since the balance gives off more than the winding conducts, G R >= 1.
     """
     if model.heat is None:
         return winding_k
-    between = min(model.heat.conductance_w_k * model.cell.winding_resistance_k_w, 1.0)
-    return winding_k - between * (winding_k - model.cell.ambient_temperature_k)
+    share = model.cell.case_share(model.heat.conductance_w_k)
+    ambient_k = model.cell.ambient_temperature_k
+    return ambient_k + share * (winding_k - ambient_k) if share > 0.0 else None
 
 
 def heat_numbers(model: EspmModel) -> Array:

@@ -23,8 +23,8 @@ from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, initial_st
 from aesi.physics.belongs import check_belongs
 from aesi.physics.cell import Soh
 from aesi.physics.depletion import ran_out
-from aesi.physics.effects.self_heating import of_file
-from aesi.physics.model import case_temperature_k
+from aesi.physics.effects.self_heating import assumed, of_file
+from aesi.physics.model import case_k
 from aesi.physics.rest.open_circuit import GIVEN_SD
 from aesi.physics.simulation import model_with
 from aesi.pipeline.notes import (
@@ -87,8 +87,8 @@ def simulate_file(
 ) -> Run:
     """Simulate the profile in `current` and write time, current, voltage and states to the CSV `out`.
 
-    The file has `temperature_k` and, where the temperature was measured or moves, `temperature_degc`. `depleted`, where
-    it is asked to run on, is 1 from where the model ran out.
+    The file has `temperature_k`, the winding's, and, where the temperature was measured or moves, `temperature_degc`,
+    the case's. `depleted`, where it is asked to run on, is 1 from where the model ran out.
 
     cell : a BPX file, or a folder of a saved model, whose cell and effects are taken (not its correction).
     effects : added to those.
@@ -125,7 +125,9 @@ def simulate_file(
             on_depletion="clip" if asked.run_on else "raise",
             model=used.model,
         )
-    _write_run(out, run, profile.temperature_degc, used)
+    degc, of_case = _case_degc(used, run, profile.temperature_degc, declared.cell)
+    _write_run(out, run, degc)
+    say([f"{placed.record.name}: {words}" for words in of_case])
     say(reached(used.cell, placed.record, run.voltage_v, run.series["soc"]))
     if asked.run_on and np.any(run.series["depleted"]):
         at = int(np.argmax(run.series["depleted"]))
@@ -133,18 +135,33 @@ def simulate_file(
     return run
 
 
-def _write_run(out: Path, run: Run, measured_degc: Array | None, used: HybridModel) -> None:
+def _write_run(out: Path, run: Run, case_degc: Array | None) -> None:
     """Write the columns of a run.
 
-    Beside `temperature_k`, the winding's, stands `temperature_degc`, which files are read by: the case's, as it was
-    measured or else by the model, unless that is the cell file's all along.
+    Beside `temperature_k`, which is the winding's, stands `temperature_degc`, the case's, which files are read by.
     """
-    degc = measured_degc
-    winding_k = run.series["temperature_k"]
-    if degc is None and np.any(winding_k != used.cell.initial_temperature_k):
-        degc = case_temperature_k(model_with(used.cell, used.effects), winding_k) - ZERO_CELSIUS_K
     columns = {"time_s": run.time_s, "current_a": run.current_a, "voltage_v": run.voltage_v, **run.series}
-    write_table(out, columns if degc is None else columns | {"temperature_degc": degc})
+    write_table(out, columns if case_degc is None else columns | {"temperature_degc": case_degc})
+
+
+def _case_degc(
+    used: HybridModel, run: Run, measured_degc: Array | None, declared: Cell
+) -> tuple[Array | None, tuple[str, ...]]:
+    """(n,) degC of the case in a run: as measured, else the model's, and a sentence where that does not tell it; None
+    also where it is the declared cell's all along."""
+    winding_k = run.series["temperature_k"]
+    if measured_degc is not None or np.all(winding_k == declared.initial_temperature_k):
+        return measured_degc, ()
+    model = model_with(used.cell, used.effects)
+    kelvin = case_k(model, winding_k)
+    if kelvin is not None:
+        return kelvin - ZERO_CELSIUS_K, ()
+    assert model.heat is not None
+    return None, (
+        f"the model gives off {model.heat.conductance_w_k:.3g} W/K, and the winding of the cell's file conducts "
+        f"{1.0 / model.cell.winding_resistance_k_w:.3g} W/K to its case: what the case is at it does not tell, and "
+        "temperature_degc is left out.",
+    )
 
 
 def predict_file(
@@ -214,8 +231,12 @@ def _placed(
 
     saved : it is one of a folder, whose hold it has where none is asked for.
     """
+    cooling: tuple[str, ...] = ()
     if asked.self_heating:
-        model = replace(model, effects=warmed(model.cell, model.effects))
+        heated = warmed(model.cell, model.effects)
+        if heated != model.effects and profile.temperature_degc is None:
+            cooling = assumed(model.cell)
+        model = replace(model, effects=heated)
     record = _record(profile, file, asked.hold)
     check_belongs(model.cell, [record])
     start = _start(model, record, asked.soc0)
@@ -229,6 +250,7 @@ def _placed(
             *on_temperatures(model.cell, [record.temperature_degc], model.effects),
             *of_contradiction(model, record, start.soc, model.hold),
             *_with_effects(record, model),
+            *cooling,
             *([f"when this model was made: {model.finding}"] if model.finding else []),
         ]
     )

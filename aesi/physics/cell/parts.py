@@ -213,6 +213,14 @@ class CellParameters:
         outside = self.heat_transfer_w_m2_k * self.surface_area_m2
         return outside / (1.0 + outside * self.winding_resistance_k_w)
 
+    def case_share(self, conductance_w_k: float) -> float:
+        """What its case is warmer than the surroundings by, over what the winding is, where the heat flows from this to
+        the surroundings through a conductance G (W/K) and on its way through the winding's resistance R: 1 - R G.
+
+        1 where the file tells no R; nought or less of a conductance that is larger than the winding's own, 1/R.
+        """
+        return 1.0 - self.winding_resistance_k_w * conductance_w_k
+
     @property
     def heat_capacity_j_k(self) -> float | None:
         """Density times specific heat times volume, or None where one of them is not declared."""
