@@ -80,6 +80,7 @@ class EspmModel:
     solid_order : even Legendre polynomials a particle.  electrolyte_order : polynomial degree a layer.
     electrode_points : of a porous electrode, where reaction and salt are resolved.
     substep_s : longest step of whatever is not stepped exactly.  most_substeps : of them between two samples.
+    step_refinement : how much shorter than the row and `substep_s`, whichever is less, a step is.
     """
 
     cell: Cell
@@ -92,6 +93,7 @@ class EspmModel:
     electrode_points: int = DEFAULT_ELECTRODE_POINTS
     substep_s: float = DEFAULT_SUBSTEP_S
     most_substeps: int = ANY_NUMBER
+    step_refinement: float = 1.0
 
     def of(self, cell: Cell) -> EspmModel:
         """The same model of another cell."""
