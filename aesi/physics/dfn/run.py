@@ -16,9 +16,9 @@ from aesi.records import Hold
 
 LONGER_STEPS = 5.0
 """Steps here over those of the single particle, whose deviations are of first order: on half-hour pulses 5 s instead of
-0.25 s move the voltage by 0.002 mV RMS, 15 s by 0.014, 60 s by 0.2. Where a diffusivity spans
-three decades, under pulses of 10 s, they are 0.05 mV RMS off steps of 1/32 s at 25 degC and 0.20 at 0 degC, where the
-single particle in steps of 1 s is 0.04 and 0.28 off its own."""
+0.25 s move the voltage by 0.002 mV RMS, 15 s by 0.014, 60 s by 0.2. Where a diffusivity spans three decades, under
+pulses of 10 s, they are 0.05 mV RMS off steps of 1/32 s at 25 degC and 0.20 at 0 degC, where the single particle in
+steps of 1 s is 0.04 and 0.28 off its own."""
 
 
 def run_porous_electrode(
