@@ -76,11 +76,13 @@ class OpenCircuit:
         """V, the open-circuit voltage."""
         return float(np.interp(soc, self.soc, self.ocv))
 
-    def full_sd(self, voltage_v: float) -> float:
-        """Standard deviation of the state of charge of a full cell that rests at `voltage_v`."""
-        return max(
-            0.5 * abs(1.0 - self.soc_at(voltage_v)), self.reading(self.voltage_at(1.0), self.potentials_v)[1]
-        )
+    def full_sd(self, voltage_v: float, doubt_v: float = 0.0) -> float:
+        """Standard deviation of the state of charge of a full cell that rests at `voltage_v`.
+
+        doubt_v : V that this may be off by, beside the potentials.
+        """
+        spread_v = float(np.hypot(self.potentials_v, doubt_v))
+        return max(0.5 * abs(1.0 - self.soc_at(voltage_v)), self.reading(self.voltage_at(1.0), spread_v)[1])
 
     def charged(self, voltage_v: float, drop_v: float = 0.0) -> bool:
         """Is this rest voltage that of a full charge?  drop_v : of it is the model's, which may be far too much."""
@@ -89,7 +91,9 @@ class OpenCircuit:
         return voltage_v >= self.cell.upper_voltage_v - CHARGED_V and as_read <= highest + BEYOND_V
 
     def reading(self, voltage_v: float, spread_v: float) -> tuple[float, float]:
-        """State of charge of an open-circuit voltage, and half of what the voltage +/- `spread_v` spans."""
+        """State of charge of an open-circuit voltage, and half of what the voltage +/- `spread_v` spans; beyond the
+        range, of what its end does with as much more as it is away.
+        """
         if not self.admits(voltage_v, spread_v):
             low, high = np.interp([0.0, 1.0], self.soc, self.ocv)
             of_record = f"{self.name}: " if self.name else ""
@@ -98,7 +102,10 @@ class OpenCircuit:
                 f"the open-circuit potentials and stoichiometry limits of {self.cell.name} allow; check that the "
                 "record belongs to this cell, or give --soc0."
             )
-        ends = np.interp([voltage_v - spread_v, voltage_v + spread_v], self.ocv, self.soc)
+        # Beyond full and empty the potentials say as little as they are far from it, and not that it is known.
+        inside_v = float(np.clip(voltage_v, self.ocv[0], self.ocv[-1]))
+        spread_v += abs(voltage_v - inside_v)
+        ends = np.interp([inside_v - spread_v, inside_v + spread_v], self.ocv, self.soc)
         sd = max(0.5 * float(ends[1] - ends[0]), GIVEN_SD)
         return self.soc_at(voltage_v), sd
 
