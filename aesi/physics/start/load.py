@@ -23,7 +23,7 @@ import numpy as np
 from aesi.constants import SECONDS_PER_HOUR, ZERO_CELSIUS_K
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
-from aesi.physics.rest.open_circuit import OpenCircuit
+from aesi.physics.rest.open_circuit import GIVEN_SD, OpenCircuit
 from aesi.physics.simulation import ModelName, simulate
 from aesi.records import Hold, Measurement
 
@@ -125,9 +125,10 @@ class LoadedStart:
         levels_v = levels_v[:, [0 if h.began else 1 + h.kind for h in histories]]
         doubt_v = DROP_ERROR * float(np.sqrt((weight * levels_v**2).sum()))
         spread_v = float(np.hypot(self.open_circuit.potentials_v, doubt_v))
-        by_level = self.open_circuit.reading(self.open_circuit.voltage_at(mean), spread_v)[1]
+        least, most = self.open_circuit.ends(self.open_circuit.voltage_at(mean), 0.5 * spread_v)
         began = weight.sum(axis=0) @ [h.began for h in histories]
-        return mean, float(np.hypot(np.sqrt(variance), by_level)), bool(began >= 0.5)
+        sd = float(np.hypot(np.sqrt(variance), 0.5 * (most - least)))
+        return mean, max(sd, GIVEN_SD), bool(began >= 0.5)
 
     def drop(self, voltage_v: float, current_a: float, before_s: float) -> float:
         """V between the open-circuit voltage and `voltage_v`, under a current that flows since `before_s`."""

@@ -189,6 +189,17 @@ def test_a_charge_that_still_flowed_at_the_upper_cut_off_had_ended_full(c_rate):
     assert abs(found.soc - soc) < 2.0 * found.sd
 
 
+@pytest.mark.parametrize("soc0", [1.05, 1.07])
+def test_a_charge_beyond_full_is_read_as_far_as_the_potentials_reach(soc0):
+    cell = Cell.from_bpx(CELLS / "panasonic_ncr18650pf.bpx.json")
+    time = np.arange(0.0, 600.0, 10.0)
+    current = np.full(len(time), -0.2 * cell.capacity_ah)
+    run = simulate(cell, time, current, soc0, (), -10.0, "backward", on_depletion="clip")
+    found = initial_state(cell, record(time, current, run.voltage_v, np.full(len(time), -10.0)))
+    assert found.basis == "load"
+    assert abs(found.soc - soc0) < 2.0 * found.sd
+
+
 def test_a_full_charge_under_load_is_as_uncertain_as_the_drop():
     open_circuit = OpenCircuit(LG_M50)
     full_v = open_circuit.voltage_at(1.0)
