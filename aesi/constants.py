@@ -8,5 +8,6 @@ ZERO_CELSIUS_K = 273.15
 COLDEST_DEGC, WARMEST_DEGC = -60.0, 150.0
 """Of a cell: colder than any is cycled, warmer than any survives; kelvins lie above."""
 MV_PER_V = 1000.0
+J_PER_KJ = 1000.0
 MILLI = 1000.0
 """Thousandths in one: mohm of an ohm."""

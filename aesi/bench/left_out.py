@@ -45,6 +45,7 @@ class MeasuredSet:
 
 SETS = (
     MeasuredSet("about_energy_nmc", None, ("C20", "C2", "1C", "drive_cycle"), ()),
+    MeasuredSet("about_energy_lfp", None, ("C20", "C2", "1C", "2C", "drive_cycle"), ()),
     MeasuredSet("lg_m50t_w8", "lg_m50_chen2020.bpx.json", ("n0_c20_discharge", "n0_hppc"), ("n0_udds",)),
     MeasuredSet(
         "lg_18650hg2", "lg_18650hg2_25degc.bpx.json", ("25degC_cap_1c_b",),

@@ -34,7 +34,15 @@ from aesi.calibration.result import (
 )
 from aesi.calibration.rewind import capacities, rewound
 from aesi.calibration.shapes import Shapes
-from aesi.calibration.start import one_branch, size_assumed, sized, tell_the_size, with_activation
+from aesi.calibration.silicon import SILICON_V
+from aesi.calibration.start import (
+    of_activation,
+    one_branch,
+    size_assumed,
+    sized,
+    tell_the_size,
+    with_activation,
+)
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError, FitError
 from aesi.numerics.metrics import rms
@@ -143,8 +151,10 @@ def _fitted_twice(told: _Told, evaluations: int) -> tuple[Array, Cell, tuple[str
     """
     model = told.model
     x = _descended(told, evaluations, np.zeros(model.layout.size))
-    found, of_heat = with_heat(rewound(model, x), model.records)
-    if of_heat:  # how fast a winding follows its case is of the file, which is fitted as it is simulated
+    plain = rewound(model, x)
+    found, of_heat = with_heat(plain, model.records)
+    if found is not plain:
+        # How fast a winding follows its case is of the file, which is fitted as it is simulated.
         model.take_heat_of(found)
         x = _descended(told, evaluations, x)
         found = rewound(model, x)
@@ -191,7 +201,7 @@ def problem(
     placed, of_temperature = with_temperatures(
         start, [data for data, _ in kept], conditions.temperatures_degc
     )
-    start, of_activation = with_activation(start)
+    declared, start = start, with_activation(start)
     telling = () if conditions.same_cell else tell_the_size(cell, records)
     of_potentials = filter(None, (unlike(start, records[i]) for i in telling))
     cut = [r.name for r, whole in zip(placed, records, strict=True) if r.time_s[0] > whole.time_s[0]]
@@ -203,11 +213,13 @@ def problem(
     span = _span_k(start, ready, spectra)
     on_case = any(r.kelvin is not None and measured_on_case(r.kelvin) for r in ready)
     start = with_interfaces(start, on_case)
+    free = with_priors(free_parameters(start, span, conditions.same_cell, on_case), conditions.priors)
+    energies = {f.name: (f.start, f.sd) for f in free if f.name.endswith("_energy")}
     ageing = Ageing.of(ready, conditions.dates, conditions.as_of)
     model = Model(
         start,
         ready,
-        with_priors(free_parameters(start, span, conditions.same_cell, on_case), conditions.priors),
+        free,
         Shapes.over(start, span),
         zero,
         ageing,
@@ -222,7 +234,7 @@ def problem(
         *of_temperature,
         *(f"{name}: {OF_ROWS_LEFT_OUT}" for name in cut if conditions.soc0 is not None),
         *_of_small_span(span, len(ready)),
-        *of_activation,
+        *of_activation(declared, start, energies, [f.name for f in free if f.given]),
         *(r.start.sentence for r in ready if not r.start.against_voltage),  # those are warnings
         *of_spectra,
         *map(hold_told, ready),
@@ -348,7 +360,8 @@ def _of_own(model: Model, x: Array) -> tuple[str, ...]:
         if abs(silicon - 1.0) > NOTED_SILICON:
             how = "fits with" if record.slow else "has, by the slow records before and after it,"
             out.append(
-                f"{record.name}: {how} {100 * silicon:.0f} % of the silicon in the negative electrode."
+                f"{record.name}: {how} {100 * silicon:.0f} % of the capacity of the negative electrode above "
+                f"{SILICON_V:g} V (silicon, if it has any)."
             )
     return tuple(out)
 

@@ -14,7 +14,7 @@ from aesi.calibration.records.prepared import Prepared
 from aesi.calibration.records.spectra import FittedSpectra
 from aesi.calibration.records.zero import Zero
 from aesi.calibration.shapes import Shapes
-from aesi.calibration.silicon import SILICON_SD, silicon_edge, stretched, with_silicon
+from aesi.calibration.silicon import SILICON_SD, may_have_silicon, silicon_edge, stretched, with_silicon
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
 from aesi.physics.model import EspmModel
@@ -123,7 +123,7 @@ class Model:
         self.spectra = FittedSpectra(tuple(spectra), model_name)
         self.cell, self.records, self.free, self.shapes, self.zero = cell, records, free, shapes, zero
         self.ageing = ageing
-        silicon = sum(r.slow for r in records) >= TELL_SILICON
+        silicon = sum(r.slow for r in records) >= TELL_SILICON and may_have_silicon(cell.negative)
         self.layout = WorkingVector(len(free), shapes.size, len(records), silicon)
         self.edge = silicon_edge(cell.negative)
         self.weights = [r.trusted.astype(float) / (ERROR_V * REPEATS**0.5) for r in records]

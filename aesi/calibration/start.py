@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from aesi.constants import SECONDS_PER_HOUR
+from aesi.constants import J_PER_KJ, SECONDS_PER_HOUR
 from aesi.numerics.typing import Array, BoolArray
 from aesi.over_time import stamp
 from aesi.physics.cell import Cell
@@ -24,7 +24,9 @@ as of graphite in O'Kane et al., Phys. Chem. Chem. Phys. 24 (2022) 7909 (35), al
 them."""
 OPEN_SHARE = 1e-3
 """Share of the largest current of a record below which no current flows (the relay is open), whatever the cycler
-reads."""
+reads. More would take the end of a charge at constant voltage for a rest: that of an LG M50T ends at 1 % of the
+largest current. The noise that hides in the small current of a slow record is another matter, see
+`aesi.calibration.records.zero.steadily_flowing`."""
 FULL_WINDOW_V = 0.15
 """A discharge is a full one if it starts within this of the upper limit and ends within twice this of the lower."""
 ALL_OF_IT = 0.95
@@ -76,37 +78,67 @@ def size_assumed(cell: Cell, measurements: Sequence[Measurement]) -> str:
     )
 
 
-def with_activation(cell: Cell) -> tuple[Cell, tuple[str, ...]]:
-    """The cell with typical activation energies where it declares none, and a sentence that names them."""
-    filled = []
-    changed = cell
-    for side, electrode in (("negative", cell.negative), ("positive", cell.positive)):
-        changes = {}
-        if not electrode.diffusivity_ea_j_mol:
-            changes["diffusivity_ea_j_mol"] = TYPICAL_SOLID_EA_J_MOL
-        if not electrode.rate_ea_j_mol:
-            changes["rate_ea_j_mol"] = TYPICAL_RATE_EA_J_MOL
-        if changes:
-            with_side = changed.with_negative if side == "negative" else changed.with_positive
-            changed = with_side(**changes)
-            filled += [
-                f"{side} {name.removesuffix('_ea_j_mol')} {v / 1e3:g} kJ/mol" for name, v in changes.items()
-            ]
-    electrolyte = {
-        name: TYPICAL_ELECTROLYTE_EA_J_MOL
-        for name in ("conductivity_ea_j_mol", "diffusivity_ea_j_mol")
-        if not getattr(cell.electrolyte, name)
+def declared_energies(cell: Cell) -> dict[str, float]:
+    """Activation energies of the cell, J/mol, by the name of the parameter that moves them in a fit; 0 for one that it
+    does not declare. Those of films are there where it has films that answer to temperature."""
+    n, p, e = cell.negative, cell.positive, cell.electrolyte
+    films = {"negative.film_energy": n.film_ea_j_mol, "positive.film_energy": p.film_ea_j_mol}
+    return {
+        "negative.diffusivity_energy": n.diffusivity_ea_j_mol,
+        "negative.rate_energy": n.rate_ea_j_mol,
+        "positive.diffusivity_energy": p.diffusivity_ea_j_mol,
+        "positive.rate_energy": p.rate_ea_j_mol,
+        "electrolyte.conductivity_energy": e.conductivity_ea_j_mol,
+        "electrolyte.diffusivity_energy": e.diffusivity_ea_j_mol,
+        **{name: energy for name, energy in films.items() if energy},
     }
-    if electrolyte:
-        changed = changed.with_electrolyte(**electrolyte)
-        filled += [
-            f"electrolyte {n.removesuffix('_ea_j_mol')} {v / 1e3:g} kJ/mol" for n, v in electrolyte.items()
-        ]
-    if not filled:
-        return cell, ()
-    return changed, (
-        f"no activation energy is declared for these, typical ones are taken: {', '.join(filled)}.",
+
+
+def with_activation(cell: Cell) -> Cell:
+    """The cell with typical activation energies where it declares none."""
+    n, p, e = cell.negative, cell.positive, cell.electrolyte
+    for with_side, electrode in ((Cell.with_negative, n), (Cell.with_positive, p)):
+        cell = with_side(
+            cell,
+            diffusivity_ea_j_mol=electrode.diffusivity_ea_j_mol or TYPICAL_SOLID_EA_J_MOL,
+            rate_ea_j_mol=electrode.rate_ea_j_mol or TYPICAL_RATE_EA_J_MOL,
+        )
+    return cell.with_electrolyte(
+        conductivity_ea_j_mol=e.conductivity_ea_j_mol or TYPICAL_ELECTROLYTE_EA_J_MOL,
+        diffusivity_ea_j_mol=e.diffusivity_ea_j_mol or TYPICAL_ELECTROLYTE_EA_J_MOL,
     )
+
+
+def of_activation(
+    declared: Cell, taken: Cell, fitted: Mapping[str, tuple[float, float]], given: Collection[str] = ()
+) -> tuple[str, ...]:
+    """Sentences on the activation energies that a fit has, or starts from, and that the cell's file does not declare.
+
+    taken : the cell with typical ones in their place.  fitted : name -> (start, standard deviation), J/mol, of those
+    that the records move.  given : names of those whose start is a user's.
+    """
+    typical = declared_energies(taken)
+    missing, replaced = [], []
+    for name, own in declared_energies(declared).items():
+        if name in given:
+            continue
+        what = name.removesuffix("_energy").replace(".", " ")
+        start, sd = fitted.get(name, (typical[name], 0.0))
+        words = f"{what} {start / J_PER_KJ:g}{f' +/- {sd / J_PER_KJ:g}' if sd else ''} kJ/mol"
+        if not own:
+            missing.append(words)
+        elif start != own:
+            replaced.append(f"{words} (declared: {own / J_PER_KJ:.4g})")
+    said = []
+    if missing:
+        begin = "the fit starts from typical ones" if fitted else "typical ones are taken"
+        said.append(f"no activation energy is declared for these, {begin}: {', '.join(missing)}.")
+    if replaced:
+        said.append(
+            "activation energies that are declared often hold more than they are named for, and the fit starts from "
+            f"those of kinetics and films by themselves: {', '.join(replaced)}."
+        )
+    return tuple(said)
 
 
 def one_branch(cell: Cell, data: Measurement) -> tuple[Measurement, tuple[str, ...]]:

@@ -1,7 +1,7 @@
 """Public data sets of measured cells: where they come from, where they are on this machine, how to get them.
 
-Nothing measured is part of the package. One set is fetched from its public address and checked; the others
-lie behind pages that a program cannot follow, so they are listed with their DOI and how to read them.
+Nothing measured is part of the package. Some sets are fetched from their public address and checked; the others lie
+behind pages that a program cannot follow, so they are listed with their DOI and how to read them.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ SUFFIXES = ("", ".csv", ".csv.gz", ".parquet", ".mat", ".bpx.json", ".json")
 
 ABOUT_ENERGY = (
     "https://raw.githubusercontent.com/About-Energy-OpenSource/About-Energy-BPX-Parameterisation/"
-    "8efd45a7495ad8d3a4d72b547e657322a4baabd2/NMC/"
+    "8efd45a7495ad8d3a4d72b547e657322a4baabd2/"
 )
 ABOUT_ENERGY_COLUMNS = {"time_s": "Time [s]", "current_a": "I[A]", "voltage_v": "U[V]"}
 
@@ -67,27 +67,27 @@ SETS = (
         (
             _about_energy(
                 "C20.csv",
-                "data/validation/NMC_25degC_Co20.csv",
+                "NMC/data/validation/NMC_25degC_Co20.csv",
                 "d04bf7f43b92df88fb0c158621f3309380027b181bd6c803f3be709c371b76c4",
             ),
             _about_energy(
                 "C2.csv",
-                "data/validation/NMC_25degC_Co2.csv",
+                "NMC/data/validation/NMC_25degC_Co2.csv",
                 "0a86a5e9eebfef061b7b0535269837780f391bfa61df09887ba955b635e58275",
             ),
             _about_energy(
                 "1C.csv",
-                "data/validation/NMC_25degC_1C.csv",
+                "NMC/data/validation/NMC_25degC_1C.csv",
                 "4dbfdac5a6d4d9aebc1c916a1fd3687049c86d3b191a4210dd0c1d8f90de34a7",
             ),
             _about_energy(
                 "drive_cycle.csv",
-                "data/validation/NMC_25degC_DriveCycle.csv",
+                "NMC/data/validation/NMC_25degC_DriveCycle.csv",
                 "08b8ecfcd3d38fba5fe3852b518d70188ac5c10e28bf47be9ec45fa0467ccace",
             ),
             _about_energy(
                 "cell.bpx.json",
-                "nmc_pouch_cell_BPX.json",
+                "NMC/nmc_pouch_cell_BPX.json",
                 "9fea2c5a2748ac1f09e2bb32225fe4810597611a93ea57d68ed84783188f4d03",
             ),
         ),
@@ -101,8 +101,47 @@ SETS = (
         (
             _about_energy(
                 "2C.csv",
-                "data/validation/NMC_25degC_2C.csv",
+                "NMC/data/validation/NMC_25degC_2C.csv",
                 "19d38ed508a42a74398c1276933335f97022f98ff9fa33bf39a59309fbc9f563",
+            ),
+        ),
+    ),
+    DataSet(
+        "about_energy_lfp",
+        "2 Ah LFP/graphite 18650 cell, 25 degC",
+        "C/20, C/2, 1C and 2C discharges; drive cycle at 1 Hz; published porous-electrode parameters (BPX)",
+        "About:Energy, github.com/About-Energy-OpenSource/About-Energy-BPX-Parameterisation, commit 8efd45a",
+        "CC BY-SA 4.0",
+        (
+            _about_energy(
+                "C20.csv",
+                "LFP/data/validation/LFP_25degC_Co20.csv",
+                "6ca1fe6c43c147d5d108a3b7ce045c3d0e5a0fadf1a6c5a70e98df82faff568d",
+            ),
+            _about_energy(
+                "C2.csv",
+                "LFP/data/validation/LFP_25degC_Co2.csv",
+                "1c857767bdd1a0a8ebe55796d22075e3dd2242dc11c31843ed0c0ac46ce4c993",
+            ),
+            _about_energy(
+                "1C.csv",
+                "LFP/data/validation/LFP_25degC_1C.csv",
+                "f3dcaf1ed812fda72b3b2d73d08a5f0ae1737fa480e24ede609f88766aadc4ce",
+            ),
+            _about_energy(
+                "2C.csv",
+                "LFP/data/validation/LFP_25degC_2C.csv",
+                "1abbc52904175977aa775967677dd93ab7bc4f673db5a6abef899461d19abb02",
+            ),
+            _about_energy(
+                "drive_cycle.csv",
+                "LFP/data/validation/LFP_25degC_DriveCycle.csv",
+                "953a15eb2500f00bd057bd6f20a3f503b53d5849edcbef4d32617d2eb1986d94",
+            ),
+            _about_energy(
+                "cell.bpx.json",
+                "LFP/lfp_18650_cell_BPX.json",
+                "56d2932515637c3f899c2b6c9620ee4fcf69b71f7479782e57d7b482d143be02",
             ),
         ),
     ),

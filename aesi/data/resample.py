@@ -16,16 +16,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aesi.errors import DataError
-from aesi.numerics.typing import Array, BoolArray, IntArray
+from aesi.numerics.typing import Array
 from aesi.records import Hold, Measurement
+from aesi.records.steps import TOLERANCE, after_gap
 
 DENSE = 0.75
 """Below this share of the new step the old rows count as denser, and the voltage is averaged."""
-MOST_STEP = 1.5
-"""Rows no further apart than this many steps count as a row a step: loggers' stamps wander by less. A convention."""
 AVERAGES, AT_STAMPS = "averaged over each interval", "interpolated between rows"
-TOLERANCE = 1e-6
-"""Share of a step to which rows lie at even stamps; times are written with as many digits."""
 MOST_EVEN_ROWS = 20_000_000
 """A fortnight at 10 Hz and more: beyond, a wrong step is likelier than a wish."""
 
@@ -71,14 +68,9 @@ def even_stamps(time_s: Array, dt_s: float) -> Array:
     return np.minimum(time_s[0] + dt_s * np.arange(count), time_s[-1])
 
 
-def is_even(time_s: Array, dt_s: float, tolerance: float = TOLERANCE) -> bool:
-    """Whether the rows already lie dt_s apart, to the given share of dt_s."""
-    return bool(np.all(np.abs(np.diff(time_s) - dt_s) <= tolerance * dt_s))
-
-
-def after_gap(time_s: Array, dt_s: float) -> BoolArray:
-    """(n,) True for a row with none a step of dt_s before it."""
-    return np.concatenate([[False], np.diff(time_s) > MOST_STEP * dt_s])
+def is_even(time_s: Array, dt_s: float) -> bool:
+    """Whether the rows already lie dt_s apart."""
+    return bool(np.all(np.abs(np.diff(time_s) - dt_s) <= TOLERANCE * dt_s))
 
 
 def is_sparse(time_s: Array, current_a: Array, dt_s: float) -> bool:
@@ -88,40 +80,11 @@ def is_sparse(time_s: Array, current_a: Array, dt_s: float) -> bool:
     return bool(2.0 * moved[after_gap(time_s, dt_s)[1:]].sum() > moved.sum())
 
 
-def shared_by_steps(time_s: Array, dt_s: float) -> float:
-    """What straight lines between rows give at a step of dt_s and at the step before it by the same rows: the share of
-    their weights that is common, in the mean over the record. Nought where each step has a row of its own."""
-    stamps = even_stamps(time_s, dt_s)
-    before = np.clip(np.searchsorted(time_s, stamps, side="right") - 1, 0, len(time_s) - 2)
-    of_next = np.clip((stamps - time_s[before]) / (time_s[before + 1] - time_s[before]), 0.0, 1.0)
-    of_row, moved = 1.0 - of_next, np.diff(before)
-    same_rows = np.minimum(of_row[1:], of_row[:-1]) + np.minimum(of_next[1:], of_next[:-1])
-    next_row = np.minimum(of_row[1:], of_next[:-1])
-    common = np.where(moved == 0, same_rows, np.where(moved == 1, next_row, 0.0))
-    return float(common.mean()) if len(common) else 0.0
-
-
-def known_by(time_s: Array, values: Array, stamps_s: Array) -> Array:
-    """(m,) what rows until each stamp tell of a slow quantity: their average since the stamp before, and where there
-    are none the last row's. No value depends on a later row.
-
-    time_s, values : (n,) of the rows.  stamps_s : (m,) even, the first at the first row.
-    """
-    last = np.searchsorted(time_s, stamps_s + _slack_s(stamps_s), side="right")
-    first = np.append(0, last[:-1])
-    sums = np.append(0.0, np.cumsum(values))
-    return np.where(last > first, (sums[last] - sums[first]) / np.maximum(last - first, 1), values[last - 1])
-
-
-def next_stamp(time_s: Array, stamps_s: Array) -> IntArray:
-    """(n,) which of the even stamps (m,) is the first at or after each row; the last one for rows behind it."""
-    found = np.searchsorted(stamps_s + _slack_s(stamps_s), time_s)
-    return np.minimum(found, len(stamps_s) - 1)
-
-
-def _slack_s(stamps_s: Array) -> float:
-    """s by which a row may miss a stamp and be at it."""
-    return TOLERANCE * float(stamps_s[1] - stamps_s[0]) if len(stamps_s) > 1 else 0.0
+def off_rows(time_s: Array, stamps_s: Array) -> float:
+    """Steps between a stamp and the row nearest to it, in the mean over the even stamps (m,), m >= 2."""
+    after = np.clip(np.searchsorted(time_s, stamps_s), 1, len(time_s) - 1)
+    nearest_s = np.minimum(np.abs(time_s[after] - stamps_s), np.abs(stamps_s - time_s[after - 1]))
+    return float(np.mean(nearest_s) / (stamps_s[1] - stamps_s[0]))
 
 
 def to_even(measurement: Measurement, dt_s: float, hold: Hold = "backward") -> Measurement:

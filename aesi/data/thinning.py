@@ -6,6 +6,7 @@ keep rows that are dense after each step of the current and ever sparser with th
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Protocol, cast
 
@@ -56,32 +57,54 @@ class Averages(Protocol):
 
 @dataclass(frozen=True)
 class Window:
-    """Centred averages over `factor` rows, one every `factor` rows; the first row stays as it is."""
+    """Centred averages over `factor` rows, one every `factor` rows, within each stretch of a record; its first row
+    stays as it is, and its last where another follows.
+
+    ends : row at which each stretch ends; those of fewer rows stay as they are.  hold : how the current runs between
+    the rows of the record, also from one stretch to the next.
+    """
 
     factor: int
+    ends: tuple[int, ...]
+    hold: Hold
 
     def averages(self, column: Array) -> Array:
         """(m,) of a column (n,)."""
         weights = np.ones(2 * self._half + 1)
         weights[[0, -1]] = 0.5 if self.factor % 2 == 0 else 1.0
-        around = np.lib.stride_tricks.sliding_window_view(column, len(weights))[:: self.factor]
-        kept = self._centres(column) - self._half
-        return np.concatenate([column[:1], (around @ (weights / weights.sum()))[: len(kept)]])
 
-    def centres(self, column: Array) -> Array:
-        """(m,) the values at the middle of each."""
-        return np.concatenate([column[:1], column[self._centres(column)]])
+        def averaged(stretch: Array) -> Array:
+            around = np.lib.stride_tricks.sliding_window_view(stretch, len(weights))[:: self.factor]
+            kept = self._centres(stretch) - self._half
+            return np.asarray((around @ (weights / weights.sum()))[: len(kept)])
+
+        return np.concatenate(self._by_stretch(column, averaged))
 
     def record(self, time_s: Array, current_a: Array) -> tuple[Array, Array]:
-        """(m,) s, A of a time and a current (n,)."""
-        return self.centres(time_s), self.averages(current_a)
+        """(m,) s, A of a time and a current (n,), in straight lines that move its charge from stretch to stretch."""
+        times = self._by_stretch(time_s, lambda stretch: stretch[self._centres(stretch)])
+        current = self.averages(current_a)
+        if self.hold == "backward":
+            last = np.cumsum([len(time) for time in times[:-1]], dtype=int) - 1
+            current[last] = current[last + 1]
+        return np.concatenate(times), current
+
+    def _by_stretch(self, column: Array, within: Callable[[Array], Array]) -> list[Array]:
+        out = []
+        for begin, end in zip((0, *self.ends[:-1]), self.ends, strict=True):
+            stretch = column[begin:end]
+            if len(stretch) > self.factor:
+                last = stretch[-1:] if end < len(column) else stretch[:0]
+                stretch = np.concatenate([stretch[:1], within(stretch), last])
+            out.append(stretch)
+        return out
 
     @property
     def _half(self) -> int:
         return self.factor // 2
 
-    def _centres(self, column: Array) -> IntArray:
-        return np.arange(self._half, len(column) - self._half, self.factor)
+    def _centres(self, stretch: Array) -> IntArray:
+        return np.arange(self._half, len(stretch) - self._half, self.factor)
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,16 +151,19 @@ class Averaged(Measurement):
 
 def averaged_over(data: Measurement, step_s: float) -> Measurement:
     """About one sample in `step_s`: centred averages of current, voltage and temperature over so many rows as are
-    nearest to it at the median interval.
+    nearest to it at the median interval. None reaches over an interval longer than itself, where rows are missing.
 
     Records of which that is less than two rows, and those no longer than one window, are returned as they are.
     """
     if len(data) < 2:
         return data
-    factor = round(step_s / float(np.median(np.diff(data.time_s))))
+    steps = np.diff(data.time_s)
+    typical = float(np.median(steps))
+    factor = round(step_s / typical)
     if factor < 2 or len(data) <= factor:
         return data
-    return _averaged(data, Window(factor))
+    missing = np.flatnonzero(steps > factor * typical) + 1
+    return _averaged(data, Window(factor, (*missing.tolist(), len(data)), data.hold_taken))
 
 
 def condensed(

@@ -32,7 +32,7 @@ REMEMBERED = 256
 
 
 def without_lithium(cell: Cell, fraction: float) -> Cell:
-    """The cell with `fraction` of its cyclable lithium gone; same electrodes, new windows.
+    """The cell without the lithium of `fraction` of its capacity; same electrodes, new windows.
 
     Raises SimulationError where no window satisfies the voltages.
     """

@@ -80,6 +80,7 @@ class EspmModel:
     solid_order : even Legendre polynomials a particle.  electrolyte_order : polynomial degree a layer.
     electrode_points : of a porous electrode, where reaction and salt are resolved.
     substep_s : longest step of whatever is not stepped exactly.  most_substeps : of them between two samples.
+    step_refinement : how much shorter than the row and `substep_s`, whichever is less, a step is.
     """
 
     cell: Cell
@@ -92,6 +93,7 @@ class EspmModel:
     electrode_points: int = DEFAULT_ELECTRODE_POINTS
     substep_s: float = DEFAULT_SUBSTEP_S
     most_substeps: int = ANY_NUMBER
+    step_refinement: float = 1.0
 
     def of(self, cell: Cell) -> EspmModel:
         """The same model of another cell."""
@@ -142,6 +144,21 @@ def of_record(model: EspmModel, measured: bool) -> EspmModel:
     resistance, capacity = model.cell.winding_resistance_k_w, model.cell.heat_capacity_j_k
     heat = None if capacity is None or not resistance else HeatBalance(capacity, 1.0 / resistance)
     return model if heat == model.heat else replace(model, heat=heat)
+
+
+def case_k(model: EspmModel, winding_k: Array) -> Array | None:
+    """(n,) K of the case, whose temperature nobody measured, of a cell whose winding is at `winding_k` (n,).
+
+        T_case = T_amb + (1 - R G) (T - T_amb)
+
+    A record of it is simulated as the model was: `of_record` conducts to the case what G gives off. None where no case
+    lies between winding and surroundings, since the balance gives off more than the winding conducts, G R >= 1.
+    """
+    if model.heat is None:
+        return winding_k
+    share = model.cell.case_share(model.heat.conductance_w_k)
+    ambient_k = model.cell.ambient_temperature_k
+    return ambient_k + share * (winding_k - ambient_k) if share > 0.0 else None
 
 
 def heat_numbers(model: EspmModel) -> Array:

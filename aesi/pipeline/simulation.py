@@ -15,7 +15,6 @@ from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.data.convert import write_csv
 from aesi.data.current import CurrentProfile, read_current
 from aesi.data.reading import Reading, record_name
-from aesi.data.resample import DENSE
 from aesi.errors import DataError, InputError, SimulationError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, BoolArray
@@ -24,8 +23,10 @@ from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, initial_st
 from aesi.physics.belongs import check_belongs
 from aesi.physics.cell import Soh
 from aesi.physics.depletion import ran_out
-from aesi.physics.effects.self_heating import of_file
+from aesi.physics.effects.self_heating import assumed, of_file
+from aesi.physics.model import case_k
 from aesi.physics.rest.open_circuit import GIVEN_SD
+from aesi.physics.simulation import model_with
 from aesi.pipeline.notes import (
     of_another_model,
     of_contradiction,
@@ -45,6 +46,8 @@ if TYPE_CHECKING:
 
 DIGITS = 9
 """Significant digits of what is written, except for the time (or the frequency)."""
+TOLD_SD = 0.01
+"""Of charge, for which it is told how many volts a start is worth. A convention."""
 SayNotes = Callable[[Iterable[str]], None]
 
 
@@ -59,6 +62,7 @@ class ProfileRequest:
     reading : how the file is read.
     self_heating : the cell warms itself, by the thermal data of its file.
     soh : share of the file's capacity that the cell had then, or the day of the test; None takes all of it.
+    soc0_sd : for `predict_file` alone: how far soc0 may be off, one standard deviation; None takes it as exact.
     run_on : for `simulate_file` alone: go on where a surface or the electrolyte runs empty or full, as `simulate` does
     with on_depletion="clip".
     """
@@ -69,6 +73,7 @@ class ProfileRequest:
     self_heating: bool = False
     soh: Soh | None = None
     run_on: bool = False
+    soc0_sd: float | None = None
 
 
 def simulate_file(
@@ -82,8 +87,8 @@ def simulate_file(
 ) -> Run:
     """Simulate the profile in `current` and write time, current, voltage and states to the CSV `out`.
 
-    The file has `temperature_k` and, where the temperature was measured or moves, `temperature_degc`. `depleted`, where
-    it is asked to run on, is 1 from where the model ran out.
+    The file has `temperature_k`, the winding's, and, where the temperature was measured or moves, `temperature_degc`,
+    the case's. `depleted`, where it is asked to run on, is 1 from where the model ran out.
 
     cell : a BPX file, or a folder of a saved model, whose cell and effects are taken (not its correction).
     effects : added to those.
@@ -120,7 +125,9 @@ def simulate_file(
             on_depletion="clip" if asked.run_on else "raise",
             model=used.model,
         )
-    _write_run(out, run, profile.temperature_degc, declared.cell)
+    degc, of_case = _case_degc(used, run, profile.temperature_degc, declared.cell)
+    _write_run(out, run, degc)
+    say([f"{placed.record.name}: {words}" for words in of_case])
     say(reached(used.cell, placed.record, run.voltage_v, run.series["soc"]))
     if asked.run_on and np.any(run.series["depleted"]):
         at = int(np.argmax(run.series["depleted"]))
@@ -128,17 +135,33 @@ def simulate_file(
     return run
 
 
-def _write_run(out: Path, run: Run, measured_degc: Array | None, cell: Cell) -> None:
+def _write_run(out: Path, run: Run, case_degc: Array | None) -> None:
     """Write the columns of a run.
 
-    Beside `temperature_k` stands `temperature_degc`, which files are read by: the case's where it was measured, else
-    the model's, unless that is the cell file's all along.
+    Beside `temperature_k`, which is the winding's, stands `temperature_degc`, the case's, which files are read by.
     """
-    degc = measured_degc
-    if degc is None and np.any(run.series["temperature_k"] != cell.initial_temperature_k):
-        degc = run.series["temperature_k"] - ZERO_CELSIUS_K
     columns = {"time_s": run.time_s, "current_a": run.current_a, "voltage_v": run.voltage_v, **run.series}
-    write_table(out, columns if degc is None else columns | {"temperature_degc": degc})
+    write_table(out, columns if case_degc is None else columns | {"temperature_degc": case_degc})
+
+
+def _case_degc(
+    used: HybridModel, run: Run, measured_degc: Array | None, declared: Cell
+) -> tuple[Array | None, tuple[str, ...]]:
+    """(n,) degC of the case in a run: as measured, else the model's, and a sentence where that does not tell it; None
+    also where it is the declared cell's all along."""
+    winding_k = run.series["temperature_k"]
+    if measured_degc is not None or np.all(winding_k == declared.initial_temperature_k):
+        return measured_degc, ()
+    model = model_with(used.cell, used.effects)
+    kelvin = case_k(model, winding_k)
+    if kelvin is not None:
+        return kelvin - ZERO_CELSIUS_K, ()
+    assert model.heat is not None
+    return None, (
+        f"the model gives off {model.heat.conductance_w_k:.3g} W/K, and the winding of the cell's file conducts "
+        f"{1.0 / model.cell.winding_resistance_k_w:.3g} W/K to its case: what the case is at it does not tell, and "
+        "temperature_degc is left out.",
+    )
 
 
 def predict_file(
@@ -153,9 +176,14 @@ def predict_file(
 
     measured : one step ahead from the file's voltage; otherwise a free run, which sees the first of it at most.
     say_notes : as in `simulate_file`.
-    Raises DataError where a measurement cannot be of this cell.
+    Raises DataError where a measurement cannot be of this cell, InputError for a doubt about a start that is not given,
+    or that no band has a use for.
     """
     asked, say = asked or ProfileRequest(), say_notes or _silent
+    if asked.soc0_sd is not None and (asked.soc0 is None or measured):
+        raise InputError(
+            "--soc0-sd says how far the --soc0 of a free run may be off; give it with --soc0 and without --measured."
+        )
     profile = read_current(current, asked.reading)
     say(profile.notes)
     if measured and profile.voltage_v is None:
@@ -165,9 +193,9 @@ def predict_file(
     used = replace(saved, hold=asked.hold or saved.hold)
     placed = _placed(used, profile, current, asked, say, saved=True)
     hybrid, record = placed.model, placed.record
-    start = placed.start
+    start, soc0_sd = placed.start, placed.start.read_sd if asked.soc0_sd is None else asked.soc0_sd
     with _doubting(start, say):
-        prediction = hybrid.predict_record(record, start.soc, one_step=measured, soc0_sd=start.read_sd)
+        prediction = hybrid.predict_record(record, start.soc, one_step=measured, soc0_sd=soc0_sd)
     frame = prediction.to_frame()
     frame.insert(1, "current_a", profile.current_a)
     _write(out, frame)
@@ -175,6 +203,8 @@ def predict_file(
     alone_v = None if hybrid.correction is None or measured else prediction.physics_v
     say(reached(hybrid.cell, record, prediction.voltage_v, prediction.soc, alone_v))
     say(_of_first(record, prediction, hybrid, measured))
+    if hybrid.bands is not None and not measured and start.basis == "given" and asked.soc0_sd is None:
+        say([_of_exact(record, prediction, hybrid, start.soc)])
     say(_of_band(record, prediction, hybrid, measured))
     return len(frame)
 
@@ -201,8 +231,12 @@ def _placed(
 
     saved : it is one of a folder, whose hold it has where none is asked for.
     """
+    cooling: tuple[str, ...] = ()
     if asked.self_heating:
-        model = replace(model, effects=warmed(model.cell, model.effects))
+        heated = warmed(model.cell, model.effects)
+        if heated != model.effects and profile.temperature_degc is None:
+            cooling = assumed(model.cell)
+        model = replace(model, effects=heated)
     record = _record(profile, file, asked.hold)
     check_belongs(model.cell, [record])
     start = _start(model, record, asked.soc0)
@@ -216,6 +250,7 @@ def _placed(
             *on_temperatures(model.cell, [record.temperature_degc], model.effects),
             *of_contradiction(model, record, start.soc, model.hold),
             *_with_effects(record, model),
+            *cooling,
             *([f"when this model was made: {model.finding}"] if model.finding else []),
         ]
     )
@@ -324,6 +359,16 @@ def _of_first(record: Measurement, prediction: Prediction, model: HybridModel, m
     return [f"{record.name}: {words}; the band is that of a whole drive from its first row on."]
 
 
+def _of_exact(record: Measurement, prediction: Prediction, model: HybridModel, soc0: float) -> str:
+    """A sentence on what a band around a given start leaves out: that the start may be off."""
+    worth_v = model.start_worth_v(record, soc0, TOLD_SD, prediction.physics_v)
+    return (
+        f"{record.name}: the band takes the start at {soc0:.4g} as exact; {TOLD_SD:g} of charge more or less is worth "
+        f"{MV_PER_V * rms(worth_v):.1f} mV RMS along this record, and --soc0-sd widens the band by how far the start "
+        "may be off."
+    )
+
+
 def _of_band(record: Measurement, prediction: Prediction, model: HybridModel, measured: bool) -> list[str]:
     """Sentences on where the correction is used, and on what its band holds of the rows that have one."""
     if model.correction is None:
@@ -331,7 +376,11 @@ def _of_band(record: Measurement, prediction: Prediction, model: HybridModel, me
         said = [f"the model carries no learnt correction: one step ahead is the same as a free run{empty}."]
     else:
         figures = trained_figures(
-            prediction.outside, record.temperature_degc, model.correction, model.visited, prediction.weight
+            prediction.outside,
+            prediction.temperature_degc,
+            model.correction,
+            model.visited,
+            prediction.weight,
         )
         said = [trained_sentence(record.name, figures, one_step=measured)]
         if model.correction.fade is not None and model.correction.fade.amplitude == 0.0:
@@ -358,11 +407,6 @@ def _of_observed(record: Measurement, model: HybridModel, apart: BoolArray) -> l
         said.append(
             f"{record.name}: in {_percent(apart)} of the rows voltage_v lies outside its own band, which follows the "
             "errors of the rows before; the middle of lower_v and upper_v is the better estimate there."
-        )
-    if float(np.median(np.diff(record.time_s))) < DENSE * model.dt_s:
-        said.append(
-            f"{record.name}: its rows are denser than the model's step of {model.dt_s:g} s, of whose averages the band "
-            "is: single rows scatter more."
         )
     if np.any(gaps := model.after_gap(record.time_s)):
         said.append(

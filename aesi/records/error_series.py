@@ -10,7 +10,9 @@ import numpy as np
 
 from aesi.numerics.typing import Array, BoolArray
 from aesi.over_time import extent
+from aesi.records.horizons import steps_ahead
 from aesi.records.measurement import digest
+from aesi.records.steps import known_by, rows_until
 
 INPUT_NAMES = ("I", "c_sp", "c_sn", "c_e0", "c_eL")
 """The inputs U of the sparse model, in the paper's order."""
@@ -23,7 +25,7 @@ class ErrorSeries:
     error_v : (n,) V, V_measured - V_model.  inputs : (n, n_inputs) SI, columns `input_names`.
     soc : (n,).  model_v : (n,) V, the physics model's voltage (so V_measured = model_v + error_v).
     physics : name -> (n,) V, what other physics models say of the same record, for comparison.
-    temperature_degc : (n,) of the cell, where it was measured.
+    temperature_degc : (n,) of the cell, as measured, else as the physics had it; None where neither is known.
     slopes_v : (n, k) V, by how much a deviation of each parameter moves the physics model's voltage, where known.
     start_v : (n,) V, >= 0, what a standard deviation of the state of charge that it starts from is worth, where that
     was read from a voltage; None elsewhere.
@@ -31,6 +33,8 @@ class ErrorSeries:
     rows leave open of the parameters, of the declared cell's too.
     ran_out_s : s, from when on the physics model, or another one of `physics`, is held where it ran empty or full; an
     error says no more than that from there on. None where none of them ran out, or that is not known.
+    own : the error over the record's own rows, in their number and at their times, where these are not the stamps
+    (between them or denser); None where they are. What is at a stamp then is filled in, or an average.
     The sparse model maps (error_v[k], inputs[k]) to error_v[k + 1]; records are never joined across a gap.
     """
 
@@ -48,6 +52,7 @@ class ErrorSeries:
     missed_v: float | None = None
     ran_out_s: float | None = None
     start_v: Array | None = None
+    own: ErrorSeries | None = None
 
     def __len__(self) -> int:
         return len(self.error_v)
@@ -62,12 +67,13 @@ class ErrorSeries:
 
     @property
     def degc_or_nan(self) -> Array:
-        """(n,) degC of the cell, NaN where it was not measured."""
+        """(n,) degC of the cell, NaN where it is not known."""
         return np.full(len(self), np.nan) if self.temperature_degc is None else self.temperature_degc
 
     def steps(self, horizon_s: float) -> int:
-        """Samples that a prediction so far ahead goes over, at least one."""
-        return max(1, round(horizon_s / self.dt_s))
+        """Samples that a prediction so far ahead goes over.  Raises InputError for a horizon that the step does not
+        divide."""
+        return steps_ahead(horizon_s, self.dt_s)
 
     @property
     def digest(self) -> str:
@@ -93,7 +99,25 @@ class ErrorSeries:
             temperature_degc=None if self.temperature_degc is None else self.temperature_degc[rows],
             slopes_v=None if self.slopes_v is None else self.slopes_v[rows],
             start_v=None if self.start_v is None else self.start_v[rows],
+            own=self._own_of(rows),
         )
+
+    def _own_of(self, rows: slice) -> ErrorSeries | None:
+        """The own rows in the steps of a piece, and the last one until its first stamp where that has none."""
+        start, stop, _ = rows.indices(len(self))
+        if self.own is None or stop <= start:
+            return None
+        if (start, stop) == (0, len(self)):
+            return self.own
+        until = np.append(0, rows_until(self.own.time_s, self.time_s))
+        return self.own.take(slice(min(int(until[start]), int(until[start + 1]) - 1), int(until[stop])))
+
+    @property
+    def as_known(self) -> ErrorSeries:
+        """The record with the error that rows until each stamp tell (`known_by`), and nothing of those behind it."""
+        if self.own is None:
+            return self
+        return replace(self, error_v=known_by(self.own.time_s, self.own.error_v, self.time_s))
 
     def left_by(self, name: str) -> Array:
         """(n,) V: measured minus what the named physics model says; of the model itself where nothing else is known."""

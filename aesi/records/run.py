@@ -18,7 +18,7 @@ class Run:
     """One simulation: voltage and the internal states, a value a sample.
 
     series : name -> (n,) array. Always there: c_sp, c_sn (surface, mol/m3), c_e0, c_eL (electrolyte at the
-    negative and the positive current collector, mol/m3), soc, temperature_k; effects add their own.
+    negative and the positive current collector, mol/m3), soc, temperature_k (of the winding); effects add their own.
     profiles : across the electrodes, where they were asked for: x_m (places,) from the negative collector, and by
     sample and place (n, places): surface_stoichiometry, reaction_a_m2 of particle surface (delithiation positive),
     electrolyte_mol_m3, and potential_v of the solid against the electrolyte.

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 from aesi import bench
 from aesi.bench import CaseRow
-from aesi.numerics.files.contents import contents
 from aesi.numerics.files.source_digest import source_digest
 from aesi.numerics.files.whole import write_whole
 from aesi.pipeline.experiment.sections import TrackingConfig
+from aesi.pipeline.product.contents import contents
 from aesi.pipeline.written import SUMMARY
 from flows.base import fingerprint
 from flows.base.console import Console

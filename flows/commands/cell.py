@@ -63,6 +63,14 @@ def predict(
         bool, typer.Option("--measured", help="Use the measured voltage: one step ahead, not free run.")
     ] = False,
     soc0: options.Soc0 = None,
+    soc0_sd: Annotated[
+        float | None,
+        typer.Option(
+            "--soc0-sd",
+            callback=options.share("--soc0-sd"),
+            help="How far --soc0 may be off, one standard deviation, by which the band of a free run is wider.",
+        ),
+    ] = None,
     soh: options.SohOption = None,
     hold: options.HoldOption = None,
     self_heating: options.SelfHeating = False,
@@ -71,7 +79,8 @@ def predict(
     outputs.check_table(out, [model, current])
     from aesi.pipeline.simulation import ProfileRequest, predict_file
 
-    asked = ProfileRequest(soc0, hold, reading, self_heating, options.state_of_health(soh))
+    health = options.state_of_health(soh)
+    asked = ProfileRequest(soc0, hold, reading, self_heating, health, soc0_sd=soc0_sd)
     rows = predict_file(model, current, out, asked, measured, options.say_notes)
     regime = "one step ahead" if measured else "free run"
     typer.echo(f"{out}: {rows:,} rows, {regime}", err=True)

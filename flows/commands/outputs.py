@@ -10,7 +10,8 @@ from pathlib import Path
 
 from aesi.errors import InputError
 from aesi.numerics.files.whole import check_writable
-from aesi.pipeline.written import ARRAYS, EFFECTS, HEAD, MODEL, SUMMARY
+from aesi.pipeline.product.contents import effect_files
+from aesi.pipeline.written import ARRAYS, HEAD, MODEL, SUMMARY
 
 PAGES = (".html", ".htm")
 OTHER_FORMATS = (
@@ -110,10 +111,7 @@ def _files_read(given: Path) -> Iterator[Path]:
         names = head.get("parts") if isinstance(head, dict) else None
         parts = [f"{name}.json" for name in names] if isinstance(names, list) else []
         yield from (given / name for name in (HEAD, ARRAYS, *parts))
-        effects = _content(given / f"{EFFECTS}.json")
-        for effect in effects if isinstance(effects, list) else []:
-            if isinstance(effect, dict) and isinstance(effect.get("file"), str):
-                yield Path(effect["file"])
+        yield from effect_files(given)
 
 
 def _content(file: Path) -> object:

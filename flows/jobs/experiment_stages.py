@@ -22,6 +22,7 @@ from aesi.pipeline.experiment.load import Loaded, load
 from aesi.pipeline.experiment.outputs import Result, write_outputs
 from aesi.pipeline.notes import together
 from aesi.pipeline.written import COMPARISON, REPORT, TABLES
+from aesi.records.failed import candidates_failed
 from aesi.sparse import Problem
 from flows.base import environment
 from flows.base.console import Console
@@ -90,6 +91,8 @@ class ExperimentJob:
                 lost_again=not self.tracker.resumed,
             ),
         )
+        for sentence in candidates_failed(found.result.failed, len(found.result.trials)):
+            self.console.say(f"  {sentence}")
         importances = found.result.importances()
         self.tracker.metrics({f"importance/{gene}": share for gene, share in importances.items()})
         return found
@@ -132,18 +135,17 @@ class ExperimentJob:
         evaluation: EvaluatedModels,
     ) -> Result:
         seconds = time.monotonic() - self.started
-        rows = found.rows()
         return Result(
             loaded.config,
             loaded,
             problem,
             found.chosen,
-            rows,
+            found.rows(),
             fitted,
             evaluation,
             self.tracker.run_id,
             seconds,
-            failed=len(found.result.trials) - len(rows),
+            failed=found.result.failed,
             unfitted=models.unfitted,
         )
 

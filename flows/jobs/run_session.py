@@ -11,10 +11,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from aesi.errors import AesiError, InputError
-from aesi.numerics.files.contents import contents
 from aesi.numerics.files.source_digest import source_digest
 from aesi.numerics.files.whole import check_writable
 from aesi.pipeline.experiment.config import ExperimentConfig
+from aesi.pipeline.product.contents import contents
 from flows.base import environment, fingerprint
 from flows.base.console import Console
 from flows.base.interrupt import kept_on_interrupt

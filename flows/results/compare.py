@@ -74,13 +74,17 @@ def _compared(store: Store, experiment: str, run: Any) -> ComparedRun:
 
 
 def _judged_on(params: Mapping[str, str]) -> str:
-    """What tells the test records of a run from another's: their digests, which are tracked behind those of the other
-    roles; of a record that is cut, and of the virtual cell's, all digests and which part tests."""
+    """What tells the test rows of a run from another's: the step to which they were averaged; the digests of the
+    records, which are tracked behind those of the other roles; of a record that is cut, and of the virtual cell's, all
+    digests and which part tests."""
+    dt_s = params.get("data.dt_s")
     digests = params.get("data_digest", "").split(", ")
     tests = json.loads(params.get("data.test") or "[]")
     if tests and len(digests) > len(tests):
-        return ", ".join(sorted(digests[-len(tests) :]))
-    return json.dumps([digests, tests, *(params.get(f"data.repeats.{key}") for key in ("period_s", "test"))])
+        return json.dumps([dt_s, sorted(digests[-len(tests) :])])
+    return json.dumps(
+        [dt_s, digests, tests, *(params.get(f"data.repeats.{key}") for key in ("period_s", "test"))]
+    )
 
 
 def _content(store: Store, run: Any, name: str) -> dict[str, Any]:

@@ -12,11 +12,14 @@ from optuna.study import Study
 from optuna.trial import FrozenTrial, TrialState
 
 from aesi.errors import FitError
+from aesi.records.failed import counted
 from aesi.sparse import FitnessWeights, Genome, fitness
 from flows.search.term_sampler import INDEX, genome_of, violation
 
 LEAST_TOLD = 20
 """Candidates from which the importance of a gene can be told at all."""
+NO_REASON, LOW = "no reason given", "a correlation below its constraint"
+"""Words for a trial that failed without a reason, and for one that was evaluated and is not feasible."""
 FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
 RECORD = "record"
 RECORDED = (
@@ -105,12 +108,24 @@ class SearchResult:
         assert trial.losses is not None
         return fitness(trial.losses, self.library_size, self.weights)
 
+    @property
+    def failed(self) -> dict[str, int]:
+        """Why trials came to nothing -> how many."""
+        return Counter(trial.reason or NO_REASON for trial in self.trials if trial.losses is None)
+
     def _nothing_feasible(self) -> str:
-        reasons = Counter(trial.reason or "a correlation below its constraint" for trial in self.trials)
-        listed = "; ".join(f"{count} x {reason}" for reason, count in reasons.most_common(4))
+        reasons = Counter(self.failed)
+        low = len(self.trials) - reasons.total()
+        if low:
+            reasons[LOW] = low
+        advice = (
+            "lower the correlation constraints, widen the ranges, or evaluate more candidates"
+            if low
+            else "see to what they failed of (each may take search.timeout_s and search.memory_mb), or widen the ranges"
+        )
         return (
-            f"none of {len(self.trials)} candidates is feasible ({listed or 'none was evaluated'}); "
-            "lower the correlation constraints, widen the ranges, or evaluate more candidates."
+            f"none of {len(self.trials)} candidates is feasible ({counted(reasons) or 'none was evaluated'}); "
+            f"{advice}."
         )
 
 

@@ -222,4 +222,6 @@ def study_key(problem: Problem, config: ExperimentConfig) -> str:
 def _best(scored: dict[int, ScoredCandidate | Failed], constraints: Constraints) -> str:
     candidates = [one.candidate for one in scored.values() if not isinstance(one, Failed)]
     values = [one.fitness for one in candidates if max(constraints.violations(one).values()) <= 0.0]
-    return f"best fitness {max(values):.3f}" if values else "none meets the constraints yet"
+    if values:
+        return f"best fitness {max(values):.3f}"
+    return "none meets the constraints yet" if candidates or not scored else "all have failed so far"

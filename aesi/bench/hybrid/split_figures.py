@@ -15,6 +15,7 @@ BEST = "AESI I"
 """The model that the docs tell of."""
 TITLES = {
     "nmc": "NMC pouch, parts of a drive",
+    "lfp": "LFP 18650, parts of a drive",
     "m50t": "LG M50T, half of the UDDS",
     "panasonic": "Panasonic, 25 °C",
     "hg2": "LG HG2, 25 °C",

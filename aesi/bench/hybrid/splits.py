@@ -3,12 +3,13 @@
 Every split trains on some drives of a cell and is tested, in free run, on drives that it has not seen:
 
     nmc        each three, and each two, of the five parts of the NMC pouch cell's drive; the others test
+    lfp        the same of the LFP cell's drive, on which no rule or default was chosen: all of them judge
     hg2        each drive of the LG HG2 at 25 degC in turn; the others train
     panasonic  the same for the Panasonic NCR18650PF
     m50t       each half (odd and even repeats) of the LG M50T's UDDS in turn
 
-Every second split of a cell is a development split: rules and defaults may be chosen by a look at those. The others
-judge, and they alone are tested at other temperatures as well.
+Every second split of the other cells is a development split: rules and defaults may be chosen by a look at those. The
+others judge, and they alone are tested at other temperatures as well.
 """
 
 from __future__ import annotations
@@ -67,13 +68,15 @@ ABROAD = {
 }
 EXPERIMENTS = {
     "nmc": "measured_nmc_drive.yaml",
+    "lfp": "measured_lfp_drive.yaml",
     "hg2": "lg_18650hg2.yaml",
     "panasonic": "panasonic_ncr18650pf.yaml",
     "m50t": "lg_m50t_udds.yaml",
 }
-NMC_PARTS = (1, 2, 3, 4, 5)
-"""The published drive repeats itself after NMC_PERIOD_S, and that of the M50T after M50T_PERIOD_S."""
-NMC_PERIOD_S = 1800.0
+DRIVE_PARTS = (1, 2, 3, 4, 5)
+"""The published drives of the NMC and the LFP cell pass from part to part after DRIVE_PART_S, and that of the M50T
+repeats itself after M50T_PERIOD_S."""
+DRIVE_PART_S = 1800.0
 M50T_HALVES = ((1, 3, 5, 7), (2, 4, 6))
 """Odd and even repeats."""
 M50T_PERIOD_S = 2600.0
@@ -81,9 +84,14 @@ M50T_PERIOD_S = 2600.0
 
 def all_splits() -> tuple[SplitCase, ...]:
     """Every split, the cells one after the other."""
-    every = [*_by_repeats("nmc", NMC_PERIOD_S, _nmc_parts()), *_by_drive("hg2"), *_by_drive("panasonic")]
     halves = (M50T_HALVES, M50T_HALVES[::-1])
-    return (*every, *_by_repeats("m50t", M50T_PERIOD_S, halves))
+    return (
+        *_by_repeats("nmc", DRIVE_PART_S, _drive_parts()),
+        *_by_drive("hg2"),
+        *_by_drive("panasonic"),
+        *_by_repeats("m50t", M50T_PERIOD_S, halves),
+        *_by_repeats("lfp", DRIVE_PART_S, _drive_parts(), development=False),
+    )
 
 
 def chosen_splits(
@@ -172,17 +180,21 @@ def _winkler(left: Array, low: Array, high: Array, alpha: float) -> Array:
     return np.asarray(high - low + 2.0 / alpha * outside)
 
 
-def _nmc_parts() -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
+def _drive_parts() -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
     return [
-        (train, tuple(part for part in NMC_PARTS if part not in train))
+        (train, tuple(part for part in DRIVE_PARTS if part not in train))
         for count in (3, 2)
-        for train in combinations(NMC_PARTS, count)
+        for train in combinations(DRIVE_PARTS, count)
     ]
 
 
 def _by_repeats(
-    cell: str, period_s: float, parts: Sequence[tuple[tuple[int, ...], tuple[int, ...]]]
+    cell: str,
+    period_s: float,
+    parts: Sequence[tuple[tuple[int, ...], tuple[int, ...]]],
+    development: bool = True,
 ) -> Iterator[SplitCase]:
+    """development : every second of them is for development; else none is."""
     for number, (train, test) in enumerate(parts):
         repeats = RepeatsConfig(period_s=period_s, train=train, test=test)
         yield SplitCase(
@@ -191,7 +203,7 @@ def _by_repeats(
             experiment=EXPERIMENTS[cell],
             overrides=(f"data.repeats={repeats.model_dump_json()}",),
             abroad=(),
-            development=number % 2 == 1,
+            development=development and number % 2 == 1,
         )
 
 

@@ -28,13 +28,12 @@ from aesi.numerics.typing import Array
 from aesi.physics import Cell
 from aesi.pipeline.experiment.intervals.bands import WHOLE, OutOfSampleErrors, Unseen
 from aesi.records import Failed, Split
+from aesi.records.horizons import HORIZONS_S
 from aesi.sparse import Genome, Options, Problem, evaluate
 from aesi.sparse.search.fold_models import fold_models, with_leverage
 
 ALPHA = 0.1
 """Bands for 90 %."""
-HORIZONS_S = (1.0, 10.0, 60.0)
-"""Those of the tables of a run."""
 OPTIONS = Options(p_c=3, d=2, mixed=False, resamples=50, block=100)
 RIDGE, THRESHOLD = 10.0, 1e-3
 """Genes of the one genome that is fitted: conventions, in the midst of what a search tries."""

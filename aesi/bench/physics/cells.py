@@ -48,7 +48,7 @@ HELD_SHARE, HELD_FROM_THEN_ON = 0.01, 0.1
 """Shares of held rows among all, and among those from the first of them on: a record with more of both was held from
 then on. Conventions: 8 of 45 of the Panasonic have 1 to 8 % of all, two of these 30 and 40 % from then on, six 3 to
 4 %."""
-NMC, M50T = "about_energy_nmc", "lg_m50t_w8"
+NMC, LFP, M50T = "about_energy_nmc", "about_energy_lfp", "lg_m50t_w8"
 START = "lg_m50_chen2020"
 ECM_UDE = (
     "circuit + neural ODE, trained on UDDS at 25 degC, windows of 1,024 rows with the state of charge given"
@@ -71,7 +71,7 @@ class MeasuredRecord:
     protocol: str = ""
 
 
-FILES = {NCR: (START, NCR), HG2: (START, HG2), NMC: (None, None), M50T: (START, None)}
+FILES = {NCR: (START, NCR), HG2: (START, HG2), NMC: (None, None), LFP: (None, None), M50T: (START, None)}
 """Set -> start file and calibrated file of `experiments/cells`; None: the file published with the data, or none."""
 
 COLD = "_cold"
@@ -80,6 +80,7 @@ COLD = "_cold"
 RECORDS = (
     *(MeasuredRecord(NMC, name, others_mv=mv, protocol=PUBLISHED) for name, mv in (
         ("drive_cycle", 18.8), ("C20", 15.9), ("C2", 12.3), ("1C", 13.4))),
+    *(MeasuredRecord(LFP, name) for name in ("drive_cycle", "C20", "C2", "1C", "2C")),
     MeasuredRecord(NCR, "25degC_us06", others_mv=39.3, protocol=ECM_UDE),
     MeasuredRecord(NCR, "25degC_la92", others_mv=19.4, protocol=ECM_UDE),
     MeasuredRecord(NCR, "25degC_hwfet", others_mv=73.4, protocol=ECM_UDE),

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aesi.calibration.records.thinning import thinned
-from aesi.calibration.records.zero import is_slow
+from aesi.calibration.records.zero import is_slow, steadily_flowing
 from aesi.calibration.start import flowing
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError
@@ -104,7 +104,7 @@ def _prepared(
         soc_sd=sd,
         slow=slow,
         trusted=thin.trusted,
-        flows=flowing(thin.data.current_a).astype(float),
+        flows=(steadily_flowing(thin.data) if slow else flowing(thin.data.current_a)).astype(float),
     )
 
 

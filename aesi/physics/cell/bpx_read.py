@@ -12,7 +12,7 @@ from typing import Any
 from aesi.errors import CellError
 from aesi.physics.cell.bpx_schema import load_bpx
 from aesi.physics.cell.bpx_transport import check_kinetics, check_transport
-from aesi.physics.cell.bpx_unread import other_capacity, replaced_relations, unread
+from aesi.physics.cell.bpx_unread import of_version_0, other_capacity, replaced_relations, unread
 from aesi.physics.cell.bpx_values import check_energies, check_values
 from aesi.physics.cell.parts import (
     CAPACITY_SHARES,
@@ -23,6 +23,7 @@ from aesi.physics.cell.parts import (
     FITTED_AT,
     FITTED_WITH,
     HEAT_TRANSFER,
+    INITIAL_SOC,
     NO_FILM,
     RATE_FACTORS,
     TESTED_ON,
@@ -43,7 +44,7 @@ Fields = Mapping[str, Any]
 
 def read_bpx(source: str | PathLike[str] | Mapping[str, Any], fitted: bool = False) -> CellParameters:
     """See `Cell.from_bpx`."""
-    v1, where = load_bpx(source)
+    v1, where, left_behind = load_bpx(source)
     try:
         cell = _cell(v1, where)
     except KeyError as error:
@@ -54,7 +55,8 @@ def read_bpx(source: str | PathLike[str] | Mapping[str, Any], fitted: bool = Fal
         check_kinetics(cell, where)
         if not cell.fitted_with:
             check_energies(cell, where)
-    return replace(cell, unread=(*cell.unread, *replaced_relations(cell), *other_capacity(cell)))
+    told = (*cell.unread, *of_version_0(left_behind), *replaced_relations(cell), *other_capacity(cell))
+    return replace(cell, unread=told)
 
 
 def _cell(v1: dict[str, Any], where: str) -> CellParameters:
@@ -69,7 +71,6 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
         raise CellError(
             f"{where}: the section 'User-defined' is {type(user).__name__}, and has to hold names and values."
         )
-    _check_initial_soc(initial, where)
     return CellParameters(
         negative=_electrode(parts["Negative electrode"], user, "Negative", where),
         separator=_separator(parts["Separator"]),
@@ -81,6 +82,7 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
         lower_voltage_v=float(fields["Lower voltage cut-off [V]"]),
         upper_voltage_v=float(fields["Upper voltage cut-off [V]"]),
         reference_temperature_k=reference,
+        initial_soc=_initial_soc(initial, where),
         initial_temperature_k=_kelvin(initial, "Initial temperature [K]", reference),
         ambient_temperature_k=_kelvin(thermal, "Ambient temperature [K]", reference),
         density_kg_m3=_optional(fields, "Density [kg.m-3]"),
@@ -101,12 +103,16 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
     )
 
 
-def _check_initial_soc(initial: Fields, where: str) -> None:
+def _initial_soc(initial: Fields, where: str) -> float:
     """A simulation is told its own start; what is no share is of another unit, and so may be what is beside it."""
-    name = "Initial state-of-charge"
-    soc = _optional(initial, name)
-    if soc is not None and not 0.0 <= soc <= 1.0:
-        raise CellError(f"{where}: {name} = {soc:g} has to be from 0 (empty) to 1 (full); 90 % is 0.9.")
+    soc = _optional(initial, INITIAL_SOC)
+    if soc is None:
+        return 1.0
+    if not 0.0 <= soc <= 1.0:
+        raise CellError(
+            f"{where}: {INITIAL_SOC} = {soc:g} has to be from 0 (empty) to 1 (full); 90 % is 0.9."
+        )
+    return soc
 
 
 def _kelvin(fields: Fields, name: str, without: float) -> float:

@@ -33,8 +33,11 @@ RELATIONS = {
 VERSIONS = r"[01]\.\d+(\.\d+)?"
 
 
-def load_bpx(source: str | PathLike[str] | Mapping[str, Any]) -> tuple[dict[str, Any], str]:
-    """The content of a BPX file or mapping as BPX 1.x, and what to call it in sentences.
+def load_bpx(
+    source: str | PathLike[str] | Mapping[str, Any],
+) -> tuple[dict[str, Any], str, tuple[str, ...]]:
+    """The content of a BPX file or mapping as BPX 1.x, what to call it in sentences, and the fields of its cell that
+    BPX 1.x has no place for.
 
     Raises CellError for what cannot be read, fails the schema, or describes a cell that is not modelled.
     """
@@ -42,7 +45,14 @@ def load_bpx(source: str | PathLike[str] | Mapping[str, Any]) -> tuple[dict[str,
     v1 = _as_v1(raw, where)
     _refuse_what_is_not_modelled(v1, where)
     _check_schema(v1, where)
-    return v1, where
+    return v1, where, _left_behind(raw, v1)
+
+
+def _left_behind(raw: Mapping[str, Any], v1: Mapping[str, Any]) -> tuple[str, ...]:
+    """The fields of a cell in BPX 0.x that became none of BPX 1.x."""
+    state = v1.get("State") or {}
+    kept = {*v1["Parameterisation"]["Cell"], *(name for section in state.values() for name in section or {})}
+    return tuple(name for name in raw["Parameterisation"]["Cell"] if name not in kept)
 
 
 def _load(source: str | PathLike[str] | Mapping[str, Any]) -> tuple[dict[str, Any], str]:

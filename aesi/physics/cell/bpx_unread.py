@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from aesi.physics.cell.parts import (
     FILM_RESISTANCES,
     FITTED_AT,
     FITTED_WITH,
+    INITIAL_SOC,
     RATE_FACTORS,
     TESTED_ON,
     THERMAL_CONDUCTIVITY,
@@ -41,6 +42,8 @@ POINTS = 401
 OTHER_CAPACITY = 1.5
 """Times, either way, that the declared capacity may be of what an electrode holds between its limits: 0.94 to 1.01 in
 the files of ten cells."""
+HYSTERESIS_STATE = "Initial hysteresis state"
+"""Begins the names of the two fields, one an electrode."""
 BRANCHES = ("OCP (lithiation) [V]", "OCP (delithiation) [V]")
 
 
@@ -57,6 +60,18 @@ def unread(v1: Mapping[str, Any]) -> tuple[str, ...]:
             f"the cell's file declares a hysteresis ({', '.join(branched)}: OCP by direction), which is not simulated: "
             "'OCP [V]' holds both ways; the effect ocv_hysteresis adds one."
         )
+    initial = (v1.get("State") or {}).get("Initial conditions") or {}
+    begun = [
+        f"{name} {value}"
+        for name, value in initial.items()
+        if (name.startswith(HYSTERESIS_STATE) and value is not None)
+        or (name == INITIAL_SOC and value not in (None, 1.0))
+    ]
+    if begun:
+        said.append(
+            f"the cell's file declares how it begins ({', '.join(begun)}), which is not simulated: a record starts at "
+            "the state of charge that is given or that its voltage says."
+        )
     ageing = (v1.get("State") or {}).get("Degradation") or {}
     lost = [f"{name} {value}" for name, value in ageing.items() if value]
     if lost:
@@ -68,6 +83,18 @@ def unread(v1: Mapping[str, Any]) -> tuple[str, ...]:
     if own:
         said.append(f"fields of the cell's file that are not read (User-defined): {', '.join(own)}.")
     return tuple(said)
+
+
+def of_version_0(names: Sequence[str]) -> tuple[str, ...]:
+    """A sentence on fields of a cell in BPX 0.x that have no place in 1.x."""
+    if not names:
+        return ()
+    own = (
+        f"; how a winding conducts to its case is read from {THERMAL_CONDUCTIVITY!r} in the section 'User-defined'"
+        if THERMAL_CONDUCTIVITY in names
+        else ""
+    )
+    return (f"fields of the cell's file, of BPX 0.x, that are not read (Cell): {', '.join(names)}{own}.",)
 
 
 def other_capacity(cell: CellParameters) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from aesi.physics.cell.parts import (
     FITTED_AT,
     FITTED_WITH,
     HEAT_TRANSFER,
+    INITIAL_SOC,
     NO_FILM,
     RATE_FACTORS,
     TESTED_ON,
@@ -107,7 +108,7 @@ def _write_state(cell: CellParameters) -> dict[str, Any]:
         surroundings[HEAT_TRANSFER] = cell.heat_transfer_w_m2_k
     return {
         "Initial conditions": {
-            "Initial state-of-charge": 1.0,
+            INITIAL_SOC: cell.initial_soc,
             "Initial temperature [K]": cell.initial_temperature_k,
             "Initial electrolyte concentration [mol.m-3]": cell.electrolyte.c0_mol_m3,
         },

@@ -27,6 +27,7 @@ CONTACT_RESISTANCE = "Contact resistance [Ohm]"
 """The field of `contact_resistance_ohm` in the user-defined section of a file: BPX itself has none for it."""
 THERMAL_CONDUCTIVITY = "Thermal conductivity [W.m-1.K-1]"
 """The field of `thermal_conductivity_w_m_k` in the user-defined section."""
+INITIAL_SOC = "Initial state-of-charge"
 HEAT_TRANSFER = "Heat transfer coefficient [W.m-2.K-1]"
 FITTED_WITH = {model: f"Fitted with {model}" for model in ("espm", "dfn")}
 """Fields of `fitted_with`, one of them 1: the standard takes numbers there, and reads words as formulas."""
@@ -141,6 +142,7 @@ class CellParameters:
     electrode_area_m2 : of one electrode pair.
     density_kg_m3 to heat_transfer_w_m2_k : None where the file has no thermal data.
     thermal_conductivity_w_m_k : from the inside of the winding to the case, see `winding_resistance_k_w`.
+    initial_soc : as the file declares it, for other readers: a simulation is told its own start.
     contact_resistance_ohm : in series with the whole cell; that of metal, the same at any temperature.
     fitted_with : "espm" or "dfn", the model that the parameters were fitted with, where they were.
     capacity_shares : (record, share of this capacity that the cell had then), of the records of that fit.
@@ -158,6 +160,7 @@ class CellParameters:
     lower_voltage_v: float
     upper_voltage_v: float
     reference_temperature_k: float = 298.15
+    initial_soc: float = 1.0
     initial_temperature_k: float = 298.15
     ambient_temperature_k: float = 298.15
     density_kg_m3: float | None = None
@@ -212,6 +215,14 @@ class CellParameters:
             return None
         outside = self.heat_transfer_w_m2_k * self.surface_area_m2
         return outside / (1.0 + outside * self.winding_resistance_k_w)
+
+    def case_share(self, conductance_w_k: float) -> float:
+        """What its case is warmer than the surroundings by, over what the winding is, where the heat flows from this to
+        the surroundings through a conductance G (W/K) and on its way through the winding's resistance R: 1 - R G.
+
+        1 where the file tells no R; nought or less of a conductance that is larger than the winding's own, 1/R.
+        """
+        return 1.0 - self.winding_resistance_k_w * conductance_w_k
 
     @property
     def heat_capacity_j_k(self) -> float | None:

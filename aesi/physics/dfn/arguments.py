@@ -41,15 +41,18 @@ def _particles(model: EspmModel) -> Particles:
         first = len(rates)
         of_volume = sum(a * r for a, r in interface.bins)
         for _, ratio in interface.bins:
-            rates.append(sphere.lam[1:] * solids[side].d0 / (electrode.particle_radius_m * ratio) ** 2)
-            sides.append(side)
+            # Where diffusivity varies, each particle follows its own profile, and has weights of its own.
+            for _ in range(1 if solids[side].linear else model.electrode_points):
+                rates.append(sphere.lam[1:] * solids[side].d0 / (electrode.particle_radius_m * ratio) ** 2)
+                sides.append(side)
         for point, weight in enumerate(layer.weight):
             for size, (area_share, ratio) in enumerate(interface.bins):
                 part = weight * area_share
+                own = size if solids[side].linear else size * model.electrode_points + point
                 radius = electrode.particle_radius_m * ratio
                 area = electrode.area_per_volume_1_m * electrode.thickness_m * part
                 place.append(side * model.electrode_points + point)
-                kind.append(first + size)
+                kind.append(first + own)
                 scale.append(1.0 / (area * FARADAY_C_MOL * radius * electrode.c_max_mol_m3))
                 share.append(part)
                 volume.append(part * ratio / of_volume)

@@ -5,26 +5,47 @@ A reaction that runs straight from y0 at the start of a step to y1 at its end mo
     z1 = E z0 - gain (a y0 + b y1) - rate (a f0 + b f1)
 
 with E, a, b of `kernels.step_weights` and f the part of diffusion that the constant diffusivity leaves out. `calm` is
-this without y1.
+this without y1. In a particle that constant follows the profile at every step, as in the single particle
+(`transport_kernels.EXACT_SHARE`): f is the mode of the flux of all diffusion less `near` times z.
 """
 
 from numba import njit
 
 from aesi.physics.espm.kernels import FASTMATH, compiled, lookup, step_weights
+from aesi.physics.espm.transport_kernels import EXACT_SHARE
 
 
 @compiled
-def renew(p, s, faster, dt, w, taken, w_salt, spread):  # type: ignore[no-untyped-def]
-    """Weights of one step length and of factors `faster` (3,) of diffusion (negative, positive, salt).
+def renew_particles(p, largest, near, faster, dt, missing, w, taken):  # type: ignore[no-untyped-def]
+    """Weights of one step length and of factors `faster` (3,) of diffusion, see `renew_salt`: of particles whose
+    diffusivity is followed anew, of all others if they are `missing`.
 
-    Out: w (kinds, 3, modes), w_salt (3, modes).  taken (kinds,) s, what a unit of y1 takes off a surface, over `scale`.
-    spread (places, places) m2/A, what a unit of reaction at v adds to the salt over rest at r.
+    largest, near : (kinds,) of the profile, over that of the rates: in, and what is stepped exactly, out.
+    Out: w (kinds, 3, modes).  taken (kinds,) s, what a unit of y1 takes off a surface, over `scale`.
     """
     for k in range(p.rates.shape[0]):
-        taken[k] = 1.5 * dt  # of the mean: three times half a step
-        for j in range(p.rates.shape[1]):
-            w[k, 0, j], w[k, 1, j], w[k, 2, j] = step_weights(p.rates[k, j] * faster[p.side[k]], dt)
-            taken[k] += p.gains[j] * w[k, 2, j]
+        followed = p.strength[p.side[k]] > 0.0
+        if followed:
+            near[k] = EXACT_SHARE * largest[k]
+        if followed or missing:
+            renew_kind(p, k, near[k] * faster[p.side[k]], dt, w, taken)
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def renew_kind(p, k, factor, dt, w, taken):  # type: ignore[no-untyped-def]
+    """As `renew_particles`, of one kind of particle, at `factor` times its rates."""
+    taken[k] = 1.5 * dt  # of the mean: three times half a step
+    for j in range(p.rates.shape[1]):
+        w[k, 0, j], w[k, 1, j], w[k, 2, j] = step_weights(p.rates[k, j] * factor, dt)
+        taken[k] += p.gains[j] * w[k, 2, j]
+
+
+@compiled
+def renew_salt(s, faster, dt, w_salt, spread):  # type: ignore[no-untyped-def]
+    """Weights of one step length and of factors `faster` (3,) of diffusion (negative, positive, salt).
+
+    Out: w_salt (3, modes).  spread (places, places) m2/A, what a unit of reaction at v adds to the salt over rest at r.
+    """
     for j in range(s.rates.shape[0]):
         w_salt[0, j], w_salt[1, j], w_salt[2, j] = step_weights(s.rates[j] * faster[2], dt)
     for r in range(s.at.shape[0]):
@@ -41,14 +62,14 @@ def calm_particles(p, state, t, faster, dt, w):  # type: ignore[no-untyped-def]
     for u in range(p.place.shape[0]):
         k = p.kind[u]
         side = p.side[k]
-        strength = p.strength[side] * faster[side]
+        varies = p.strength[side] > 0.0
         t.calm_mean[u] = state.mean[u] - 1.5 * p.scale[u] * dt * t.y_start[u]
         surface = t.calm_mean[u]
         for j in range(p.gains.shape[0]):
             value = w[k, 0, j] * state.z[u, j] - p.scale[u] * p.gains[j] * w[k, 1, j] * t.y_start[u]
-            if strength > 0.0:
-                value -= strength * p.rates[k, j] * (
-                    w[k, 1, j] * state.force[u, j + 1] + w[k, 2, j] * t.force[u, j + 1]
+            if varies:
+                value -= faster[side] * p.rates[k, j] * (
+                    w[k, 1, j] * (state.flow[u, j] - t.near[k] * state.z[u, j]) + w[k, 2, j] * t.rest[u, j]
                 )  # fmt: skip
             t.calm_z[u, j] = value
             surface += value

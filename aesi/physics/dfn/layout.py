@@ -97,8 +97,9 @@ class DfnState(NamedTuple):
 
     z : (units, modes) stoichiometry.  mean, theta : (units,) the same, of the whole particle and of its surface.
     y : (units,) A/m2, what the particles give.  trend : (units,) A/(m2 s), how y leaves its share of the current.
-    force : (units, modes + 1) stoichiometry, of the variable part of diffusion, see `solid_forcing`.
-    q, forcing : (salt modes,) mol/m3, of the salt, the latter as `force`.  c : (nodes,) mol/m3.
+    flow : (units, modes) stoichiometry, of the integral of the diffusivity over that of the rates.
+    largest : (kinds,) diffusivity of a profile over that of the rates.
+    q, forcing : (salt modes,) mol/m3, of the salt, the latter of the variable part of diffusion.  c : (nodes,) mol/m3.
     given : (places,) A/m2, of particles, double layers and plating.  psi : (places,) V, see `reaction_kernels`.
     salt : (places,) over rest.  layer : (places,) A/m2 into double layers.  plated : (places,) mol/m3.
     """
@@ -108,7 +109,8 @@ class DfnState(NamedTuple):
     y: Array
     trend: Array
     theta: Array
-    force: Array
+    flow: Array
+    largest: Array
     q: Array
     forcing: Array
     c: Array
@@ -123,10 +125,12 @@ class DfnTrial(NamedTuple):
     """Scratch of a step. `calm_...` is its end without what the reaction there does; `..._start` and `..._back` are its
     start. What `DfnState` names as well has the units that it has there.
 
-    calm_z, calm_mean, calm_q, calm_salt, y_start, given_start, psi_start, force, forcing, q, c, salt : as there;
-    y_start with what double layers lag by.
+    calm_z, calm_mean, calm_q, calm_salt, y_start, given_start, psi_start, flow, largest, forcing, q, c, salt : as
+    there; y_start with what double layers lag by.
     reach, give : (units,) stoichiometry, and that per A/m2: surface = reach - give y.
-    force_end, z_end : (modes + 1,) and (modes,) of one unit, in a pass before and at the end.
+    near : (kinds,) what is stepped exactly of the diffusivity, over that of the rates.
+    rest : (units, modes) stoichiometry, flow less what is stepped exactly.
+    force, z_end : (modes + 1,) and (modes,) of one unit, see `solid_forcing`.
     nodes : (points of a particle,) stoichiometry.  kappa : (places,) S/m.  salt_before, forcing_before : a step ago.
     ohm : (places, points of an electrode) ohm m2.
     layer_c A/(V m2), layer_old A/m2, skew, lag A/m2 : (places,) double layers.
@@ -147,8 +151,11 @@ class DfnTrial(NamedTuple):
     given_start: Array
     psi_start: Array
     y_back: Array
+    flow: Array
+    largest: Array
+    near: Array
+    rest: Array
     force: Array
-    force_end: Array
     forcing: Array
     forcing_before: Array
     salt_before: Array

@@ -4,7 +4,7 @@ import math
 
 from numba import njit
 
-from aesi.physics.dfn.diffusion_kernels import renew, salt_forcing
+from aesi.physics.dfn.diffusion_kernels import renew_particles, renew_salt, salt_forcing
 from aesi.physics.dfn.local_kernels import equilibrium, row_lookup
 from aesi.physics.dfn.output_kernels import left_range, record, record_profile
 from aesi.physics.dfn.stepping_kernels import advance, hold_layers, hold_metal, settle, take_back
@@ -55,7 +55,7 @@ def run_porous(  # type: ignore[no-untyped-def]
         if jumped:
             jump(current[k - 1], current[k], p, s, e, state, t, newton, half, t_k)
             last_dt = 0.0
-        parts = parts_of(whole, drive.substep, drive.most) if k > 0 else 0
+        parts = parts_of(whole, drive.substep, drive.most, drive.finer) if k > 0 else 0
         turned = False
         if e.has_layers and k > 0:
             slope_before, slope = slope, 0.0 if drive.backward else (current[k] - current[k - 1]) / whole
@@ -83,11 +83,11 @@ def run_porous(  # type: ignore[no-untyped-def]
                 t_rates = t_k
                 set_rates(e, t, t_k)
             slot, missing = slot_of(dt, weights.keys)
+            renew_particles(
+                p, state.largest, t.near, t.faster, dt, missing, weights.particle[slot], weights.taken[slot]
+            )
             if missing:
-                renew(
-                    p, s, t.faster, dt,
-                    weights.particle[slot], weights.taken[slot], weights.salt[slot], weights.spread[slot],
-                )  # fmt: skip
+                renew_salt(s, t.faster, dt, weights.salt[slot], weights.spread[slot])
             if e.has_layers:
                 hold_layers(e, state, t, newton, dt)
             if e.plating[0] > 0.0:
@@ -163,7 +163,10 @@ def start_at_rest(p, s, e, state, t, half, theta0, t_k):  # type: ignore[no-unty
         side = 0 if p.place[u] < half else 1
         state.mean[u] = theta0[side]
         if p.strength[side] > 0.0:
-            solid_forcing(state.mean[u], state.z[u], p.at, p.project, p.psi[side], t.nodes, state.force[u])
+            steepest = solid_forcing(
+                state.mean[u], state.z[u], p.at, p.project, p.psi[side], t.nodes, t.force
+            )
+            state.largest[p.kind[u]] = 1.0 + p.strength[side] * steepest
 
 
 @njit(inline="always", fastmath=FASTMATH)

@@ -11,12 +11,14 @@ from aesi.physics.dfn.diffusion_kernels import (
     end_mean,
     end_mode,
     end_salt,
+    renew_kind,
     salt_at_places,
     salt_forcing,
 )
 from aesi.physics.dfn.reaction_kernels import GAS_OVER_FARADAY, solve_reaction
 from aesi.physics.espm.interface_kernels import bounded_exp, end_weight, stripped
 from aesi.physics.espm.kernels import FASTMATH, compiled, lookup
+from aesi.physics.espm.tables import CORRECTED_MARGIN
 from aesi.physics.espm.transport_kernels import solid_forcing
 
 SALT_TOLERANCE = 1e-3
@@ -116,14 +118,16 @@ def advance(  # type: ignore[no-untyped-def]
     weights, slot : those of the step's length.  last_dt : of the step before, 0 after a jump.
     last_try : take the step although it solves nothing.  Returns as `solve_reaction`.
     """
-    faster, w, w_salt, spread = t.faster, weights.particle[slot], weights.salt[slot], weights.spread[slot]
-    extrapolate(p, s, e, state, t, dt, last_dt, weights.taken[slot], t.change)
+    faster, w, taken = t.faster, weights.particle[slot], weights.taken[slot]
+    w_salt, spread = weights.salt[slot], weights.spread[slot]
+    extrapolate(p, s, e, state, t, dt, last_dt, taken, t.change)
     varies = p.strength[0] > 0.0 or p.strength[1] > 0.0
     if varies:
+        hold_flows(p, state, t)
         calm_particles(p, state, t, faster, dt, w)
-        end_forces(p, state, t, dt, w)
+        end_flows(p, state, t, faster, dt, w, taken, True)
     phi_n, phi_p, steps = 0.0, 0.0, 0
-    for _ in range(PASSES):
+    for passed in range(PASSES):
         calm_salt(s, state, t, faster[2], w_salt)
         calm_particles(p, state, t, faster, dt, w)
         phi_n, phi_p, steps = find_reaction(p, s, e, state, t, newton, spread, t.total, t_k)
@@ -136,7 +140,8 @@ def advance(  # type: ignore[no-untyped-def]
             t.salt[r] = state.salt[r]
         settled = off < SALT_TOLERANCE
         if varies:
-            settled = end_forces(p, state, t, dt, w) < SURFACE_TOLERANCE and settled
+            more = passed + 1 < PASSES
+            settled = end_flows(p, state, t, faster, dt, w, taken, more) < SURFACE_TOLERANCE and settled
         if settled:
             break
     if steps > 0 or last_try:
@@ -173,8 +178,20 @@ def extrapolate(p, s, e, state, t, dt, last_dt, taken, change):  # type: ignore[
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def end_forces(p, state, t, dt, w):  # type: ignore[no-untyped-def]
-    """Variable part of diffusion at the end of the step, t.force; returns by how much it moves a surface."""
+def hold_flows(p, state, t):  # type: ignore[no-untyped-def]
+    """Diffusion beyond what is stepped exactly, t.rest, as it is at the start of the step."""
+    for u in range(p.place.shape[0]):
+        for j in range(p.gains.shape[0]):
+            t.rest[u, j] = state.flow[u, j] - t.near[p.kind[u]] * state.z[u, j]
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def end_flows(p, state, t, faster, dt, w, taken, more):  # type: ignore[no-untyped-def]
+    """Diffusion at the end of the step, t.flow and t.rest; returns by how much its change moves a surface.
+
+    more : a pass follows. Where the diffusivity has risen so far that passes would part instead of meeting, more of it
+    is stepped exactly from then on.
+    """
     worst = 0.0
     for u in range(p.place.shape[0]):
         k = p.kind[u]
@@ -182,14 +199,22 @@ def end_forces(p, state, t, dt, w):  # type: ignore[no-untyped-def]
         if p.strength[side] > 0.0:
             for j in range(p.gains.shape[0]):
                 t.z_end[j] = end_mode(p, t, u, j, state.y[u], w)
-                t.force_end[j + 1] = t.force[u, j + 1]
             mean = end_mean(p, t, u, state.y[u], dt)
-            solid_forcing(mean, t.z_end, p.at, p.project, p.psi[side], t.nodes, t.force[u])
-            moved = 0.0
+            steepest = solid_forcing(mean, t.z_end, p.at, p.project, p.psi[side], t.nodes, t.force)
+            t.largest[k] = 1.0 + p.strength[side] * steepest
+            last, moved = t.near[k], 0.0
+            if more:
+                t.near[k] = max(last, CORRECTED_MARGIN * t.largest[k])
             for j in range(p.gains.shape[0]):
-                change = t.force[u, j + 1] - t.force_end[j + 1]
-                moved += p.strength[side] * p.rates[k, j] * w[k, 2, j] * change
+                t.flow[u, j] = t.z_end[j] + p.strength[side] * t.force[j + 1]
+                before = t.rest[u, j]
+                t.rest[u, j] = t.flow[u, j] - t.near[k] * t.z_end[j]
+                moved += faster[side] * p.rates[k, j] * w[k, 2, j] * (t.rest[u, j] - before)
             worst = max(worst, abs(moved))
+            if t.near[k] > last:
+                renew_kind(p, k, t.near[k] * faster[side], dt, w, taken)
+                t.give[u] = p.scale[u] * taken[k]
+                worst = math.inf
     return worst
 
 
@@ -204,8 +229,9 @@ def commit(p, s, e, state, t, dt, w, change, varies):  # type: ignore[no-untyped
         moved = p.share[u] * change[0 if p.place[u] < half else 1]
         state.trend[u] = (state.y[u] - t.y_back[u] - moved) / dt
         if varies:
-            for j in range(p.gains.shape[0] + 1):
-                state.force[u, j] = t.force[u, j]
+            state.largest[p.kind[u]] = t.largest[p.kind[u]]
+            for j in range(p.gains.shape[0]):
+                state.flow[u, j] = t.flow[u, j]
     for j in range(state.q.shape[0]):
         state.q[j] = t.q[j]
         state.forcing[j] = t.forcing[j]

@@ -2,8 +2,9 @@
 
     q_n x_n + q_p x_p = Q_Li - loss Q,   U_p(x_p) - U_n(x_n) = V_full, V_empty       q capacity of an electrode, Ah
 
-Stoichiometry windows follow from the declared rest voltages of full and empty; a simulation starts from the rest
-voltage that soc0 declares.
+Q is the capacity of the cell as the effects named before leave it: the declared one, less what a loss of active
+material took. Stoichiometry windows follow from the declared rest voltages of full and empty; a simulation starts from
+the rest voltage that soc0 declares.
 
 Leaves out the film that consumed the lithium (film_growth). Holds for a cell that still reaches both voltages.
 
@@ -22,7 +23,7 @@ PARAMETERS = {
         bounds=(-0.1, 0.4),
         neutral=0.0,
         source="a cell more than new (declared too low) to its end of life",
-        description="share of the declared capacity",
+        description="share of the capacity that effects named before leave",
         counted="share",
         spread=Spread(None, 0.03, "first-cycle losses of cells of one make differ by a few per cent"),
     )

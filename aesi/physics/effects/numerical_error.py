@@ -1,6 +1,6 @@
 """The declared model's own discretisation: the same equations on a finer basis and with shorter steps.
 
-    orders of projection times n, longest explicit step divided by n
+    orders of projection times n, steps (a row, or the longest explicit step within it) divided by n
 
 Leaves out the error of how the current runs between samples, which is the caller's choice (`hold`). Holds
 always: what refining changes is numerics, not physics, and has to be known before any physics is sought.
@@ -34,7 +34,7 @@ def refine(model: EspmModel, *, refinement: float) -> EspmModel:
         solid_order=round(model.solid_order * factor),
         electrolyte_order=round(model.electrolyte_order * factor),
         electrode_points=round(model.electrode_points * factor),
-        substep_s=model.substep_s / factor,
+        step_refinement=model.step_refinement * factor,
     )
 
 

@@ -50,7 +50,8 @@ def run_extended(
     theta0 = np.array(model.cell.stoichiometries(soc0))
     given = temperature_k is not None
     kelvin = temperature_k if temperature_k is not None else np.array([model.cell.initial_temperature_k])
-    drive = Drive(time, current, kelvin, given, hold == "backward", model.substep_s, model.most_substeps)
+    steps = model.substep_s, model.most_substeps, model.step_refinement
+    drive = Drive(time, current, kelvin, given, hold == "backward", *steps)
     arguments = general_arguments(model)
     fault_at, fault = run_general(drive, theta0, *arguments, *_memory(*arguments[:2], model.regions), out)
     extra = {"temperature_k": out[7]}

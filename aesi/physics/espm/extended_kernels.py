@@ -52,7 +52,7 @@ def run_general(  # type: ignore[no-untyped-def]
     fault_at, fault, driest, voltage = -1, 0, 1.0, 0.0
     for k in range(time.shape[0]):
         whole = time[k] - time[k - 1] if k > 0 else 0.0
-        parts = parts_of(whole, drive.substep, drive.most) if k > 0 else 1
+        parts = parts_of(whole, drive.substep, drive.most, drive.finer) if k > 0 else 1
         dt, slot = whole / parts, 0
         for part in range(parts):
             end_share = (part + 1.0) / parts

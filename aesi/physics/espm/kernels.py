@@ -50,9 +50,10 @@ def lookup(table, position):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def parts_of(step, longest, most):  # type: ignore[no-untyped-def]
-    """Into how many equal parts a step is taken that are not longer than `longest`, at most `most`."""
-    return min(max(1, math.ceil(step / longest - ROUND_OFF)), most)
+def parts_of(step, longest, most, finer):  # type: ignore[no-untyped-def]
+    """Into how many equal parts a step is taken that are not longer than it, or `longest`, over `finer`; at most
+    `most`."""
+    return min(max(1, math.ceil(finer * max(1.0, step / longest) - ROUND_OFF)), most)
 
 
 @njit(inline="always", fastmath=FASTMATH)

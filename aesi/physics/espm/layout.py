@@ -23,6 +23,7 @@ class Drive(NamedTuple):
 
     time, current : (n,) s, A.  temperature : K, (n,) where `given`, else (1,) at the start.
     backward : a row's current holds since the row before.  substep, most : s and count of the steps within a row.
+    finer : see `EspmModel.step_refinement`.
     """
 
     time: Array
@@ -32,6 +33,7 @@ class Drive(NamedTuple):
     backward: bool
     substep: float
     most: int
+    finer: float
 
 
 class Units(NamedTuple):

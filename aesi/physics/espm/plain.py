@@ -117,6 +117,7 @@ def plain_arguments(model: EspmModel) -> tuple[PlainSolid, PlainSalt, PlainCell]
             nonlinear=not diffusion.linear,
             substep=model.substep_s,
             most=model.most_substeps,
+            finer=model.step_refinement,
         ),
         _cell(model, temperature, diffusion.top),
     )

@@ -67,7 +67,7 @@ def renew_plain_weights(dt, slot, solid, salt, memory):  # type: ignore[no-untyp
     """Weights of a step of length `dt`: of the particles' modes, and of the parts that the electrolyte takes it in."""
     rates, gains = solid.rates, solid.gains
     w_n, w_p, w_e = memory.w_n, memory.w_p, memory.w_e
-    parts = parts_of(dt, salt.substep, salt.most) if salt.nonlinear else 1
+    parts = parts_of(dt, salt.substep, salt.most, salt.finer) if salt.nonlinear else 1
     memory.parts[slot] = parts
     for j in range(rates.shape[1]):
         decay, start, end = step_weights(rates[0, j], dt)

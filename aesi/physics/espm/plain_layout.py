@@ -24,7 +24,7 @@ class PlainSalt(NamedTuple):
     rates : (modes,) 1/s.  gains : (modes,) mol/m3 per A s of cell current.
     to_nodes, project : (nodes, modes) both ways.  gauss, mean : weights of Gauss points and of the mean over the nodes.
     psi, strength : table and factor of the variable part of diffusion.  nonlinear : whether there is one.
-    substep, most : s and count of the steps in which it is taken explicitly.
+    substep, most, finer : of the steps in which it is taken explicitly, see `layout.Drive`.
     """
 
     rates: Array
@@ -38,6 +38,7 @@ class PlainSalt(NamedTuple):
     nonlinear: bool
     substep: float
     most: int
+    finer: float
 
 
 class PlainCell(NamedTuple):

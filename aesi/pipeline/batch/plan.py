@@ -17,8 +17,8 @@ from typing import Any, TextIO
 
 from aesi.data.reading import SUFFIXES
 from aesi.errors import CellError, InputError
-from aesi.numerics.files.contents import contents
 from aesi.physics.cell import Soh, checked_soh, read_soh
+from aesi.pipeline.product.contents import contents
 
 CELL_FILES = ("*.bpx.json", "*.json")
 LAID_BESIDE = (".", "~$")

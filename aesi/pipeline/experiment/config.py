@@ -30,6 +30,7 @@ from aesi.pipeline.experiment.sections import (
     Section,
     TrackingConfig,
 )
+from aesi.records.horizons import divides
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
@@ -104,6 +105,17 @@ class ExperimentConfig(Section):
             )
         if self.data.kind == "virtual" and self.discover is not None and self.discover.names_records:
             raise ValueError("discover: kind: virtual brings its own records; leave out fit, test and good")
+        return self
+
+    @model_validator(mode="after")
+    def _horizons_in_whole_steps(self) -> ExperimentConfig:
+        for data in (self.data, *([] if self.fallback is None else [self.fallback.data])):
+            for horizon_s in self.conformal.horizons_s or ():
+                if not divides(data.dt_s, horizon_s):
+                    raise ValueError(
+                        f"conformal.horizons_s: {horizon_s:g} s is no whole number of steps of data.dt_s, "
+                        f"{data.dt_s:g} s; give multiples of it, or leave horizons_s out"
+                    )
         return self
 
     @field_validator("name")

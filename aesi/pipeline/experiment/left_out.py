@@ -113,7 +113,7 @@ class TrainingDrives:
         )
 
     def as_they_are(self, train: tuple[ErrorSeries, ...]) -> LeftOutDrives:
-        """The training drives under physics that is the same for all: as declared, or of a single drive."""
+        """The training drives under the physics that was fitted to all of them, which a single one leaves no other."""
         pieces = self.pieces()
         made = [
             tuple(HeldOutDrive.of(train, piece.drive, piece.rows) for piece in each)

@@ -13,10 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from aesi.data.resample import DENSE, is_sparse, shared_by_steps, to_even
+from aesi.data.resample import DENSE, is_sparse, off_rows, to_even
 from aesi.data.virtual import DEFAULT_MIX
 from aesi.errors import ConfigError, DataAway, DataError, InputError, SimulationError
-from aesi.numerics.files.contents import contents
 from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, simulate
 from aesi.physics.belongs import check_measured
 from aesi.physics.depletion import RUN_ON
@@ -24,7 +23,7 @@ from aesi.physics.effects import activated
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.drives import by_role, cut_short, training_drives
 from aesi.pipeline.experiment.left_out import TrainingDrives, series_under
-from aesi.pipeline.experiment.physics_models import PhysicsModels, no_rows, physics_models
+from aesi.pipeline.experiment.physics_models import FREE, PhysicsModels, no_rows, physics_models
 from aesi.pipeline.experiment.recalibrate import Beginning, FitRecord
 from aesi.pipeline.experiment.sources import (
     Sources,
@@ -35,15 +34,15 @@ from aesi.pipeline.experiment.sources import (
     with_keys,
 )
 from aesi.pipeline.notes import of_contradiction, of_day, on_temperatures, temperature_sentence
+from aesi.pipeline.product.contents import contents
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import ErrorSeries, Hold, LeftOutDrives, Measurement, Role, Split, hold_sentence
 
 DFN_NOTE = "The physics is the porous electrode: DFN in tables and figures, where others have ESPM."
 
-TOLD_OF_SHARED = 0.05
-"""Share of a step that the step before has, too, from which it is told: rows a hundredth of a step off their place make
-one or two hundredths. A convention."""
+TOLD_OFF = 0.05
+"""Steps by which a row is off its stamp, in the mean, from which it is told. A convention."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,6 +136,7 @@ def _load(config: ExperimentConfig) -> Loaded:
         *_of_starts(physics, records, starts, config.data.hold),
         *told,
         *_of_repeats(config, records),
+        *_of_single(training),
         *([DFN_NOTE] if given.model == "dfn" else []),
         *of_empty,
     ]
@@ -185,9 +185,22 @@ def _of_repeats(config: ExperimentConfig, records: Mapping[str, FitRecord]) -> l
     return cut_short(cut.measurement.time_s, config.data.repeats)
 
 
+def _of_single(training: TrainingDrives) -> list[str]:
+    """A sentence on fitted physics where there is no second drive to fit it to without the first."""
+    config = training.config
+    fitted = config.cell.start == "recalibrated" or set(config.models) & set(FREE)
+    if len(training.drives) > 1 or not fitted:
+        return []
+    return [
+        "One drive trains, so that the physics fitted to it has seen the rows on which its intervals and bands are "
+        "calibrated: they may come out too narrow, also around a correction of it; a second drive, or a second repeat, "
+        "has them calibrated on what was left out."
+    ]
+
+
 def _physics(given: HybridModel, training: TrainingDrives) -> tuple[PhysicsModels, LeftOutDrives | None]:
-    """The physics, and the training drives under physics that has not seen them; None where it is the same for all:
-    as declared, or of a single drive."""
+    """The physics, and the training drives under physics that has not seen them; None of a single drive, without which
+    there is nothing to fit to. Also where the declared cell is corrected: what is fitted stands beside it."""
     config = training.config
     physics = physics_models(
         given.cell,
@@ -198,7 +211,7 @@ def _physics(given: HybridModel, training: TrainingDrives) -> tuple[PhysicsModel
         model=given.model,
         own_charges=training.of_several_records,
     )
-    if config.cell.start == "recalibrated" and len(training.drives) > 1:
+    if len(training.drives) > 1:
         return training.left_out(physics)
     return physics, None
 
@@ -253,7 +266,7 @@ def _on_grid(
         held = hold_sentence(measurement.name, data.hold, data.declared_hold is not None, "data.hold: {}")
         # First, since it refuses a step that would make too many rows, or none.
         even = to_even(measurement, data.dt_s, data.hold)
-        sampled = _of_sampling(measurement, data.dt_s, judges=name in judging)
+        sampled = _of_sampling(measurement, even, data.dt_s, judges=name in judging)
         notes += [
             held,
             *sampled,
@@ -266,8 +279,8 @@ def _on_grid(
     return records, starts, notes
 
 
-def _of_sampling(measurement: Measurement, dt_s: float, *, judges: bool) -> list[str]:
-    """A sentence on a record whose figures one step ahead know something of the row that they predict.
+def _of_sampling(measurement: Measurement, even: Measurement, dt_s: float, *, judges: bool) -> list[str]:
+    """A sentence on a record whose even rows are not those that were measured.
 
     judges : of a test record, whose free run needs no dense voltage.
     Raises DataError for another whose rows are so far apart that most of it would be filled in.
@@ -280,13 +293,15 @@ def _of_sampling(measurement: Measurement, dt_s: float, *, judges: bool) -> list
             f"is fitted and judged would be filled in between rows; give data.dt_s: {apart_s:g}, or a record of "
             "denser rows."
         )
-    share = shared_by_steps(time_s, dt_s)
-    if share <= TOLD_OF_SHARED or apart_s < DENSE * dt_s:
+    if apart_s < DENSE * dt_s:
+        of_what = "averages over a step, about which single rows scatter more"
+    elif off_rows(time_s, even.time_s) > TOLD_OFF:
+        of_what = "voltages filled in between rows, which scatter less than rows do"
+    else:
         return []
     return [
-        f"{measurement.name}: its rows do not lie every {dt_s:g} s, and {share:.0%} of what is filled in at a step was "
-        "known at the step before: errors and intervals one step ahead come out too small (those of a free run do "
-        "not); a data.dt_s of several rows, over which they are averaged, avoids it."
+        f"{measurement.name}: its rows do not lie every {dt_s:g} s. In free run, errors and bands are of {of_what}; "
+        "one step ahead they are of rows as measured."
     ]
 
 

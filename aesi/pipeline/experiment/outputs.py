@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import platform
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ from aesi.pipeline.report.figures import paper_figures
 from aesi.pipeline.report.views import BootstrapView, RecordTrace, RunView
 from aesi.pipeline.report.words.runs import run_finding
 from aesi.pipeline.written import FIGURES, MODEL, PAPER_FIGURES, REPORT, SUMMARY, TABLES
+from aesi.records.failed import candidates_failed
 from aesi.sparse import ENSEMBLES, Candidate, Problem, SparseModel
 from aesi.sparse.ranking import svd_ranking
 
@@ -40,7 +41,7 @@ class Result:
 
     candidates : rows with number, oob, valid, terms, fitness, feasible, front, chosen.
     chosen : the candidates the models come from, as one.  run_id : of the tracked run.  seconds : wall time so far.
-    failed : how many further candidates were evaluated and failed.  unfitted : a sentence on each baseline that could
+    failed : why further candidates came to nothing -> how many.  unfitted : a sentence on each baseline that could
     not be fitted.
     """
 
@@ -53,8 +54,13 @@ class Result:
     evaluation: EvaluatedModels
     run_id: str
     seconds: float
-    failed: int = 0
+    failed: Mapping[str, int] = field(default_factory=dict)
     unfitted: tuple[str, ...] = ()
+
+    @property
+    def evaluated(self) -> int:
+        """Candidates of the search, those included that failed."""
+        return len(self.candidates) + sum(self.failed.values())
 
     @property
     def best(self) -> str:
@@ -96,7 +102,7 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
         "schema": SCHEMA,
         "experiment": result.config.name,
         "mlflow_run_id": result.run_id,
-        "candidates": len(result.candidates) + result.failed,
+        "candidates": result.evaluated,
         "chosen": shown(result.best),
         "finding": finding,
         "seed": result.config.seed,
@@ -106,7 +112,8 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
         "notes": list(notes(result)),
         "models": rows,
     }
-    replace(hybrid(result), finding=finding).save(folder / MODEL)
+    # A sentence on another model than the one that is kept would be told of each prediction by that.
+    replace(hybrid(result), finding=finding if result.kept else "").save(folder / MODEL)
     for format, name in TABLES.items():
         write_whole(folder / name, tables.render(rows, format))
     write_run_report(folder / REPORT, view)
@@ -120,8 +127,9 @@ def notes(result: Result) -> tuple[str, ...]:
     without_intervals = (note for one in result.fitted for note in one.notes)
     alone = f"The saved model is the {result.corrected} alone, without bands: {result.best} cannot be kept with it."
     told = () if result.kept else (alone,)
+    failed = candidates_failed(result.failed, result.evaluated)
     return together(
-        (*result.loaded.notes, *result.problem.notes, *result.unfitted, *without_intervals, *told)
+        (*result.loaded.notes, *result.problem.notes, *result.unfitted, *without_intervals, *failed, *told)
     )
 
 

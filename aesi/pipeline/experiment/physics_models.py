@@ -6,7 +6,8 @@
     ESPM recalibrated             all of `aesi.pipeline.experiment.recalibrate`
 
 The correction is learned on one of them (`cell.start`). Errors that calibrate bands, and the validation figure, have
-to come from drives that the physics had not seen either, so everything is fitted once more without each training drive.
+to come from drives that the physics had not seen either, so everything is fitted once more without each training drive,
+where there are several.
 
 A record that the recalibration has seen starts where the fit has it, one whose start is given there. Any other one
 starts where the recalibrated cell reads it to start, as it will once it is saved: its potentials are nearer than the
@@ -87,10 +88,11 @@ class PhysicsModels:
         except DataError:  # by the declared cell it does
             return None
 
-    def run(self, name: str, record: FitRecord, hold: Hold) -> Run:
-        """The record under the named physics, from where that has it start."""
+    def run(self, name: str, record: FitRecord, hold: Hold, rows: Measurement | None = None) -> Run:
+        """The record under the named physics, from where that has it start; at the given rows of it, its even ones by
+        default."""
         soc0, _ = self.begin(name, record, hold)
-        return self.by_name[name].run(record.measurement, soc0, hold)
+        return self.by_name[name].run(record.measurement if rows is None else rows, soc0, hold)
 
     def series(self, record: FitRecord, dt_s: float, hold: Hold) -> tuple[ErrorSeries, bool]:
         """The error of the chosen physics along a record, what the others say beside it, and whether it ran empty."""
@@ -105,8 +107,22 @@ class PhysicsModels:
             physics=others,
             missed_v=self.by_name[RECALIBRATED].missed_v,
             ran_out_s=None if first is None else float(run.time_s[first]),
+            own=self._own(record, dt_s, hold),
         )
         return series, bool(run.series["depleted"].any())
+
+    def _own(self, record: FitRecord, dt_s: float, hold: Hold) -> ErrorSeries | None:
+        """The error over the rows as they were logged; None where these are the even ones, or not known."""
+        rows = None if record.begins is None else record.begins.measured
+        if rows is None or rows is record.measurement:
+            return None
+        runs = {name: self.run(name, record, hold, rows) for name in self.by_name}
+        return replace(
+            error_series(rows, runs[self.start], dt_s),
+            inputs=rows.current_a[:, None],  # no correction is asked at these rows
+            input_names=("I",),
+            physics={name: each.voltage_v for name, each in runs.items()},
+        )
 
     def with_slopes(self, series: ErrorSeries, record: FitRecord, hold: Hold) -> ErrorSeries:
         """The series of the record with what each parameter of the chosen physics, and its start, is worth along it."""

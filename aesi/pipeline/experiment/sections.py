@@ -306,7 +306,8 @@ class ConformalConfig(Section):
     method : how intervals one step ahead are made.
     alpha : share of misses that is aimed at; 0.1 for intervals of 90 %.
     window : rows, the residuals that an interval looks back at.
-    horizons_s : s, times since the last measured voltage for which bands are calibrated, beside the whole record.
+    horizons_s : s, times since the last measured voltage for which bands are calibrated, beside the whole record, in
+    whole steps of `data.dt_s`; None takes those of 1, 10 and 60 s that are.
     compare : methods that the tables show beside it, calibrated on the same residuals; `spci_refitted`, the paper's
     forest refitted as it goes, can stand here alone.
     """
@@ -314,7 +315,7 @@ class ConformalConfig(Section):
     method: str = "spci_boosted"
     alpha: Share = 0.1
     window: Annotated[int, Field(ge=2)] = 200
-    horizons_s: tuple[Positive, ...] = (1.0, 10.0, 60.0)
+    horizons_s: tuple[Positive, ...] | None = None
     compare: tuple[str, ...] = ("split", "enbpi", "spci_refitted", "spci_linear")
 
     @field_validator("method")

@@ -16,7 +16,7 @@ from typing import Any, Self
 import numpy as np
 
 from aesi.conformal import WHOLE_DRIVE, Calibrated, FreeRunBands, calibrated_from_dict
-from aesi.data.resample import after_gap, is_even, is_sparse, known_by, next_stamp, to_even
+from aesi.data.resample import is_even, is_sparse, to_even
 from aesi.errors import CellError, DataError, InputError, SimulationError
 from aesi.numerics.typing import Array, BoolArray, Numbers
 from aesi.numerics.visited import Visited
@@ -29,11 +29,13 @@ from aesi.physics.effects import active_effect
 from aesi.pipeline.product.deviations import PhysicsStart, slopes_v, start_v
 from aesi.pipeline.product.error_series import error_series
 from aesi.pipeline.product.model_folder import part_file, read_model, write_model
+from aesi.pipeline.product.one_step import rows_ahead
 from aesi.pipeline.product.prediction import Prediction
 from aesi.pipeline.product.trained import outside_trained, trained_on
 from aesi.pipeline.written import EFFECTS, HEAD
 from aesi.records import ErrorSeries, FreeRun, Hold, Measurement
 from aesi.records.checked import numbers, row_words
+from aesi.records.steps import after_gap, next_stamp
 from aesi.sparse import SparseModel
 
 END_BEFORE = ", or end the record before that (--to-s on the command line)."
@@ -98,18 +100,21 @@ class HybridModel:
         voltage_v: Numbers | None = None,
         temperature_degc: Numbers | None = None,
         error0_v: float | None = None,
+        soc0_sd: float = 0.0,
     ) -> Prediction:
         """Voltage under a current, with its band.
 
         time_s, current_a : (n,) s, A (discharge positive).  voltage_v : (n,) V measured: one step ahead, each
-        sample predicted from those before it, the first by the physics alone and without a band; None: free run. Of
-        rows denser than the model's step it is their mean over a step that is predicted, and the band is of that:
-        single rows scatter more.
+        sample predicted from those before it, the first by the physics alone and without a band; None: free run. Rows
+        denser than the model's step are predicted from the mean of those in the step before; the band is of single
+        rows.
         error0_v : V, measured minus physics at the first sample, that a free run begins with. Where it is not known
         (None), it begins with what the inputs give, and the band is that of a whole drive from the first sample on. One
         step ahead it has no use.
         soc0 : state of charge at the first sample; None takes it from the first measured voltage at rest, else
         the model's own.  temperature_degc : as in `simulate`.
+        soc0_sd : how far soc0 may be off, one standard deviation, by which the band of a free run is wider: nought
+        takes it as exact, and a band around a start that is not covers next to nothing.
 
         Raises DataError where the record cannot be simulated, its first voltage is no such cell's, soc0 is unknown, or
         one step ahead is asked for of rows that are further apart than the correction's step.
@@ -118,7 +123,7 @@ class HybridModel:
         measured = np.full(np.shape(time_s), np.nan) if free else numbers(voltage_v, "voltage_v")
         warm = _each_row(temperature_degc, np.shape(time_s))
         record = Measurement(time_s, current_a, measured, warm, "the record")
-        return self.predict_record(record, soc0, one_step=not free, error0_v=error0_v)
+        return self.predict_record(record, soc0, one_step=not free, error0_v=error0_v, soc0_sd=soc0_sd)
 
     def predict_record(
         self,
@@ -134,8 +139,10 @@ class HybridModel:
 
         error0_v : that a free run begins with; None takes it from the first voltage, as an experiment does that judges
         a model, or where that is missing as `predict` does.
-        soc0_sd : standard deviation of soc0, by what it is worth the band of a free run is wider. Raises InputError
-        for one that is no number from 0 to 1, and for an error0_v that is not finite.
+        soc0 : None reads it, with what it is uncertain by, from the voltage that the record begins with, also for a
+        free run; where it has none it is the model's own.
+        soc0_sd : standard deviation of a soc0 that is not read, by what it is worth the band of a free run is wider.
+        Raises InputError for one that is no number from 0 to 1, and for an error0_v that is not finite.
         """
         if error0_v is not None and not np.isfinite(error0_v):
             raise InputError(f"error0_v = {error0_v!r} is no voltage; give volts, or leave it out.")
@@ -153,23 +160,20 @@ class HybridModel:
         from_first = error0_v is None and np.isfinite(measured[:1]).any()
         if one_step or from_first:
             check_voltage(self.cell, record.take(slice(0, 1)))  # from which state and error start
+        if soc0 is None:
+            soc0, soc0_sd = self._begins(record, soc0_sd)
         if one_step:
             self._check_dense(record)
         else:
             seen = np.arange(len(record)) < (1 if from_first else 0)
             record = replace(record, voltage_v=np.where(seen, measured, np.nan))
-        soc0 = self._soc0(record, soc0, one_step)
         even = self._even(record)
         series = self._series(even, soc0)
-        own = series if even is record else self._series(record, soc0)
+        own = None if even is record else self._series(record, soc0)
         if one_step:
-            if own is not series:
-                # Filled in between rows, it would hold the voltage of the very row that is predicted from it.
-                series = replace(series, error_v=known_by(own.time_s, own.error_v, series.time_s))
-            prediction = self._one_step(series)
-        else:
-            prediction = self._free_run(self._with_slopes(series, even, soc0, soc0_sd), error0_v)
-        return prediction if own is series else _back(prediction, own, one_step=one_step)
+            return self._one_step(replace(series, own=own))
+        prediction = self._free_run(self._with_slopes(series, even, soc0, soc0_sd), error0_v)
+        return prediction if own is None else _back(prediction, own)
 
     def save(self, folder: str | Path) -> Path:
         """Write the model to a folder, made where it is missing; returns the folder."""
@@ -214,14 +218,15 @@ class HybridModel:
                 **read,
             )
 
-    def _soc0(self, record: Measurement, soc0: float | None, measured: bool) -> float:
-        if soc0 is not None:
-            return soc0
-        if measured:
-            return initial_state(self.cell, record, None, self.hold, self.effects, model=self.model).soc
+    def _begins(self, record: Measurement, soc0_sd: float) -> tuple[float, float]:
+        """State of charge at the first row and its standard deviation, by its voltage; the model's own without one, and
+        the deviation that was given."""
+        if np.isfinite(record.voltage_v[:1]).any():
+            read = initial_state(self.cell, record, None, self.hold, self.effects, model=self.model)
+            return read.soc, read.read_sd
         if self.soc0 is None:
             raise DataError("a free run needs soc0, the state of charge at the first sample; give it.")
-        return self.soc0
+        return self.soc0, soc0_sd
 
     def _check_dense(self, record: Measurement) -> None:
         if self.correction is not None and is_sparse(record.time_s, record.current_a, self.dt_s):
@@ -277,13 +282,17 @@ class HybridModel:
         """The series with the slopes that the band needs of the physics: a simulation for each parameter left open,
         and one for the start."""
         if self.bands is not None and soc0_sd > 0.0:
-            physics = PhysicsStart(self.cell, self.cell, self.effects, model=self.model)
-            begins_v = start_v(physics, record, soc0, soc0_sd, self.hold, series.model_v)
-            series = replace(series, start_v=begins_v)
+            series = replace(series, start_v=self.start_worth_v(record, soc0, soc0_sd, series.model_v))
         if self.bands is None or self.bands.root is None:
             return series
         slopes = slopes_v(self.cell, self.effects, record, soc0, self.hold, self.model, series.model_v)
         return replace(series, slopes_v=slopes)
+
+    def start_worth_v(self, record: Measurement, soc0: float, soc0_sd: float, physics_v: Array) -> Array:
+        """(n,) V, >= 0, how far the physics_v (n,) of the record moves where it starts `soc0_sd` off soc0; see
+        `start_v`."""
+        physics = PhysicsStart(self.cell, self.cell, self.effects, model=self.model)
+        return start_v(physics, record, soc0, soc0_sd, self.hold, physics_v)
 
     def _free_run(self, series: ErrorSeries, error0_v: float | None) -> Prediction:
         n = len(series)
@@ -301,32 +310,35 @@ class HybridModel:
         return Prediction.of(series, run.error_v, low, high, run.outside, weight, alpha)
 
     def _one_step(self, series: ErrorSeries) -> Prediction:
-        n = len(series)
+        """Of the record's own rows, each as the last one of its step, a step before which it, too, is not known."""
+        own = series if series.own is None else series.own
         if self.correction is None:
+            n = len(own)
             none = np.full(n, np.nan)
-            return Prediction.of(series, np.zeros(n), none, none, np.zeros(n, dtype=bool), none, None)
-        error = self.correction.one_step(series)
+            return Prediction.of(own, np.zeros(n), none, none, np.zeros(n, dtype=bool), none, None)
+        known, ahead = series.as_known, rows_ahead(self.correction, series)
+        step = next_stamp(own.time_s, series.time_s)
+        error = self.correction.one_step(known)
         error[0] = 0.0  # nothing was measured before the first sample
-        low = high = np.full(n, np.nan)
+        low = high = np.full(len(own), np.nan)
         if self.intervals is not None:
-            residual = series.error_v - error
+            residual = ahead.left_v
             residual[0] = np.nan
-            band = self.intervals.intervals(residual, series.current_a)
-            low, high = (np.concatenate([[np.nan], bound[1:]]) for bound in (band.lower_v, band.upper_v))
+            band = self.intervals.intervals(residual, ahead.current_a)
+            at = np.searchsorted(ahead.stamps, step)
+            low, high = (np.where(step == 0, np.nan, bound[at]) for bound in (band.lower_v, band.upper_v))
         alpha = None if self.intervals is None else self.intervals.alpha
-        outside = outside_trained(self.correction.outside(series), series, self.visited)
-        return Prediction.of(series, error, low, high, outside, self.correction.kept(series), alpha)
+        outside = outside_trained(self.correction.outside(known), known, self.visited)
+        kept = self.correction.kept(known)
+        return Prediction.of(own, error[step], low, high, outside[step], kept[step], alpha)
 
 
-def _back(prediction: Prediction, own: ErrorSeries, *, one_step: bool) -> Prediction:
-    """Onto a record's own rows: the physics simulated there (`own`), the correction and its band interpolated.
-
-    one_step : those of the next stamp, a step before which the last row before this one, and not itself, is known.
-    """
-    later = next_stamp(own.time_s, prediction.time_s)
+def _back(prediction: Prediction, own: ErrorSeries) -> Prediction:
+    """Of a free run, onto a record's own rows: the physics simulated there (`own`), the correction and its band
+    interpolated."""
 
     def onto(values: Array) -> Array:
-        return values[later] if one_step else np.interp(own.time_s, prediction.time_s, values)
+        return np.interp(own.time_s, prediction.time_s, values)
 
     return replace(
         prediction,
@@ -338,6 +350,7 @@ def _back(prediction: Prediction, own: ErrorSeries, *, one_step: bool) -> Predic
         soc=own.soc,
         outside=onto(prediction.outside.astype(float)) > 0,
         weight=onto(prediction.weight),
+        temperature_degc=own.temperature_degc,
     )
 
 

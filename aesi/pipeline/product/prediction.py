@@ -23,6 +23,7 @@ class Prediction:
     outside : (n,) True where an input, or the temperature, lies outside the range the correction was trained on.
     weight : (n,) share of the correction that is kept, 0 to 1, where it fades towards the physics with the distance
     from what it was trained on; 1 of one that does not fade, NaN where the model carries none.
+    temperature_degc : (n,) at which the physics took the cell.
     """
 
     time_s: Array
@@ -34,6 +35,7 @@ class Prediction:
     outside: BoolArray
     weight: Array
     nominal: float | None = None
+    temperature_degc: Array | None = None
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -88,4 +90,5 @@ class Prediction:
             outside=outside,
             weight=weight,
             nominal=None if alpha is None else 1.0 - alpha,
+            temperature_degc=series.temperature_degc,
         )

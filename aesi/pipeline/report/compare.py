@@ -46,7 +46,7 @@ class ComparedRun:
     """One tracked run.
 
     settings : dotted key -> text.  metrics : by MLflow's names.  chosen : the model that a search ended with.
-    judged_on : the same text for runs whose errors are of the same test records.
+    judged_on : the same text for runs whose errors are of the same test records at the same step.
     comparison : see `aesi.pipeline.experiment.comparison`.  discovery : content of discovery.json.
     """
 
@@ -130,7 +130,8 @@ def _least(runs: Sequence[ComparedRun]) -> str:
     if not _judged_alike(runs):
         count = sum(FREE_RUN_MV in run.metrics for run in runs)
         return (
-            f"The {count} runs were not judged on the same test records, so that their errors do not compare."
+            f"The {count} runs were not judged on the same test records at the same step, so that their errors do not "
+            "compare."
         )
     known = sorted((run.metrics[FREE_RUN_MV], run.label) for run in runs if FREE_RUN_MV in run.metrics)
     if len(known) < 2:
@@ -155,7 +156,7 @@ def _harmed(runs: Sequence[ComparedRun]) -> str:
 
 
 def _judged_alike(runs: Sequence[ComparedRun]) -> bool:
-    """Whether the errors of those that have one are of the same test records."""
+    """Whether the errors of those that have one are of the same test records at the same step."""
     return len({run.judged_on for run in runs if FREE_RUN_MV in run.metrics}) < 2
 
 

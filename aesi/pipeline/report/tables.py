@@ -107,7 +107,7 @@ def free_run_band_table(models: Sequence[Row]) -> Table:
         ("pieces", lambda row: _number(row, "bands.pieces", 0)),
         ("worst piece, %", lambda row: _number(row, "bands.worst_piece_coverage_pct", 1)),
     ]
-    return _table("free-run-bands", caption, columns, rows)
+    return _table("free-run-bands", caption + _brackets(models), columns, rows)
 
 
 def record_table(models: Sequence[Row]) -> Table:

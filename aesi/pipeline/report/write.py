@@ -23,7 +23,8 @@ TELLING_SHARE = 0.01
 """A share of the residual's variance below this is not worth a bar."""
 
 NOT_COMPARED: dict[str, Any] = {"free_run": None, "one_step": None, "intervals": None}
-"""Row of a model that the experiment does not name among those that it compares: it has no figures."""
+"""Figures that a row may lack: all of them of a model that the experiment does not name among those that it compares,
+intervals of one that none could be calibrated for."""
 
 
 def write_run_report(path: str | Path, view: RunView) -> Path:
@@ -32,7 +33,7 @@ def write_run_report(path: str | Path, view: RunView) -> Path:
     for section in sections.SECTIONS:
         figures.update(section.figures(view))
     chosen, physics, corrected = (
-        view.model(name) or NOT_COMPARED | {"name": name}
+        {**NOT_COMPARED, **(view.model(name) or {"name": name})}
         for name in (view.chosen, view.physics, view.corrected)
     )
     return write_page(

@@ -18,8 +18,14 @@ if TYPE_CHECKING:
 
 CODE = Path(__file__).with_name("served_model.py")
 ADDRESS = "MLFLOW_TRACKING_URI"
-DEFAULT_SOC0 = 0.5
-"""State of charge in a logged model's signature, where the model knows none."""
+TOLD = {
+    "soc0": "state of charge at the first row; left out, it is read from voltage_v where that is given, else it is the "
+    "one that the training records began at",
+    "voltage_v": "V, measured; given: one step ahead, left out: free run",
+    "current_a": "A, positive on discharge",
+    "temperature_degc": "of the cell, where it was measured",
+}
+"""What a user of a logged model is told of its inputs, in its metadata."""
 NEEDS = ("bpx", "numba", "numpy", "pandas", "pyarrow", "pydantic", "quantile-forest", "scikit-learn", "scipy")
 
 
@@ -78,7 +84,6 @@ def _log(run_id: str, folder: Path) -> str:
 
     warnings.filterwarnings("ignore", ".*An input example was not provided")
 
-    hybrid = aesi.HybridModel.load(folder)
     with mlflow.start_run(run_id=run_id, log_system_metrics=False):
         logged = mlflow.pyfunc.log_model(
             name="model",
@@ -86,12 +91,15 @@ def _log(run_id: str, folder: Path) -> str:
             artifacts={"model": str(folder)},
             code_paths=[str(Path(aesi.__file__).parent)],
             pip_requirements=[f"{name}=={version(name)}" for name in NEEDS],
-            signature=_signature(DEFAULT_SOC0 if hybrid.soc0 is None else hybrid.soc0),
+            signature=_signature(),
+            metadata={"inputs": TOLD},
         )
     return str(logged.model_id)
 
 
-def _signature(soc0: float) -> ModelSignature:
+def _signature() -> ModelSignature:
+    """No number for the state of charge: MLflow hands a default on as if it had been given, so that it would be taken
+    instead of what a measured voltage says."""
     from mlflow.models import ModelSignature
     from mlflow.types import ColSpec, ParamSchema, ParamSpec, Schema
 
@@ -105,7 +113,7 @@ def _signature(soc0: float) -> ModelSignature:
             ]
         ),
         outputs=Schema([ColSpec("double", name) for name in ("voltage_v", "lower_v", "upper_v")]),
-        params=ParamSchema([ParamSpec("soc0", "double", soc0)]),
+        params=ParamSchema([ParamSpec("soc0", "double", None)]),
     )
 
 

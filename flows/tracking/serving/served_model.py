@@ -2,7 +2,8 @@
 
 In: a table with time_s, current_a and, if measured, voltage_v (one step ahead then; free run without it) and
 temperature_degc. A column without any value counts as not there; one that lacks some is refused.
-Out: voltage_v, lower_v, upper_v, one row a row. Parameter soc0: state of charge at the first row.
+Out: voltage_v, lower_v, upper_v, one row a row. Parameter soc0: state of charge at the first row; without it as
+`HybridModel.predict` has it, from the first measured voltage, else the model's own.
 """
 
 from __future__ import annotations

@@ -101,26 +101,56 @@ def test_settings_records_and_every_candidate_of_a_run_are_tracked(finished):
     assert not [name for name in of_candidates if "test" in name]  # only the chosen model meets the test set
 
 
-def test_the_model_is_served_by_mlflow_and_is_the_saved_one(finished):
+def served_by_mlflow(workspace):
+    """The model that a run of the small experiment registered, as MLflow loads it."""
     import mlflow
+
+    before = mlflow.get_tracking_uri()
+    mlflow.set_tracking_uri(f"sqlite:///{workspace}/mlflow.db")
+    try:
+        return mlflow.pyfunc.load_model("models:/smoke/1")
+    finally:
+        mlflow.set_tracking_uri(before)
+
+
+def test_the_model_is_served_by_mlflow_and_is_the_saved_one(finished):
     import numpy as np
     import pandas as pd
 
     import aesi
 
     (folder,) = (finished / "runs" / "smoke").iterdir()
-    uri = f"sqlite:///{finished}/mlflow.db"
     assert not [path for path in (finished / "mlartifacts").rglob("*") if path.suffix in (".pkl", ".pickle")]
-    before = mlflow.get_tracking_uri()
-    mlflow.set_tracking_uri(uri)
-    try:
-        served = mlflow.pyfunc.load_model("models:/smoke/1")
-    finally:
-        mlflow.set_tracking_uri(before)
+    served = served_by_mlflow(finished)
     time_s = np.arange(0.0, 60.0, 2.0)
     table = pd.DataFrame({"time_s": time_s, "current_a": np.full(30, 20.0)})
     ours = aesi.HybridModel.load(folder / "model").predict(time_s, table["current_a"].to_numpy(), soc0=0.7)
     assert np.array_equal(served.predict(table, params={"soc0": 0.7})["voltage_v"], ours.voltage_v)
+    assert "read from voltage_v" in served.metadata.metadata["inputs"]["soc0"]
+
+
+def test_a_measured_record_was_served_from_where_the_training_records_began(finished):
+    import numpy as np
+    import pandas as pd
+
+    import aesi
+
+    (folder,) = (finished / "runs" / "smoke").iterdir()
+    model, served = aesi.HybridModel.load(folder / "model"), served_by_mlflow(finished)
+    time_s = np.arange(0.0, 600.0, 2.0)
+    current_a = np.where(time_s < 60.0, 0.0, 20.0)
+    elsewhere = model.soc0 - 0.3
+    voltage_v = model.predict(time_s, current_a, soc0=elsewhere).voltage_v
+    table = pd.DataFrame({"time_s": time_s, "current_a": current_a})
+    measured = table.assign(voltage_v=voltage_v)
+    ours = model.predict(time_s, current_a, voltage_v=voltage_v)
+    assert np.array_equal(served.predict(measured)["voltage_v"], ours.voltage_v)
+    assert not np.allclose(
+        served.predict(measured, params={"soc0": model.soc0})["voltage_v"], ours.voltage_v, atol=1e-4
+    )
+    assert np.array_equal(
+        served.predict(table)["voltage_v"], model.predict(time_s, current_a, soc0=model.soc0).voltage_v
+    )
 
 
 @pytest.mark.slow

@@ -120,6 +120,23 @@ def test_a_run_was_gone_on_with_over_an_edited_fallback(experiment, tmp_path, ed
     assert resume_key(config) != before
 
 
+def test_a_run_was_gone_on_with_over_an_edited_effect_of_the_saved_model_that_it_corrects(
+    experiment, tmp_path
+):
+    from aesi.pipeline.experiment.config import read_experiment
+    from flows.jobs.run_session import resume_key
+
+    model, own = tmp_path / "found", tmp_path / "own.py"
+    model.mkdir()
+    own.write_text("as it was")
+    (model / "effects.json").write_text(json.dumps([{"effect": "own", "file": str(own), "parameters": {}}]))
+    config = read_experiment(experiment, [f"cell={model}"])
+    before = resume_key(config)
+    assert resume_key(config) == before
+    own.write_text("edited")
+    assert resume_key(config) != before
+
+
 def test_a_run_that_fell_back_was_gone_on_with_on_other_data(experiment, call, monkeypatch):
     from dataclasses import replace
 

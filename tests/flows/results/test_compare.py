@@ -84,7 +84,7 @@ def test_runs_that_were_judged_on_different_records_had_a_winner(tmp_path):
     other = replace(run_of(2), judged_on="def", metrics=run_of(2).metrics | {"free_run/test_mser_pct": -20.0})
     text = heading_of(tmp_path, one, other)
     assert text == (
-        "The 2 runs were not judged on the same test records, so that their errors do not compare. "
+        "The 2 runs were not judged on the same test records at the same step, so that their errors do not compare. "
         "1 of 2 errs by more than the declared model alone on its own test records."
     )
     assert "On the test records of each run, which differ" in (tmp_path / "page.html").read_text()
@@ -96,6 +96,8 @@ def test_what_a_run_was_judged_on_is_its_test_records_whatever_it_was_trained_on
     more = {"data_digest": "d, c", "data.train": '["4"]', "data.test": '["renamed"]'}
     other = {**given, "data_digest": "a, b, edited"}
     assert _judged_on(given) == _judged_on(more) != _judged_on(other)
+    # Averages over six seconds err less than those over two, whatever the model is worth.
+    assert _judged_on(given | {"data.dt_s": "2.0"}) != _judged_on(given | {"data.dt_s": "6.0"})
     cut = {"data_digest": "a", "data.test": "[]", "data.repeats.test": "[3]"}
     assert _judged_on(cut) != _judged_on(cut | {"data.repeats.test": "[4]"})
 

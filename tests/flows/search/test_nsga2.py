@@ -94,7 +94,8 @@ def test_all_infeasible_is_one_clear_error(problem):
 
 def test_all_failed_is_one_clear_error(problem):
     result = search(problem, 3, seed=0, evaluate_many=by(lambda _: Failed("out of luck")))
-    with pytest.raises(FitError, match="3 x out of luck"):
+    assert result.failed == {"out of luck": 3}
+    with pytest.raises(FitError, match=r"\(3 x out of luck\); see to what they failed of"):
         result.best()
 
 

@@ -65,7 +65,7 @@ def test_a_voltage_with_a_gap_was_served_as_a_free_run(served):
 def test_a_measured_temperature_was_served_as_none(served):
     model, table = served
     cold = table.assign(temperature_degc=0.0)
-    assert "temperature_degc" in logged_model._signature(0.5).inputs.input_names()
+    assert "temperature_degc" in logged_model._signature().inputs.input_names()
     assert (model.predict(None, cold)["voltage_v"] < model.predict(None, table)["voltage_v"] - 1e-3)[
         60:
     ].all()

@@ -52,6 +52,26 @@ def test_every_parameter_has_an_interval_and_a_source(found):
         assert interval.source
 
 
+def test_the_energies_that_a_fit_starts_from_were_told_as_others(start, records):
+    """Typical ones of 35 kJ/mol were told of kinetics where the fit began at 55, and nothing where these took the place
+    of those that the file declares."""
+    bare = start.with_negative(rate_ea_j_mol=0.0, diffusivity_ea_j_mol=0.0)
+    cases = {"both": records, "one": records[:1], "given": records}
+    given = Conditions(priors={"negative.rate_energy": Prior(40e3, 5e3)})
+    told = {}
+    for name, some in cases.items():
+        model, notes = problem(bare, some, given if name == "given" else Conditions())
+        told[name] = " ".join(note for note in notes if "activation energ" in note and "declared" in note)
+        begins = model.cell_at(np.zeros(model.layout.size))
+        rate = begins.negative.rate_ea_j_mol / 1e3
+        assert f"negative rate {rate:g}" in told[name] or name == "given"
+    assert "negative rate 55 +/- 12 kJ/mol" in told["both"]
+    assert "positive rate 55 +/- 12 kJ/mol (declared: 17.8)" in told["both"]
+    assert "negative rate 35 kJ/mol" in told["one"]
+    assert "positive rate" not in told["one"]
+    assert "negative rate" not in told["given"]
+
+
 def test_a_calibration_is_short_in_words_and_a_table_of_its_parameters(found):
     assert len(repr(found)) < 200
     assert "at_25" in repr(found)

@@ -74,6 +74,41 @@ def test_records_that_do_not_warm_leave_the_file_as_it_is(warming):
     assert with_heat(NMC, prepared(NMC, [flat], 0.9)) == (NMC, ())
 
 
+def in_a_chamber(degc, c_rate: float = 0.1) -> Measurement:
+    """Five hours at one current, after a minute of rest; what the thermocouple says is the chamber's doing alone."""
+    time = np.arange(0.0, 18000.0, 20.0)
+    current = np.where(time < 60.0, 0.0, c_rate * NMC.capacity_ah)
+    temperature = degc(time)
+    run = simulate(NMC, time, current, 0.9, temperature_degc=temperature, hold="backward")
+    return Measurement(time, current, run.voltage_v, temperature, "chamber")
+
+
+CHAMBERS = {
+    "a ramp up": lambda t: 25.0 + 15.0 * np.clip((t - 3600.0) / 7200.0, 0.0, 1.0),
+    "a ramp down": lambda t: 25.0 - 20.0 * np.clip((t - 3600.0) / 7200.0, 0.0, 1.0),
+    "a swing": lambda t: 25.0 + 4.0 * np.sin(t / 4600.0),
+    "a soak": lambda t: 25.0 * np.exp(-t / 1500.0),
+    "noise": lambda t: 25.0 + np.random.default_rng(3).normal(size=len(t)),
+}
+
+
+@pytest.mark.parametrize("what", CHAMBERS)
+def test_a_chamber_or_a_noisy_sensor_was_written_into_the_file_as_heat(what):
+    """Twelve times the heat capacity of noise; of a swing 9e5 W/K, which left all 2.8 K of it."""
+    cell, notes = with_heat(NMC, prepared(NMC, [in_a_chamber(CHAMBERS[what])], 0.9))
+    assert cell is NMC
+    assert notes == ("heat: losses do not explain the temperature of chamber; it tells nothing.",)
+
+
+def test_a_record_in_a_chamber_does_not_take_part_in_what_another_tells_of_heat(warming):
+    alone, of_alone = with_heat(NMC, prepared(NMC, [warming], 0.9))
+    both, of_both = with_heat(NMC, prepared(NMC, [warming, in_a_chamber(CHAMBERS["a ramp down"])], 0.9))
+    assert both.heat_capacity_j_k == pytest.approx(alone.heat_capacity_j_k, rel=1e-6)
+    assert both.conductance_w_k == pytest.approx(alone.conductance_w_k, rel=1e-6)
+    assert of_both[0] == of_alone[0]
+    assert "temperature of chamber" in of_both[1]
+
+
 def test_a_file_without_thermal_data_is_told_what_it_lacks():
     with pytest.raises(CellError, match="Specific heat"):
         of_file(replace(NMC, specific_heat_j_kg_k=None))

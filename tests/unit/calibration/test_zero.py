@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aesi.calibration.records.zero import ZERO_SHARE, zero_of
+from aesi.calibration.records.zero import ZERO_SHARE, steadily_flowing, zero_of
 from aesi.physics import simulate
 from aesi.records import Measurement
 
@@ -61,8 +61,42 @@ def test_a_charge_that_stops_a_little_short_does_not_pass_for_a_zero(start, cycl
     assert zero.sd_a > 1.5 * whole.sd_a
 
 
-def test_a_cycle_that_stops_before_full_tells_nothing(start, cycle):
-    assert zero_of(start, [stopped(start, cycle, 200)]).mean_a == 0.0
+def test_a_cycle_that_stops_before_full_tells_nothing_and_says_so(start, cycle):
+    zero = zero_of(start, [stopped(start, cycle, 200)])
+    assert zero.mean_a == 0.0
+    assert zero.sentences[0].startswith("cycle: the charge that it takes and gives does not tell the zero")
+    assert "has to be nearly full at both ends" in zero.sentences[0]
+
+
+@pytest.mark.parametrize("noise_a", [2e-4, 1e-3, 2e-3])
+def test_noise_at_rest_passed_for_a_current_and_hid_the_zero(start, cycle, noise_a):
+    """From 0.2 mA on, a thousandth of the current, no rest was found after the charge, and nothing was said."""
+    noise = noise_a * np.random.default_rng(0).standard_normal(len(cycle))
+    noisy, quiet = (
+        zero_of(start, [replace(cycle, current_a=cycle.current_a + noise)]),
+        zero_of(start, [cycle]),
+    )
+    assert noisy.mean_a == pytest.approx(quiet.mean_a, abs=quiet.sd_a)
+    assert len(noisy.sentences) == 1
+    assert "too high" in noisy.sentences[0]
+
+
+def test_a_current_at_rest_is_told_from_one_that_flows_whatever_flows_for_a_moment(start, cycle):
+    pulsed = replace(cycle, current_a=np.where(np.arange(len(cycle)) == 600, 20.0, cycle.current_a))
+    assert np.array_equal(steadily_flowing(pulsed), cycle.current_a != 0.0)
+    alone = cycle.take(slice(100, 101))
+    assert steadily_flowing(alone).tolist() == [True]
+
+
+@pytest.mark.parametrize(
+    ("rows", "why"), [(1200, "no rest after its charge"), (None, "ends with a discharge")]
+)
+def test_a_cycle_that_could_not_be_used_was_passed_over_in_silence(start, cycle, rows, why):
+    """Of one that was cut off in its charge, and of one that starts with the charge."""
+    kept = cycle.take(slice(0, rows)) if rows else replace(cycle, current_a=-cycle.current_a)
+    zero = zero_of(start, [kept])
+    assert zero.mean_a == 0.0
+    assert [why in sentence for sentence in zero.sentences] == [True]
 
 
 def test_the_zero_is_taken_out_of_slow_records_alone(start, cycle):

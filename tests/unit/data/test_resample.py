@@ -7,16 +7,14 @@ from hypothesis import strategies as st
 
 from aesi.data.resample import (
     BetweenStamps,
-    after_gap,
     decimate,
     is_sparse,
-    known_by,
-    next_stamp,
-    shared_by_steps,
+    off_rows,
     to_even,
 )
 from aesi.errors import DataError
 from aesi.records import Measurement
+from aesi.records.steps import after_gap
 
 
 def measurement(time, current, voltage=None):
@@ -122,14 +120,6 @@ def test_a_ramp_declared_straight_between_rows_lost_charge_where_it_was_thinned(
     assert "constant from here on" in few.notes[0]
 
 
-def test_what_rows_until_a_stamp_tell_is_their_average_or_the_last_one():
-    time_s, values = np.array([0.0, 0.4, 0.8, 1.0 + 1e-9, 3.5, 4.2]), np.array([1.0, 2.0, 4.0, 6.0, 8.0, 9.0])
-    stamps_s = np.arange(5.0)
-    # In (0, 1] lie three rows, the last of them at the stamp but for its last digits; in (1, 2] and (2, 3] none.
-    np.testing.assert_allclose(known_by(time_s, values, stamps_s), [1.0, 4.0, 6.0, 6.0, 8.0])
-    np.testing.assert_array_equal(next_stamp(time_s, stamps_s), [0, 1, 1, 1, 4, 4])
-
-
 def test_a_row_is_after_a_gap_where_none_is_a_step_before_it():
     time_s = np.array([0.0, 1.0, 2.4, 5.0, 8.0])
     np.testing.assert_array_equal(after_gap(time_s, 1.0), [False, False, False, True, True])
@@ -146,13 +136,10 @@ def test_a_rest_that_is_written_seldom_was_counted_against_a_dense_drive():
     assert is_sparse(np.cumsum(np.tile([0.1, 0.1, 60.0], 100)), np.ones(300), 1.0)  # a third of its rows
 
 
-def test_steps_share_rows_where_rows_are_further_apart_than_steps():
-    time_s = np.arange(100.0)
-    assert shared_by_steps(time_s, 1.0) == pytest.approx(0.0, abs=1e-12)
-    assert shared_by_steps(time_s, 0.5) == pytest.approx(
-        0.5
-    )  # half of each second step is the row of the step before
-    # Of rows at 0, 1.25, 2.5, 3.75 and 5, steps at 1 to 5 share 0.2, 0.4, 0.6, 0.4 and 0.2 with the step before.
-    assert shared_by_steps(1.25 * time_s, 1.0) == pytest.approx(0.36, abs=0.01)
-    jitter = time_s + 0.01 * np.sin(time_s)
-    assert 0.0 < shared_by_steps(jitter, 1.0) < 0.02
+def test_how_far_rows_are_off_the_stamps_of_a_step():
+    stamps_s = np.arange(100.0)
+    assert off_rows(stamps_s, stamps_s) == 0.0
+    # Of rows at 0, 1.25, 2.5, 3.75 and 5 the nearest is 0, 0.25, 0.5, 0.5 and 0.25 off stamps at 0 to 4, then again.
+    assert off_rows(1.25 * stamps_s, stamps_s) == pytest.approx(0.3)
+    assert off_rows(stamps_s + 0.01 * np.sin(stamps_s), stamps_s) < 0.01
+    assert off_rows(stamps_s / 8.0, stamps_s[:12]) == 0.0

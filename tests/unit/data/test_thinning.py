@@ -46,6 +46,36 @@ def test_windows_side_by_side_count_every_row_once(factor):
     assert factor * thin.current_a[1:].sum() == pytest.approx(whole, rel=1e-12)
 
 
+@pytest.mark.parametrize("hold", ["backward", "linear"])
+@pytest.mark.parametrize("gap_s", [600.0, 3600.0])
+@pytest.mark.parametrize(("before_a", "after_a"), [(0.0, 0.0), (2.5, 0.0), (0.0, 2.5), (2.5, 2.5)])
+def test_windows_over_a_gap_made_charge_that_never_flowed(hold, gap_s, before_a, after_a):
+    """A logger that pauses: a window of three rows of which one is of a load carried its current over half of it."""
+    time = np.concatenate([np.arange(2000.0), 2000.0 + gap_s + np.arange(2000.0)])
+    current = np.repeat(np.random.default_rng(0).normal(0.5, 1.5, 400), 10)
+    current[1990:2000], current[2000], current[2001:2030] = before_a, after_a, 3.0
+    data = Measurement(time, current, 3.7 - 0.02 * current, hold=hold)
+    for step_s in (2.0, 3.0, 8.0, 30.0):
+        thin = averaged_over(data, step_s)
+        assert len(thin) < 1.2 * len(data) / step_s
+        (moved, kept) = (r.discharged_ah(h)[-1] for r, h in ((data, hold), (thin, "linear")))
+        # What a window at an end is off by, at the largest current.
+        assert kept == pytest.approx(moved, abs=4.0 * step_s * 5.0 / 3600.0)
+        ends = np.flatnonzero(np.diff(thin.time_s) > 100.0)
+        assert thin.time_s[ends] == 1999.0
+        assert thin.time_s[ends + 1] == 2000.0 + gap_s
+        assert thin.voltage_v[[ends[0], ends[0] + 1]] == pytest.approx(data.voltage_v[[1999, 2000]])
+
+
+def test_a_stretch_between_two_gaps_that_is_shorter_than_a_window_stays_as_it_is():
+    time = np.concatenate([np.arange(500.0), 1000.0 + np.arange(4.0), 2000.0 + np.arange(500.0)])
+    data = Measurement(time, np.zeros(len(time)), 4.0 - 1e-4 * time)
+    thin = averaged_over(data, step_s=10.0)
+    kept = (thin.time_s >= 1000.0) & (thin.time_s < 1900.0)
+    np.testing.assert_array_equal(thin.time_s[kept], data.time_s[500:504])
+    np.testing.assert_allclose(thin.voltage_v, 4.0 - 1e-4 * thin.time_s, rtol=1e-12)
+
+
 def test_the_rows_on_both_sides_of_a_step_stand_for_themselves():
     time = np.arange(3000.0)
     current = np.where((time >= 1000.0) & (time < 1100.0), 5.0, 0.0)

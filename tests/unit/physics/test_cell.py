@@ -216,6 +216,42 @@ def test_what_a_file_declares_beyond_the_model_was_passed_over_in_silence(conten
     assert own.endswith("(User-defined): Swelling.")
 
 
+def test_the_state_that_a_file_begins_in_was_passed_over_and_written_as_full(content):
+    initial = content["State"]["Initial conditions"]
+    initial["Initial state-of-charge"] = 0.3
+    initial["Initial hysteresis state: Negative electrode"] = 0.9
+    cell = Cell.from_bpx(content)
+    (said,) = cell.unread
+    assert (
+        "(Initial state-of-charge 0.3, Initial hysteresis state: Negative electrode 0.9), which is not"
+        in said
+    )
+    written = cell.to_bpx()
+    assert written["State"]["Initial conditions"]["Initial state-of-charge"] == 0.3
+    assert Cell.from_bpx(written) == cell
+    del initial["Initial state-of-charge"], initial["Initial hysteresis state: Negative electrode"]
+    assert Cell.from_bpx(content).unread == ()
+    assert Cell.from_bpx(content).initial_soc == 1.0
+
+
+def test_a_field_of_the_first_versions_of_bpx_was_lost_without_a_word(content):
+    """How the cell conducts: of the same name as what a winding conducts by, in a section of its own."""
+    state = content.pop("State")["Initial conditions"]
+    parts = content["Parameterisation"]
+    content["Header"]["BPX"] = "0.4.0"
+    parts["Cell"] |= {"Ambient temperature [K]": 288.15, "Initial temperature [K]": 278.15}
+    name = "Initial electrolyte concentration [mol.m-3]"
+    parts["Electrolyte"]["Initial concentration [mol.m-3]"] = state[name]
+    plain = Cell.from_bpx(content)
+    assert plain.unread == ()
+    assert (plain.ambient_temperature_k, plain.initial_temperature_k) == (288.15, 278.15)
+    parts["Cell"]["Thermal conductivity [W.m-1.K-1]"] = 0.4
+    conducting = Cell.from_bpx(content)
+    (said,) = conducting.unread
+    assert "of BPX 0.x, that are not read (Cell): Thermal conductivity [W.m-1.K-1]; how a winding" in said
+    assert conducting == plain
+
+
 def test_a_relation_that_does_not_hold_where_surfaces_and_salt_come_was_replaced_in_silence(content):
     parts = content["Parameterisation"]
     parts["Negative electrode"]["Diffusivity [m2.s-1]"] = "4e-14 * (0.95 - x)"

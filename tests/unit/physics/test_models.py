@@ -1,12 +1,15 @@
 """Both models of a cell answer in the same names, and a saved model keeps which one it is."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from aesi.errors import InputError, SimulationError
-from aesi.physics import Cell, simulate
+from aesi.physics import Cell, EspmModel, simulate
+from aesi.physics.effect import Effect
+from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.simulation import ProfileRequest, simulate_file
 
@@ -16,6 +19,26 @@ TIME = np.arange(0.0, 120.0)
 CURRENT = 60.0 * np.sign(np.sin(TIME / 10.0))
 
 HELD_V = 5e-5  # what steps of 1 s leave: 0.02 mV against steps of 10 ms, 0.7 mV where a short step was extrapolated
+
+STEEP = [("lg_18650hg2_cold", 25.0), ("lg_18650hg2_cold", 0.0), ("panasonic_ncr18650pf", 0.0)]
+STEEP_V = {
+    10.0: 1e-3,
+    1.0: 3e-4,
+}  # by row; 0.78 and 0.19 mV are reached, 9 and 7 with one diffusivity of all states
+
+
+def on_the_usual_basis(model):
+    """A model whose steps alone differ from the usual numerics."""
+    usual = EspmModel(model.cell)
+    return replace(
+        model,
+        solid_order=usual.solid_order,
+        electrolyte_order=usual.electrolyte_order,
+        electrode_points=usual.electrode_points,
+    )
+
+
+SAME_BASIS = Effect("same_basis", "instrument", "", on_model=on_the_usual_basis)
 
 
 def voltage(**options):
@@ -33,6 +56,34 @@ def test_held_rows_are_steps_of_the_current():
     held = CURRENT[np.searchsorted(TIME, edges)]
     steps = simulate(CELL, edges, held, 0.7, model="dfn").voltage_v[np.isin(edges, TIME)]
     assert np.abs(voltage(model="dfn", hold="backward") - steps).max() < HELD_V
+
+
+def pulsed(row_s, degc, name, effects=()):
+    """(n,) V at the ends of 10 s pulses of a cell whose diffusivities span decades, held rows of row_s."""
+    cell = Cell.from_bpx(CELLS / f"{name}.bpx.json")
+    pulse_a = np.random.default_rng(3).normal(0.4, 0.5, 20) * cell.capacity_ah
+    pulse_a[:2] = 0.0
+    time = np.linspace(0.0, 190.0, round(190.0 / row_s) + 1)
+    current = pulse_a[np.searchsorted(np.arange(0.0, 200.0, 10.0), time - 1e-6)]
+    run = simulate(cell, time, current, 0.8, effects, degc, hold="backward", model="dfn")
+    return run.voltage_v[:: round(10.0 / row_s)]
+
+
+@pytest.mark.parametrize(("name", "degc"), STEEP)
+@pytest.mark.parametrize("row_s", [10.0, 1.0])
+def test_rows_of_a_second_erred_by_millivolts_where_diffusivity_is_steep(name, degc, row_s):
+    assert np.abs(pulsed(row_s, degc, name) - pulsed(0.0625, degc, name)).max() < STEEP_V[row_s]
+
+
+def test_finer_numerics_left_rows_shorter_than_their_longest_step_whole():
+    refined = CATALOGUE["numerical_error"].activate(refinement=2.0)
+    whole, half, finer = (
+        pulsed(1.0, 0.0, "lg_18650hg2_cold", (SAME_BASIS.activate(),)),
+        pulsed(0.5, 0.0, "lg_18650hg2_cold", (SAME_BASIS.activate(),)),
+        pulsed(1.0, 0.0, "lg_18650hg2_cold", (refined, SAME_BASIS.activate())),
+    )
+    assert np.abs(half - whole).max() > 1e-4
+    assert np.abs(finer - half).max() < 1e-5  # a double layer is met in other steps
 
 
 def test_a_saved_model_keeps_which_one_it_is(tmp_path):

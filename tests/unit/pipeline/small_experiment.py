@@ -18,8 +18,10 @@ NOISE_V = 1e-3
 PERIOD_S = 600
 
 
-def write_record(folder: Path, name: str = "drive.csv", seed: int = 0) -> Path:
-    """Five repeats of a random drive every second, after a minute of rest; 1.5 mohm more than declared."""
+def write_record(
+    folder: Path, name: str = "drive.csv", seed: int = 0, every_s: float = 1.0, noise_v: float = NOISE_V
+) -> Path:
+    """Five repeats of a random drive, after a minute of rest; 1.5 mohm more than declared."""
     import pandas as pd
 
     import aesi
@@ -28,8 +30,9 @@ def write_record(folder: Path, name: str = "drive.csv", seed: int = 0) -> Path:
     rng = np.random.default_rng(seed)
     schedule = np.repeat(rng.normal(12.0, 30.0, PERIOD_S // 20), 20).clip(-60.0, 90.0)
     schedule[:60] = 0.0
-    current_a = np.tile(schedule, 5)
-    time_s = np.arange(len(current_a), dtype=float)
+    seconds_a = np.tile(schedule, 5)
+    time_s = np.round(every_s * np.arange(int((len(seconds_a) - 1) / every_s) + 1), 6)
+    current_a = seconds_a[np.ceil(time_s).astype(int)]
     truth = aesi.simulate(
         aesi.Cell.from_bpx(BPX),
         time_s,
@@ -38,19 +41,20 @@ def write_record(folder: Path, name: str = "drive.csv", seed: int = 0) -> Path:
         effects=[CATALOGUE["series_resistance"].activate(resistance_ohm=1.5e-3)],
         hold="backward",
     )
-    voltage_v = truth.voltage_v + NOISE_V * rng.standard_normal(len(time_s))
+    voltage_v = truth.voltage_v + noise_v * rng.standard_normal(len(time_s))
     path = folder / name
     pd.DataFrame({"time_s": time_s, "current_a": current_a, "voltage_v": voltage_v}).to_csv(path, index=False)
     return path
 
 
-def experiment(record: Path, **changes: object) -> ExperimentConfig:
+def experiment(record: Path, dt_s: float = 1.0, **changes: object) -> ExperimentConfig:
     """Train on repeats 1, 3 and 5 of the record, test on 2 and 4."""
     content = {
         "name": "small",
         "data": {
             "kind": "files",
             "record": str(record),
+            "dt_s": dt_s,
             "repeats": {"period_s": PERIOD_S, "train": [1, 3, 5], "test": [2, 4]},
         },
         "cell": {"bpx": str(BPX), "soc0": SOC0, "start": "declared"},
@@ -69,9 +73,9 @@ def experiment(record: Path, **changes: object) -> ExperimentConfig:
 
 
 @cache
-def fitted(record: Path) -> tuple[Loaded, Candidate, tuple]:
+def fitted(record: Path, dt_s: float = 1.0) -> tuple[Loaded, Candidate, tuple]:
     """The experiment loaded, one candidate without feedback, and the models with their intervals."""
-    config = experiment(record)
+    config = experiment(record, dt_s)
     loaded = load(config)
     problem = build_problem(loaded, config)
     chosen = evaluate(problem, Genome.whole(problem.library, 1.0, 1e-3, 0.5, 1, 1, feedback=False))

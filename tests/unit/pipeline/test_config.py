@@ -48,6 +48,9 @@ def test_an_unknown_key_is_named_with_its_nearest_match(changes, found, near):
     assert f"Did you mean {near}" in message
 
 
+FILES = {"kind": "files", "train": ["a.csv"], "test": ["b.csv"]}
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
@@ -91,6 +94,18 @@ def test_an_unknown_key_is_named_with_its_nearest_match(changes, found, near):
             {"conformal": {"method": "spci"}},
             "conformal.method: there is no method 'spci'; there are: split, aci",
         ),
+        (
+            {"data": {"kind": "virtual", "dt_s": 2}, "conformal": {"horizons_s": [10, 1]}},
+            "experiment: conformal.horizons_s: 1 s is no whole number of steps of data.dt_s, 2 s; give multiples",
+        ),
+        (
+            {
+                "data": FILES | {"kind": "catalogue", "set": "lg_18650hg2"},
+                "fallback": {"data": {"kind": "virtual", "dt_s": 4}, "cell": {}},
+                "conformal": {"horizons_s": [10]},
+            },
+            "10 s is no whole number of steps of data.dt_s, 4 s",
+        ),
         ({"conformal": {"window": 9}}, "conformal: window = 9 samples is too short a history"),
         (
             {"conformal": {"window": 18}},
@@ -106,9 +121,6 @@ def test_an_unknown_key_is_named_with_its_nearest_match(changes, found, near):
 )
 def test_an_inadmissible_value_is_named(changes, words):
     assert words in sentence(changes)
-
-
-FILES = {"kind": "files", "train": ["a.csv"], "test": ["b.csv"]}
 
 
 @pytest.mark.parametrize(

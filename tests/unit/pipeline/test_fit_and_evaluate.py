@@ -206,6 +206,22 @@ def test_bands_are_judged_at_every_horizon(evaluation):
         assert 0 < figures["worst_piece_coverage_pct"] <= 100
 
 
+def test_two_seconds_ahead_were_called_one_second(record):
+    loaded, _, models = fitted(record, 2.0)
+    bands = models[1].bands
+    assert [band.horizon_s for band in bands.horizons] == [10.0, 60.0, np.inf]
+    espm, aesi, _ = evaluate_models(models, loaded.split).rows
+    for figures in (espm["k_step"], espm["k_step_persistence"], aesi["bands_by_horizon"]):
+        assert list(figures) == ["10", "60"]
+    held = []
+    for (
+        one
+    ) in loaded.split.test:  # rows of a second: the last of each step, 10 s or 5 steps after what is repeated
+        last = one.own.error_v[np.searchsorted(one.own.time_s, one.time_s)]
+        held.append(last[5:] - one.as_known.error_v[:-5])
+    assert espm["k_step_persistence"]["10"] == pytest.approx(1e3 * np.sqrt(np.mean(np.square(held))))
+
+
 def test_the_table_of_bands_has_a_row_for_each_horizon(evaluation):
     table = free_run_band_table([row(evaluation, "AESI I")])
     assert [cells[0] for cells in table.rows] == [

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
-from small_experiment import experiment, write_record
+from small_experiment import BPX, experiment, write_record
 
 from aesi.pipeline.experiment.left_out import carried_over, slope_on
 from aesi.pipeline.experiment.load import load
-from aesi.pipeline.experiment.physics_models import DECLARED, RECALIBRATED, PhysicsModels
+from aesi.pipeline.experiment.physics_models import DECLARED, FREE, RECALIBRATED, PhysicsModels
 from aesi.pipeline.experiment.recalibrate import MODEL_ERROR_V
 from aesi.pipeline.product.deviations import PRIORS, PhysicsStart
 
@@ -34,6 +36,40 @@ def test_a_recalibration_that_every_part_bears_out_is_kept_whole(loaded):
         assert slope_on(error, error - part.series.left_by(RECALIBRATED)[part.rows]) == pytest.approx(
             1.0, abs=0.05
         )
+
+
+def test_where_the_declared_cell_is_corrected_the_physics_beside_it_had_seen_what_was_left_out(
+    loaded, tmp_path
+):
+    beside = load(experiment(write_record(tmp_path)))
+    assert beside.config.cell.start == "declared"
+    pieces, others = ((*one.left_out.parts, *one.left_out.drives) for one in (beside, loaded))
+    for piece, other in zip(pieces, others, strict=True):
+        np.testing.assert_array_equal(piece.series.error_v, piece.series.left_by(DECLARED))
+        for name in FREE:
+            unseen = piece.series.left_by(name)
+            np.testing.assert_array_equal(unseen, other.series.left_by(name))
+            assert not np.array_equal(unseen, beside.split.train[piece.place].left_by(name))
+    # and the physics that is shown on the test is the one that is corrected elsewhere
+    for one, other in zip(beside.split.test, loaded.split.test, strict=True):
+        np.testing.assert_array_equal(one.left_by(RECALIBRATED), other.left_by(RECALIBRATED))
+
+
+@pytest.mark.parametrize(
+    ("start", "models", "told"),
+    [
+        ("recalibrated", ["ESPM"], 1),
+        ("declared", ["ESPM", "ESPM recalibrated"], 1),
+        ("declared", ["ESPM"], 0),
+    ],
+)
+def test_intervals_about_physics_that_has_seen_the_only_drive_were_given_without_a_word(
+    tmp_path, start, models, told
+):
+    record = str(write_record(tmp_path))
+    data = {"kind": "files", "record": record, "repeats": {"period_s": 600, "train": [1], "test": [2]}}
+    one = load(experiment(Path(record), data=data, models=models, cell={"bpx": str(BPX), "start": start}))
+    assert sum("One drive trains" in note for note in one.notes) == told
 
 
 def test_the_error_that_a_fit_allowed_for_goes_with_its_physics(loaded):

@@ -1,5 +1,7 @@
 """What a run saves: a model with its own bands, or none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -20,8 +22,10 @@ from aesi.data import read_measurement
 from aesi.errors import FitError
 from aesi.physics import Cell, initial_state
 from aesi.pipeline.experiment.judging.evaluate import evaluate_models
-from aesi.pipeline.experiment.outputs import Result, hybrid, notes
+from aesi.pipeline.experiment.outputs import Result, hybrid, notes, write_outputs
+from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.simulation import predict_file, simulate_file
+from aesi.pipeline.written import MODEL
 from aesi.sparse import Genome
 
 
@@ -58,6 +62,21 @@ def test_physics_was_saved_with_the_bands_of_other_physics(record):
     assert (
         told == "The saved model is the ESPM alone, without bands: ESPM recalibrated cannot be kept with it."
     )
+
+
+def test_a_saved_model_told_the_finding_of_the_one_that_could_not_be_kept(record, tmp_path):
+    for models, kept in ((("ESPM", "ESPM recalibrated"), False), (("ESPM recalibrated", "ESPM"), True)):
+        one = result(record, *models)
+        assert bool(one.kept) is kept
+        summary = write_outputs(tmp_path, one)
+        assert HybridModel.load(tmp_path / MODEL).finding == (summary["finding"] if kept else "")
+
+
+def test_candidates_that_failed_were_told_nowhere(record):
+    one = replace(result(record, "ESPM"), failed={"a bug": 3, "too slow": 1, "b": 1, "c": 1})
+    assert one.evaluated == 6
+    assert "6 of 6 candidates failed: 3 x a bug; 1 x too slow; 1 x b; 1 x something else." in notes(one)
+    assert not [note for note in notes(result(record, "ESPM")) if "failed" in note]
 
 
 def test_physics_that_is_saved_keeps_its_bands(record):

@@ -52,6 +52,15 @@ def test_a_run_whose_physics_is_not_among_its_models_ended_without_a_report(view
     assert "<h1>" in write_run_report(tmp_path / "report.html", alone).read_text("utf-8")
 
 
+@pytest.mark.parametrize("figures", ["intervals", "one_step", "free_run"])
+def test_a_run_whose_chosen_model_lacks_figures_ended_without_a_report(views, tmp_path, figures):
+    view = views.run_view(400)
+    rows = [{key: value for key, value in row.items() if key != figures} for row in view.models]
+    text = write_run_report(tmp_path / "report.html", replace(view, models=tuple(rows))).read_text("utf-8")
+    assert "test, one step ahead" not in text or figures != "intervals"
+    assert "AESI II" in text
+
+
 def test_nothing_is_loaded_from_elsewhere(run_html, discovery_html):
     for html in (run_html, discovery_html):
         assert not re.findall(r"<(?:script|link|img)[^>]+(?:src|href)=\"(?!data:)", html)

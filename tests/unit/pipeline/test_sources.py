@@ -142,13 +142,19 @@ def test_rows_that_were_filled_in_between_those_of_a_record_were_fitted_and_judg
     assert not [
         note
         for note in load(experiment(apart, data=data | {"repeats": repeats})).notes
-        if "too small" in note
+        if "do not lie every" in note
     ]
     stamps_s = np.arange(0.0, rows["time_s"].iloc[-1], 1.25)
     near = {name: np.interp(stamps_s, rows["time_s"], rows[name]) for name in rows} | {"time_s": stamps_s}
     pd.DataFrame(near).to_csv(apart, index=False)
-    (told,) = (note for note in load(experiment(apart)).notes if "too small" in note)
-    assert told.startswith("apart: its rows do not lie every 1 s, and 36% of")
+    (told,) = (note for note in load(experiment(apart)).notes if "do not lie every" in note)
+    assert "are of voltages filled in between rows" in told
+    (told,) = (
+        note
+        for note in load(experiment(apart, data=data | {"dt_s": 5.0, "repeats": repeats})).notes
+        if "do not lie every" in note
+    )
+    assert "are of averages over a step" in told
 
 
 def test_a_unit_that_was_declared_wrongly_was_told_in_options_that_a_run_does_not_have(tmp_path):

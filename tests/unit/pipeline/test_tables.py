@@ -71,6 +71,15 @@ def test_coverage_of_several_seeds_stands_with_its_range():
     assert "lowest and highest of 3 seeds" in table.caption
 
 
+def test_ranges_of_the_bands_stood_without_a_word_on_what_they_are():
+    bands = HYBRID["intervals"]
+    table = tables.free_run_band_table(
+        [{**HYBRID, "free_run_intervals": bands, "bands_by_horizon": {"1": bands}}]
+    )
+    assert [cells[2] for cells in table.rows] == ["90.50 [90.25, 90.75]"] * 2
+    assert "lowest and highest of 3 seeds" in table.caption
+
+
 def test_seeds_that_agree_need_no_range():
     row = {**HYBRID, "free_run": {"test_mser_pct": 58.731, "spread": {"test_mser_pct": [58.731, 58.732]}}}
     assert row_of(tables.free_run_table([row]), "ESPM + AESI I")["MSER test, %"] == "58.73"

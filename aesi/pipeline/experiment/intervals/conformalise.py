@@ -17,7 +17,9 @@ from aesi.pipeline.experiment.candidate import method
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.intervals.bands import WHOLE, OutOfSampleErrors, Unseen
+from aesi.pipeline.product.one_step import rows_ahead
 from aesi.records import ErrorModel, LeftOutDrives
+from aesi.records.horizons import in_whole_steps
 from aesi.sparse import ENSEMBLES, Candidate, Problem, SparseModel
 from aesi.sparse.search.fold_models import fold_models, with_leverage
 from aesi.sparse.yardsticks import Bare
@@ -106,7 +108,10 @@ def _bands(
     unseen: Sequence[Unseen], stretches: int, problem: Problem, config: ExperimentConfig
 ) -> FreeRunBands:
     """stretches : how many stretches err independently; whole drives are the same rows as their parts."""
-    errors = OutOfSampleErrors.of(unseen, problem.split.train, config.conformal.horizons_s)
+    train, horizons_s = problem.split.train, config.conformal.horizons_s
+    errors = OutOfSampleErrors.of(
+        unseen, train, in_whole_steps(train[0].dt_s) if horizons_s is None else horizons_s
+    )
     return errors.bands(config.conformal.alpha, stretches)
 
 
@@ -124,10 +129,11 @@ def _intervals(
     pairs: Sequence[Unseen], config: ExperimentConfig, chosen: Method | RefittedForest
 ) -> Calibrated | RefittedIntervals:
     conformal = config.conformal
+    ahead = [(rows_ahead(model, series), rows) for model, series, rows in pairs]
     return chosen.fit(
-        [(series.error_v - model.one_step(series))[rows] for model, series, rows in pairs],
+        [each.left_v[each.of(rows)] for each, rows in ahead],
         conformal.alpha,
         conformal.window,
         np.random.default_rng(config.seed),
-        current_a=[series.current_a[rows] for _, series, rows in pairs],
+        current_a=[each.current_a[each.of(rows)] for each, rows in ahead],
     )

@@ -23,13 +23,12 @@ from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.intervals.bands import error_ahead, reach
 from aesi.pipeline.experiment.judging.reductions import AGAINST
 from aesi.pipeline.experiment.physics_models import DECLARED
+from aesi.pipeline.product.one_step import RowsAhead, rows_ahead
 from aesi.pipeline.product.trained import outside_trained, trained_figures, trained_on
 from aesi.pipeline.report.views import ModelVoltage, RecordTrace
 from aesi.records import ROLES, ErrorSeries, FreeRun, Role, Split
+from aesi.records.horizons import in_whole_steps
 from aesi.sparse import SparseModel
-
-HORIZONS_S = (1.0, 10.0, 60.0)
-"""Horizons of the tables, s: a sample, a manoeuvre, a minute."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +41,14 @@ class EvaluatedModels:
 
 @dataclass(frozen=True, eq=False)
 class _Judged:
-    """One model on one record, (n,) V each; bounds relative to the prediction, None where not calibrated."""
+    """One model on one record, (n,) V each; bounds relative to the prediction, None where not calibrated.
+
+    one_step : the measured rows, to which `intervals` and `compared` belong.
+    """
 
     series: ErrorSeries
     free: FreeRun
-    one_step: Array
+    one_step: RowsAhead
     intervals: Intervals | None
     bands: Intervals | None
     compared: dict[str, Intervals]
@@ -86,16 +88,16 @@ def evaluate_models(
 def _judge(one: Fitted, series: ErrorSeries, role: Role) -> _Judged:
     free = one.model.free_run(series)
     free = replace(free, outside=outside_trained(free.outside, series, trained_on(one.model, one.bands)))
-    prediction = one.model.one_step(series)
-    residual = series.error_v - prediction
+    ahead = rows_ahead(one.model, series)
+    residual = ahead.left_v
     residual[0] = np.nan  # the first sample has no step before it
     return _Judged(
         series=series,
         free=free,
-        one_step=prediction,
-        intervals=None if one.intervals is None else one.intervals.intervals(residual, series.current_a),
+        one_step=ahead,
+        intervals=None if one.intervals is None else one.intervals.intervals(residual, ahead.current_a),
         bands=None if one.bands is None else one.bands.intervals(series, free, reach(one.model, series)),
-        compared={name: each.intervals(residual, series.current_a) for name, each in one.compared.items()}
+        compared={name: each.intervals(residual, ahead.current_a) for name, each in one.compared.items()}
         if role == "test"  # the tables show no other
         else {},
     )
@@ -111,11 +113,8 @@ def _row(one: Fitted, judged: Mapping[Role, Sequence[_Judged]], seconds: float) 
         "seconds": round(seconds, 3),
         "free_run": _free_run(judged),
         "one_step": _one_step(judged),
-        "k_step": _k_step(ahead, test),
+        **_k_step(one, test),
         "test_records": {r.series.name: _record_figures(one, r) for r in test},
-        "k_step_persistence": {
-            _seconds(h): _persistence_mv(test, test[0].series.steps(h)) for h in HORIZONS_S
-        },
         **_one_step_intervals(one, test),
         **_free_run_intervals(one, test, ahead),
     }
@@ -148,9 +147,8 @@ def _one_step(judged: Mapping[Role, Sequence[_Judged]]) -> dict[str, float]:
     figures = {}
     for role, records in judged.items():
         if records:
-            error = _joined(r.series.error_v[1:] for r in records)
-            figures[f"{role}_rmse_mv"] = MV_PER_V * rmse(error, _joined(r.one_step[1:] for r in records))
-    figures["persistence_rmse_mv"] = _persistence_mv(judged["test"], 1)
+            figures[f"{role}_rmse_mv"] = _rms_mv(r.one_step.judged_v for r in records)
+    figures["persistence_rmse_mv"] = _rms_mv(r.one_step.persistence_v for r in judged["test"])
     return figures
 
 
@@ -158,11 +156,12 @@ def _one_step_intervals(one: Fitted, test: Sequence[_Judged]) -> dict[str, Any]:
     """Scores of the model's intervals one step ahead and of the methods beside them; nothing where it has none."""
     if one.intervals is None:
         return {}
-    residuals = [_without_first(r.series.error_v - r.one_step) for r in test]
+    rows = [r.one_step for r in test]
+    residuals = [each.judged_v for each in rows]
     return {
-        "intervals": _interval_figures(test, [r.intervals for r in test], residuals, one.intervals.alpha),
+        "intervals": _interval_figures(rows, [r.intervals for r in test], residuals, one.intervals.alpha),
         "intervals_by_method": {
-            name: _interval_figures(test, [r.compared[name] for r in test], residuals, each.alpha)
+            name: _interval_figures(rows, [r.compared[name] for r in test], residuals, each.alpha)
             for name, each in one.compared.items()
         },
     }
@@ -176,7 +175,9 @@ def _free_run_intervals(
         return {}
     residuals = [r.series.error_v - r.free.error_v for r in test]
     bands = [r.bands for r in test]
-    whole = _interval_figures(test, bands, residuals, one.bands.alpha) | _start_figures(test)
+    whole = _interval_figures([r.series for r in test], bands, residuals, one.bands.alpha) | _start_figures(
+        test
+    )
     return {
         "free_run_intervals": whole | _inside_coverage(bands, residuals) | _left_out(one.bands.horizons[-1]),
         "bands_by_horizon": {
@@ -213,19 +214,21 @@ def _record_figures(one: Fitted, record: _Judged) -> dict[str, float | None]:
 
 
 def _ahead(one: Fitted, test: Sequence[_Judged]) -> dict[float, list[Array]]:
-    """Horizon in s -> (n,) V a test record: what a prediction from a measurement that long before left of the
-    error; NaN where there is none so early."""
+    """Horizon of each band in s -> (n,) V a test record: what a prediction from a measurement that long before left of
+    the error; NaN where there is none so early."""
     finite = () if one.bands is None else (b.horizon_s for b in one.bands.horizons if isfinite(b.horizon_s))
-    horizons = sorted({*HORIZONS_S, *finite})
-    return {h: [error_ahead(one.model, r.series, h) for r in test] for h in horizons}
+    return {h: [error_ahead(one.model, r.series, h) for r in test] for h in finite}
 
 
-def _k_step(ahead: Mapping[float, Sequence[Array]], test: Sequence[_Judged]) -> dict[str, float]:
-    figures = {}
-    for horizon in HORIZONS_S:
-        left = _joined(each[test[0].series.steps(horizon) :] for each in ahead[horizon])
-        figures[_seconds(horizon)] = MV_PER_V * rmse(left, np.zeros(len(left)))
-    return figures
+def _k_step(one: Fitted, test: Sequence[_Judged]) -> dict[str, dict[str, float]]:
+    """Errors of measured rows on the test part by horizon, and those of holding the last error for so long, at the
+    horizons of the tables that the records' step divides."""
+    ours, held = {}, {}
+    for horizon in in_whole_steps(test[0].series.dt_s):
+        rows = [rows_ahead(one.model, r.series, r.series.steps(horizon)) for r in test]
+        ours[_seconds(horizon)] = _rms_mv(each.judged_v for each in rows)
+        held[_seconds(horizon)] = _rms_mv(each.persistence_v for each in rows)
+    return {"k_step": ours, "k_step_persistence": held}
 
 
 def _horizon_figures(
@@ -235,7 +238,7 @@ def _horizon_figures(
         bands.intervals(r.series, r.free, reach(one.model, r.series, band.horizon_s), band.horizon_s)
         for r in test
     ]
-    figures = _interval_figures(test, intervals, left, bands.alpha)
+    figures = _interval_figures([r.series for r in test], intervals, left, bands.alpha)
     return figures | _inside_coverage(intervals, left) | _left_out(band)
 
 
@@ -258,15 +261,18 @@ def _left_out(band: HorizonBand) -> dict[str, float]:
     }
 
 
-def _persistence_mv(test: Sequence[_Judged], steps: int) -> float:
-    """RMSE of holding the last measured error for `steps` steps."""
-    truth = _joined(r.series.error_v[steps:] for r in test)
-    held = _joined(r.series.error_v[:-steps] for r in test)
-    return MV_PER_V * rmse(truth, held)
+def _rms_mv(left_v: Iterable[Array]) -> float:
+    """mV, RMS over all records of what is scored of them; NaN where nothing is."""
+    joined = _joined(left_v)
+    scored = joined[np.isfinite(joined)]
+    return MV_PER_V * rms(scored) if scored.size else float("nan")
 
 
 def _interval_figures(
-    test: Sequence[_Judged], intervals: Sequence[Intervals | None], residuals: Sequence[Array], alpha: float
+    test: Sequence[ErrorSeries | RowsAhead],
+    intervals: Sequence[Intervals | None],
+    residuals: Sequence[Array],
+    alpha: float,
 ) -> dict[str, float]:
     """Scores over all test records together, so that a bin spread over records is one bin."""
     known = [each for each in intervals if each is not None]
@@ -279,9 +285,9 @@ def _interval_figures(
         together,
         _joined(residuals),
         alpha,
-        current_a=_joined(r.series.current_a for r in test),
-        soc=_joined(r.series.soc for r in test),
-        dt_s=test[0].series.dt_s,
+        current_a=_joined(r.current_a for r in test),
+        soc=_joined(r.soc for r in test),
+        dt_s=test[0].dt_s,
     )
     return {
         "nominal_pct": 100.0 * (1.0 - alpha),
@@ -294,16 +300,18 @@ def _interval_figures(
 
 
 def _prediction(record: _Judged) -> ModelVoltage:
-    model_v = record.series.model_v
-    free_v, step_v = model_v + record.free.error_v, model_v + record.one_step
+    model_v, ahead = record.series.model_v, record.one_step
+    # What is drawn at a stamp is what was said of the next measured row.
+    at = np.minimum(np.searchsorted(ahead.stamps, np.arange(len(model_v))), len(ahead.stamps) - 1)
+    free_v, step_v = model_v + record.free.error_v, model_v + ahead.predicted_v[at]
     bands, intervals = record.bands, record.intervals
     return ModelVoltage(
         free_run_v=free_v,
         free_run_lower_v=None if bands is None else free_v + bands.lower_v,
         free_run_upper_v=None if bands is None else free_v + bands.upper_v,
         one_step_v=step_v,
-        one_step_lower_v=None if intervals is None else step_v + intervals.lower_v,
-        one_step_upper_v=None if intervals is None else step_v + intervals.upper_v,
+        one_step_lower_v=None if intervals is None else step_v + intervals.lower_v[at],
+        one_step_upper_v=None if intervals is None else step_v + intervals.upper_v[at],
         diverged_at=record.free.diverged_at,
         outside=record.free.outside,
     )
@@ -321,10 +329,6 @@ def _trace(role: Role, series: ErrorSeries, predictions: dict[str, ModelVoltage]
         predictions=predictions,
         all_physics_v=series.physics,
     )
-
-
-def _without_first(residual: Array) -> Array:
-    return np.concatenate([[np.nan], residual[1:]])
 
 
 def _seconds(horizon_s: float) -> str:

@@ -1,0 +1,37 @@
+"""What is in files and saved models, for keys of what rests on them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from aesi.pipeline.written import EFFECTS
+
+
+def contents(paths: Iterable[Path]) -> list[bytes]:
+    """What is in each file, and in each file of a folder, in order; of a saved model also the user's effects that it
+    names, whose code lies elsewhere and may be edited there. Nothing of what is not there."""
+    files = [file for path in paths for file in _files(path)]
+    return [file.read_bytes() for file in files if file.is_file()]
+
+
+def effect_files(folder: Path) -> list[Path]:
+    """The files of the user's own effects that a saved model names; none of what is no model, or cannot be read, which
+    whoever loads it says."""
+    try:
+        effects = json.loads((folder / f"{EFFECTS}.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return []
+    named = (
+        [each.get("file") for each in effects if isinstance(each, dict)] if isinstance(effects, list) else []
+    )
+    return [Path(file) for file in named if isinstance(file, str)]
+
+
+def _files(path: Path) -> Iterator[Path]:
+    if path.is_dir():
+        yield from sorted(path.iterdir())
+        yield from effect_files(path)
+    else:
+        yield path

@@ -1,0 +1,49 @@
+"""Rows of a record as they were measured, told off to the steps of an even grid.
+
+Step k ends at stamp k and begins behind the stamp before it; a row at a stamp, but for its last digits, is in the step
+that ends there. The grid begins at the first row, and rows behind its last stamp are told off to that.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aesi.numerics.typing import Array, BoolArray, IntArray
+
+MOST_STEP = 1.5
+"""Rows no further apart than this many steps count as a row a step: loggers' stamps wander by less. A convention."""
+TOLERANCE = 1e-6
+"""Share of a step to which rows lie at even stamps; times are written with as many digits."""
+
+
+def after_gap(time_s: Array, dt_s: float) -> BoolArray:
+    """(n,) True for a row with none a step of dt_s before it."""
+    return np.concatenate([[False], np.diff(time_s) > MOST_STEP * dt_s])
+
+
+def known_by(time_s: Array, values: Array, stamps_s: Array) -> Array:
+    """(m,) what rows until each stamp tell of a slow quantity: their average since the stamp before, and where there
+    are none the last row's. No value depends on a later row.
+
+    time_s, values : (n,) of the rows.  stamps_s : (m,) even, the first at the first row or later.
+    """
+    last = rows_until(time_s, stamps_s)
+    first = np.append(0, last[:-1])
+    sums = np.append(0.0, np.cumsum(values))
+    return np.where(last > first, (sums[last] - sums[first]) / np.maximum(last - first, 1), values[last - 1])
+
+
+def next_stamp(time_s: Array, stamps_s: Array) -> IntArray:
+    """(n,) which of the even stamps (m,) is the first at or after each row; the last one for rows behind it."""
+    found = np.searchsorted(stamps_s + _slack_s(stamps_s), time_s)
+    return np.minimum(found, len(stamps_s) - 1)
+
+
+def rows_until(time_s: Array, stamps_s: Array) -> IntArray:
+    """(m,) how many of the rows (n,) are at each of the even stamps or before."""
+    return np.searchsorted(time_s, stamps_s + _slack_s(stamps_s), side="right")
+
+
+def _slack_s(stamps_s: Array) -> float:
+    """s by which a row may miss a stamp and be at it."""
+    return TOLERANCE * float(stamps_s[1] - stamps_s[0]) if len(stamps_s) > 1 else 0.0
