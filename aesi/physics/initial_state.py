@@ -7,8 +7,10 @@ One rule for every command. In this order:
                   of charge 1 by definition, whatever the open-circuit potentials of the cell file say
     rest          the open-circuit voltage that the cell relaxes to, at the temperature of the record; under a slow
                   current, which nothing tells from a rest at first, that of the first rows
-    load          the open-circuit voltage after the drop of the model under that current; the current may have begun
-                  with the record or long before it, and the first minutes tell how likely either is
+    load          the open-circuit voltage after the drop of the model over the first minutes; the current may have
+                  begun with the record or long before it, and another before: these minutes tell how likely either is
+
+A full charge may also lie before a load whose drop is known well enough, and never before a charge that still flows.
 
 The current, time and temperature are those that the cell saw: where the effects of its model say that the record has
 others, as by the offset of a sensor or a leak, a rest is a rest and a load a load by theirs, as in `simulate`.
@@ -229,16 +231,16 @@ class _Start:
     def _under_load(self) -> InitialState:
         terminal = freed_of_instruments(self.model, self.effects, float(self.record.voltage_v[0]))
         first = self._freed_of_series(terminal, self.current_a)
-        drops = [self.load.drop(first, self.current_a, before_s) for before_s in FLOWED_S]
-        begun = terminal + drops[0]
+        drop_v = self.load.drop(first, self.current_a, 0.0)
+        begun = terminal + drop_v
         written = "" if self.written_a == self.current_a else f" ({self.written_a:.3g} A as written)"
         said = f"starts under {self.current_a:.3g} A{written} at {self.record.voltage_v[0]:.3f} V"
-        if self._ended_full(first, begun, drops[0]):
+        if self._ended_full(begun, drop_v):
             words = (
-                f"{said}, and with the {1e3 * drops[0]:.0f} mV that the model drops at once at {begun:.3f} V"
+                f"{said}, and with the {1e3 * drop_v:.0f} mV that the model drops at once at {begun:.3f} V"
             )
-            return self._full(begun, words, None, drops[0])
-        soc, sd, began_there = self.load.state_of_charge(first, drops)
+            return self._full(begun, words, None, drop_v)
+        soc, sd, began_there = self.load.state_of_charge(first)
         likelier = "as if the current began there" if began_there else "as if it had flowed before"
         words = (
             f"{self.record.name} {said}, {likelier}: "
@@ -246,15 +248,14 @@ class _Start:
         )
         return InitialState(self._declared(soc), sd, "load", words)
 
-    def _ended_full(self, first_v: float, begun_v: float, drop_v: float) -> bool:
-        """Has a charge ended at the upper cut-off before this load?  first_v : V, without what is in series.
+    def _ended_full(self, begun_v: float, drop_v: float) -> bool:
+        """Has a charge ended before this load, also where the model drops by two of its deviations too much?
 
-        Not where one still flows. Nor by a drop that the model may have wrong by more than a full cell falls, of a cell
-        that is far from full by what was read: 1.2 V in the cold made a full one of 3.06 V and a charge of 0.64.
+        One that still flows has not. 1.2 V of drop in the cold made a full charge of 3.06 V and a charge of 0.64.
         """
-        known = DROP_ERROR * drop_v <= CHARGED_V
-        near = 1.0 - self.open_circuit.soc_at(first_v) <= OTHER_STATE_LOADED
-        return self.current_a > 0.0 and (known or near) and self.open_circuit.charged(begun_v, drop_v)
+        least_v = begun_v - DOUBTED_SDS * DROP_ERROR * drop_v
+        as_read_v = begun_v - drop_v
+        return self.current_a > 0.0 and self.open_circuit.charged(least_v, least_v - as_read_v)
 
     def _freed_of_series(self, terminal_v: float, current_a: float = 0.0) -> float:
         return freed_of_series(self.open_circuit, self.model, self.effects, terminal_v, current_a)
@@ -262,7 +263,8 @@ class _Start:
     def _full(self, true_v: float, how: str, rest_v: float | None, drop_v: float = 0.0) -> InitialState:
         """true_v : at the terminals.  drop_v : of it, what the model adds to the voltage as it was read."""
         ocv_v = self._freed_of_series(true_v)
-        inside, sd = self.open_circuit.soc_at(ocv_v), self.open_circuit.full_sd(ocv_v)
+        inside = self.open_circuit.soc_at(ocv_v)
+        sd = self.open_circuit.full_sd(ocv_v, DROP_ERROR * drop_v)
         above_v = true_v - self.cell.upper_voltage_v
         near = f"within {1e3 * CHARGED_V:.0f} mV of"
         doubt = ""

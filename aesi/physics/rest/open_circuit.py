@@ -76,11 +76,13 @@ class OpenCircuit:
         """V, the open-circuit voltage."""
         return float(np.interp(soc, self.soc, self.ocv))
 
-    def full_sd(self, voltage_v: float) -> float:
-        """Standard deviation of the state of charge of a full cell that rests at `voltage_v`."""
-        return max(
-            0.5 * abs(1.0 - self.soc_at(voltage_v)), self.reading(self.voltage_at(1.0), self.potentials_v)[1]
-        )
+    def full_sd(self, voltage_v: float, doubt_v: float = 0.0) -> float:
+        """Standard deviation of the state of charge of a full cell that rests at `voltage_v`.
+
+        doubt_v : V that this may be off by, beside the potentials.
+        """
+        spread_v = float(np.hypot(self.potentials_v, doubt_v))
+        return max(0.5 * abs(1.0 - self.soc_at(voltage_v)), self.reading(self.voltage_at(1.0), spread_v)[1])
 
     def charged(self, voltage_v: float, drop_v: float = 0.0) -> bool:
         """Is this rest voltage that of a full charge?  drop_v : of it is the model's, which may be far too much."""
