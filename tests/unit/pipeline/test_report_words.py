@@ -115,8 +115,8 @@ def test_a_band_of_92_mv_about_an_error_of_3_was_told_without_the_start_that_mak
         row | {"free_run_intervals": row["free_run_intervals"] | {"start_v": 0.0123}}
     )
     assert told.endswith(
-        "24.0 mV wide, because where a record starts is read from its voltage: a standard deviation of that is worth "
-        "12.3 mV along it, and cell.soc0 gives a start that is known."
+        "24.0 mV wide. It holds that the state of charge at the start is read from a voltage, a standard deviation of "
+        "which is worth 12.3 mV; cell.soc0 gives one that is known."
     )
 
 

@@ -259,15 +259,13 @@ def interval_finding(model: Row) -> str:
     if free is None or wide is None:
         return text
     start = _figure(model, "free_run_intervals", "start_v")
-    why = (
-        ""
-        if start is None
-        else (
-            f", because where a record starts is read from its voltage: a standard deviation of that is worth "
-            f"{1e3 * start:.1f} mV along it, and cell.soc0 gives a start that is known"
-        )
+    text += f" The band in free run covers {free:.1f} % of them and is {1e3 * wide:.1f} mV wide"
+    if start is None:
+        return f"{text}."
+    return (
+        f"{text}. It holds that the state of charge at the start is read from a voltage, a standard deviation of which "
+        f"is worth {1e3 * start:.1f} mV; cell.soc0 gives one that is known."
     )
-    return f"{text} The band in free run covers {free:.1f} % of them and is {1e3 * wide:.1f} mV wide{why}."
 
 
 def _told(first: float, other: float) -> tuple[str, str]:
