@@ -195,6 +195,12 @@ class _Start:
             voltage_sds_v += [self._long_drop_v(rest, ocv_v), ocv_rise_before_v]
         spread_v = float(np.linalg.norm(voltage_sds_v))
         soc, sd = self.open_circuit.reading(ocv_v, spread_v)
+        ended_by_load = len(rest.rows) < len(self.record) and not rest.flows
+        if ended_by_load and settled_sd_v > self.open_circuit.potentials_v:
+            # How far it is from settled is the greater doubt: the load may tell more.
+            by_minutes = self._by_first_minutes(f"rests at {begins_v:.3f} V, too short to tell by itself")
+            if by_minutes.sd < sd:
+                return by_minutes
         low, high = self.open_circuit.ends(ocv_v, spread_v)
         return InitialState(
             self._declared(soc + moved),
@@ -240,7 +246,12 @@ class _Start:
                 f"{said}, and with the {1e3 * drop_v:.0f} mV that the model drops at once at {begun:.3f} V"
             )
             return self._full(begun, words, None, drop_v)
-        soc, sd, began_there = self.load.state_of_charge(first)
+        return self._by_first_minutes(said)
+
+    def _by_first_minutes(self, said: str) -> InitialState:
+        """From the minutes that the model follows from there, whatever flowed before."""
+        terminal = freed_of_instruments(self.model, self.effects, float(self.record.voltage_v[0]))
+        soc, sd, began_there = self.load.state_of_charge(self._freed_of_series(terminal, self.current_a))
         likelier = "as if the current began there" if began_there else "as if it had flowed before"
         words = (
             f"{self.record.name} {said}, {likelier}: "

@@ -603,3 +603,19 @@ def test_a_voltage_lost_before_the_end_leaves_what_the_cell_saw_until_then():
     )
     seen = record(saw.time_s[:40], saw.current_a[:40], voltage[:40])
     assert found == initial_state(LG_M50, seen)
+
+
+@pytest.mark.parametrize("rows", [1, 3, 7])
+def test_a_few_rows_of_rest_before_a_load_left_doubts_of_a_tenth_and_more(rows):
+    rng = np.random.default_rng(3)
+    time_s = np.arange(0.0, 3000.0)
+    current_a = np.repeat(rng.normal(3.0, 4.0, 100), 30).clip(-5.0, 12.0)
+    current_a[1500 : 1500 + rows] = 0.0
+    run = simulate(LG_M50, time_s, current_a, soc0=0.9, hold="backward")
+    voltage_v = run.voltage_v + 5e-4 * rng.standard_normal(len(time_s))
+    stop = record(time_s, current_a, voltage_v).take(slice(1500, None))
+    found = initial_state(LG_M50, stop, hold="backward")
+    truth = float(run.series["soc"][1500])
+    assert abs(found.soc - truth) < min(2.0 * found.sd, 0.02)
+    assert found.sd < 0.03
+    assert "too short to tell by itself" in found.sentence
