@@ -23,7 +23,7 @@ PARAMETERS = {
         bounds=(-0.1, 0.4),
         neutral=0.0,
         source="a cell more than new (declared too low) to its end of life",
-        description="share of the capacity that effects named before leave",
+        description="share of the declared capacity",
         counted="share",
         spread=Spread(None, 0.03, "first-cycle losses of cells of one make differ by a few per cent"),
     )
