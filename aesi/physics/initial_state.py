@@ -10,7 +10,8 @@ One rule for every command. In this order:
     load          the open-circuit voltage after the drop of the model over the first minutes; the current may have
                   begun with the record or long before it, and another before: these minutes tell how likely either is
 
-A full charge may also lie before a load whose drop is known well enough, and never before a charge that still flows.
+A rest that a load ends before it has told where it settles is read by these minutes too, if they leave less doubt. A
+full charge may also lie before a load whose drop is known well enough, and never before a charge that still flows.
 
 The current, time and temperature are those that the cell saw: where the effects of its model say that the record has
 others, as by the offset of a sensor or a leak, a rest is a rest and a load a load by theirs, as in `simulate`.
@@ -198,7 +199,10 @@ class _Start:
         ended_by_load = len(rest.rows) < len(self.record) and not rest.flows
         if ended_by_load and settled_sd_v > self.open_circuit.potentials_v:
             # How far it is from settled is the greater doubt: the load may tell more.
-            by_minutes = self._by_first_minutes(f"rests at {begins_v:.3f} V, too short to tell by itself")
+            _, first_v = self._first_voltages()
+            by_minutes = self._by_first_minutes(
+                first_v, f"rests at {begins_v:.3f} V, too short to tell by itself"
+            )
             if by_minutes.sd < sd:
                 return by_minutes
         low, high = self.open_circuit.ends(ocv_v, spread_v)
@@ -234,9 +238,13 @@ class _Start:
         """
         return self.load.drop(ocv_v, float(rest.rows.current_a.mean()), FLOWED_S[-1])
 
-    def _under_load(self) -> InitialState:
+    def _first_voltages(self) -> tuple[float, float]:
+        """V of the first row, without what instruments do, and without what effects add in series, too."""
         terminal = freed_of_instruments(self.model, self.effects, float(self.record.voltage_v[0]))
-        first = self._freed_of_series(terminal, self.current_a)
+        return terminal, self._freed_of_series(terminal, self.current_a)
+
+    def _under_load(self) -> InitialState:
+        terminal, first = self._first_voltages()
         drop_v = self.load.drop(first, self.current_a, 0.0)
         begun = terminal + drop_v
         written = "" if self.written_a == self.current_a else f" ({self.written_a:.3g} A as written)"
@@ -246,12 +254,14 @@ class _Start:
                 f"{said}, and with the {1e3 * drop_v:.0f} mV that the model drops at once at {begun:.3f} V"
             )
             return self._full(begun, words, None, drop_v)
-        return self._by_first_minutes(said)
+        return self._by_first_minutes(first, said)
 
-    def _by_first_minutes(self, said: str) -> InitialState:
-        """From the minutes that the model follows from there, whatever flowed before."""
-        terminal = freed_of_instruments(self.model, self.effects, float(self.record.voltage_v[0]))
-        soc, sd, began_there = self.load.state_of_charge(self._freed_of_series(terminal, self.current_a))
+    def _by_first_minutes(self, first_v: float, said: str) -> InitialState:
+        """From the minutes that the model follows from there, whatever flowed before.
+
+        first_v : V, the first voltage, without what effects add in series and instruments do.
+        """
+        soc, sd, began_there = self.load.state_of_charge(first_v)
         likelier = "as if the current began there" if began_there else "as if it had flowed before"
         words = (
             f"{self.record.name} {said}, {likelier}: "

@@ -23,10 +23,10 @@ from aesi.constants import SECONDS_PER_HOUR, ZERO_CELSIUS_K
 from aesi.numerics.typing import Array, IntArray
 from aesi.physics.rest.open_circuit import OpenCircuit
 from aesi.physics.simulation import ModelName, simulate
-from aesi.physics.start.load import FLOWED_S, HISTORY_C_RATE
+from aesi.physics.start.load import FLOWED_S, HISTORY_C_RATE, OTHER_C_RATES
 from aesi.records import Hold, Measurement
 
-C_RATE_SDS = (0.25, 1.0, 4.0)
+C_RATE_SDS = OTHER_C_RATES[1:]
 """C of (1): from slow discharges to pulses. On 62 rests of `aesi bench start --set cuts=60 --set seed=1` the readings
 are off by 0.44 points of charge RMS with the three, 0.44 and 0.45 with the first and the second alone, and 1.11 where
 the voltage is taken as it stands; six of a drive by 1.1 of the deviations that they claim at most, 2.2 and 2.5."""
