@@ -1,10 +1,13 @@
 """The likelihood against brute force: dense covariances, refits without a block, draws of its noise."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from aesi.numerics.noise.discrepancy import CORRELATION_LENGTHS_S, whiten
 from aesi.physics.effects import CATALOGUE
+from aesi.records import Measurement
 from aesi.tracer.case.blocks import Blocks, blocks_of
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import prepare_all
@@ -86,6 +89,28 @@ def test_what_the_data_push_beyond_a_bound_is_held_there_and_scored_as_if_it_wer
     assert score.shift == pytest.approx([1.0, *two.shift])
     assert score.covariance[1:, 1:] == pytest.approx(two.covariance)
     assert not score.covariance[0].any()
+
+
+def samples_under_load(cell, data):
+    problem = replace(InverseProblem(cell, prepare_all(cell, [data], 0.9, 0.0), {}), trust="measured")
+    assert problem.independent.max() <= 1.0
+    return problem.independent[np.abs(problem.seen[0].current_a) > 0.3].sum()
+
+
+def test_a_rest_and_a_pause_of_the_logger_took_the_evidence_from_the_load(cell, make):
+    drive = make(n=3000)
+    alone = samples_under_load(cell, drive)
+    rest_s = drive.time_s[-1] + 60.0 * np.arange(1.0, 601.0)
+    rested = Measurement(
+        np.append(drive.time_s, rest_s),
+        np.append(drive.current_a, np.zeros(600)),
+        np.append(drive.voltage_v, np.full(600, drive.voltage_v[-1])),
+        name="rested",
+    )
+    paused = replace(drive, time_s=drive.time_s + np.where(np.arange(3000) > 100, 36_000.0, 0.0))
+    assert alone > 6.0
+    assert samples_under_load(cell, rested) > alone - 1.0
+    assert samples_under_load(cell, paused) > alone - 1.0
 
 
 def test_draws_have_the_variance_that_is_whitened():
