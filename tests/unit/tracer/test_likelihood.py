@@ -85,10 +85,30 @@ def test_what_the_data_push_beyond_a_bound_is_held_there_and_scored_as_if_it_wer
     table, log_det = whiten(known, TIME, STARTS[:-1], AMPLITUDE, WHITE)
     two = Posterior(block_sums(BLOCKS, table, log_det), np.zeros(2), BLOCKS.folds["block"])
     assert score.log_density["block"] == pytest.approx(two.log_density, rel=1e-9)
-    assert score.evidence == pytest.approx(two.evidence - 0.5)
     assert score.shift == pytest.approx([1.0, *two.shift])
     assert score.covariance[1:, 1:] == pytest.approx(two.covariance)
     assert not score.covariance[0].any()
+
+
+@pytest.mark.parametrize("bounds", [(-1.0, 1.0), (-1.0, 0.0)])
+def test_the_evidence_of_what_is_held_on_a_bound_was_not_an_integral_over_what_is_allowed(bounds):
+    rng = np.random.default_rng(8)
+    jacobian = rng.normal(size=(N, M))
+    residual = jacobian @ [1.3, 0.2, -0.1] + 0.5 * rng.normal(size=N)
+    white = whiten(np.column_stack([residual, jacobian]), TIME, STARTS[:-1], AMPLITUDE, WHITE)
+    allowed = np.array([bounds, *[(-9.0, 9.0)] * (M - 1)])
+    held = weighed(BLOCKS, block_sums(BLOCKS, *white), np.zeros(M), allowed, Size(1.0), 0.0)
+    assert held.held.tolist() == [True, False, False]
+
+    def with_first(z):
+        column = np.column_stack([residual - z * jacobian[:, 0], jacobian[:, 1:]])
+        others = block_sums(BLOCKS, *whiten(column, TIME, STARTS[:-1], AMPLITUDE, WHITE))
+        return Posterior(others, np.zeros(M - 1), FOLDS["block"]).evidence - 0.5 * (z**2 + LOG_2PI)
+
+    z = np.linspace(*bounds, 1001)
+    said = np.array([with_first(one) for one in z])
+    integral = said.max() + np.log(np.trapezoid(np.exp(said - said.max()), z))
+    assert held.score.evidence == pytest.approx(integral, abs=1e-3)
 
 
 def samples_under_load(cell, data):
