@@ -243,6 +243,11 @@ class InverseProblem:
         return np.concatenate([r.white_v[: r.n_fit] for r in self.records])
 
     @cached_property
+    def as_white_v(self) -> Array:
+        """(n,) V, see `PreparedRecord.as_white_v`."""
+        return np.concatenate([r.as_white_v[: r.n_fit] for r in self.records])
+
+    @cached_property
     def noise_v(self) -> float:
         """Root mean square of the white noise of the fitted rows, V."""
         return rms(self.white_v)
