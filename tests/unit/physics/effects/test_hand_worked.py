@@ -106,6 +106,14 @@ def test_a_fast_clock_stretches_the_record_and_a_lag_shifts_the_voltage():
     assert late[3:] == pytest.approx(run(None, rested).voltage_v[:-3])
 
 
+@pytest.mark.parametrize("side", ["negative", "positive"])
+def test_kinetics_that_are_hardly_asymmetric_were_of_another_salt(side):
+    """The salt differs within an electrode, and so does the overpotential that a mean is taken of."""
+    current = np.full(len(TIME), 90.0)
+    alpha = {"negative_alpha": 0.5, "positive_alpha": 0.5, f"{side}_alpha": 0.5 + 1e-9}
+    assert np.abs(shift("asymmetric_kinetics", current, **alpha)).max() < 1e-7
+
+
 def test_ten_kelvin_colder_slows_everything_by_arrhenius():
     cold = model_with(CELL, [CATALOGUE["ambient_temperature"].activate(shift_k=-10.0)]).cell
     assert cold.initial_temperature_k == pytest.approx(288.15)
