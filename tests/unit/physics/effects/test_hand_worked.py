@@ -106,6 +106,12 @@ def test_a_fast_clock_stretches_the_record_and_a_lag_shifts_the_voltage():
     assert late[3:] == pytest.approx(run(None, rested).voltage_v[:-3])
 
 
+def test_a_clock_slow_by_a_ten_millionth_took_each_second_in_two_steps():
+    current = np.repeat([0.0, 30.0, -60.0, 60.0], 100)
+    slow = run("clock_skew", current, skew=-1e-7, lag_s=0.0).voltage_v
+    assert slow == pytest.approx(run(None, current).voltage_v, abs=1e-6)
+
+
 @pytest.mark.parametrize("side", ["negative", "positive"])
 def test_kinetics_that_are_hardly_asymmetric_were_of_another_salt(side):
     """The salt differs within an electrode, and so does the overpotential that a mean is taken of."""
