@@ -102,6 +102,7 @@ def simulate_file(
     declared = declared_model(cell).with_soh(asked.soh)
     if declared.correction is not None:
         say(["the saved model's learnt correction is no part of a simulation; `aesi predict` has it."])
+        declared = replace(declared, finding="")  # it is of the model with its correction
     say([*of_another_model(declared, model), *of_day(declared.cell, asked.soh)])
     saved, lone = cell.is_dir(), profile.voltage_v is None
     assumed = declared.hold if saved else "linear" if lone else assumed_hold(profile.time_s)

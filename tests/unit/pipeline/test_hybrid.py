@@ -649,7 +649,18 @@ def test_what_a_model_was_found_to_be_worth_was_told_by_its_report_alone(model, 
     for use in (predict_file, simulate_file):
         said: list[str] = []
         use(found.save(tmp_path / "model"), record, tmp_path / "o.csv", say_notes=said.extend)
-        assert "when this model was made: it does not help; use the ESPM alone." in said
+        assert ("when this model was made: it does not help; use the ESPM alone." in said) == (
+            use is predict_file
+        )
+
+
+def test_what_a_model_without_a_correction_was_found_to_be_worth_is_told_of_its_simulation(
+    model, record, tmp_path
+):
+    found = replace(model, correction=None, finding="use it.")
+    said: list[str] = []
+    simulate_file(found.save(tmp_path / "model"), record, tmp_path / "o.csv", say_notes=said.extend)
+    assert "when this model was made: use it." in said
 
 
 def test_round_off_at_a_full_charge_was_told_as_rows_beyond_it(model, data):
