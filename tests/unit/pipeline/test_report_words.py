@@ -408,6 +408,13 @@ def test_no_verdict_is_called_certain():
 
 
 def test_the_range_that_the_data_cover_is_told(views):
+def test_the_confidence_in_a_look_alike_was_told_as_that_in_the_name():
+    """The cases that it was counted on take a look-alike for right."""
+    found = {"verdict": "found", "effects": ["series_resistance"], "confidence": 0.83}
+    alike = found | {"indistinguishable": [["series_resistance", "electrolyte_transport"]]}
+    assert discoveries.name_confidence(alike) == " (83 % confidence in this name or look-alikes)"
+
+
     view = views.discovery_view(3601)
     t = view.traces[0]
     soc, current_a = np.linspace(0.9, 0.2, 3601), np.linspace(-5.0, 12.5, 3601)

@@ -110,13 +110,15 @@ def _tried(discovery: Mapping[str, Any]) -> bool:
 
 
 def name_confidence(discovery: Mapping[str, Any]) -> str:
-    """The confidence in the names of a finding, never as certainty; '' where there is no finding."""
+    """The confidence in the names of a finding, never as certainty; '' where there is no finding. The cases behind it
+    count a look-alike as right."""
     if discovery["verdict"] != "found":
         return ""
     value = discovery["confidence"]
     share = f"over {100 * CERTAIN:.0f} %" if value > CERTAIN else f"{100 * value:.0f} %"
     names = "this name" if len(discovery["effects"]) == 1 else "these names"
-    return f" ({share} confidence in {names})"
+    or_alike = " or look-alikes" if discovery.get("indistinguishable") else ""
+    return f" ({share} confidence in {names}{or_alike})"
 
 
 WITH_FINDING = "with the finding added"
