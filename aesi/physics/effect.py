@@ -192,6 +192,11 @@ class Effect:
     def __repr__(self) -> str:
         return f"Effect({self.id!r}, {self.kind}, parameters {', '.join(self.parameters) or 'none'})"
 
+    @property
+    def kind_told(self) -> str:
+        """Its kind for a reader: what refines the discretisation alone is no fault of an instrument."""
+        return "numerics" if self.refines == "discretisation" else self.kind
+
     def activate(self, **values: float) -> ActiveEffect:
         """This effect with the given parameters, defaults elsewhere.
 

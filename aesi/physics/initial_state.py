@@ -231,6 +231,8 @@ class _Start:
         if max(abs(settled_v - begins_v), settled_sd_v) > GOOD_READING_V:
             words += f", relaxing to {settled_v:.3f} +/- {settled_sd_v:.3f} V"
         words += f": state of charge {soc:.4f} +/- {sd:.4f}"
+        if self.open_circuit.potentials_v < READING_V:  # else it is taken for what a simulation starts from
+            words += " by potentials that are fitted with it"
         return f"{words}{'; give --soc0 if it is known' if sd > OTHER_STATE else ''}."
 
     def _rise_v(self, ocv_v: float, moved: float) -> float:

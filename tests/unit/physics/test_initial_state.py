@@ -690,3 +690,11 @@ def test_a_few_rows_of_rest_before_a_load_left_doubts_of_a_tenth_and_more(rows):
     assert abs(found.soc - truth) < min(2.0 * found.sd, 0.02)
     assert found.sd < 0.03
     assert "too short to tell by itself" in found.sentence
+
+
+def test_a_third_of_the_uncertainty_was_told_without_a_word_where_the_potentials_are_fitted():
+    """The user of a simulation took the smaller one for that of its start."""
+    at_rest = resting(float(LG_M50.rest_voltage_v(0.5)[0]))
+    told = {v: initial_state(LG_M50, at_rest, potentials_v=v).sentence for v in (READING_V, GOOD_READING_V)}
+    assert told[GOOD_READING_V].endswith(" by potentials that are fitted with it.")
+    assert "potentials" not in told[READING_V]
