@@ -222,6 +222,20 @@ def test_a_gap_is_refused_with_both_ways_out(tmp_path):
     assert len(read_measurement(written(tmp_path, content), start_s=149)) == N - 149
 
 
+def test_gaps_some_rows_apart_hid_one_another(tmp_path):
+    lines = text().split("\n")
+    message = refusal(tmp_path, "\n".join(lines[:60] + lines[100:108] + lines[150:]))
+    assert "gap of 41 s after 58 s" in message
+
+
+def test_the_intervals_of_a_logger_that_writes_slowly_in_a_rest_are_no_gaps():
+    after_pulse = np.array([*np.ones(20), 60.9, 52.4, *np.ones(20)])  # of an HPPC test at one row in a minute
+    at_changes = np.tile([1.0, 1.0, 2.0, 5.0, 12.0, 50.0, 600.0, 530.0], 5)
+    pairs_at_steps = np.tile([0.1, 60.0], 30)
+    for step in (after_pulse, at_changes, pairs_at_steps):
+        assert find_gaps({"time_s": np.cumsum(step)}) == []
+
+
 def test_the_time_of_a_step_was_proposed_beside_that_of_the_test(tmp_path):
     table = text(header="Time,I[A],U[V]").splitlines()
     total = [f"{row},{cell}" for row, cell in zip(table, ["Total Time (h)", *TIME / 3600], strict=True)]
@@ -703,5 +717,5 @@ def test_looking_for_gaps_in_a_slowly_sampled_record_took_longer_than_reading_it
     began = time.process_time()
     found = find_gaps({"time_s": np.concatenate([[0.0], np.cumsum(step)])})
     assert time.process_time() - began < 0.5  # it was 2.8 s, row by row
-    assert found == [0, 299_999]  # each of the two in the middle has the other beside it
+    assert found == [0, 5000, 5003, 299_999]
     assert find_gaps({"time_s": np.array([0.0, 1e6])}) == []
