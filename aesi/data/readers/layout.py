@@ -117,7 +117,7 @@ def layout_of(text: str, encoding: str, *, whole: bool, name: str, wanted: Colle
         notes.append("Numbers were read with a decimal comma.")
     header = _as_wide_as_the_rows(header, below, separator)
     form, units = (heading.format, heading.units) if heading else (None, ())
-    layer = _layer(header, below, separator) if form else 0
+    layer = _layer(lines[:start], header, below, separator) if form else 0
     if layer:
         notes.append("The rows of cycles and steps between the records were passed over.")
     return Layout(encoding, separator, decimal, header, first_row, tuple(notes), form, units, layer)
@@ -135,11 +135,25 @@ def _rows_from(lines: Sequence[str]) -> Iterator[list[list[str]]]:
         ]
 
 
-def _layer(header: tuple[str, ...], below: Sequence[str], separator: str) -> int:
-    """Columns without a name at the start of the header, where some rows, of other layers, have something there."""
-    nameless = next((i for i, name in enumerate(header) if name), 0)
-    others = any(any(cell.strip() for cell in split(line, separator)[:nameless]) for line in below)
-    return nameless if others else 0
+def _layer(above: Sequence[str], header: tuple[str, ...], below: Sequence[str], separator: str) -> int:
+    """Empty cells that a row of this table begins with, below the names of other layers; 0 of a table by itself.
+
+    Those names stand in the lines right above, each indented by one cell more, and the rows of such a layer have no
+    more cells than its names: a first column without a name, as of row numbers, is none of that.
+    """
+    layer = next((i for i, name in enumerate(header) if name), 0)
+    names = [_extent(line, separator) for line in above[-layer:]] if layer else []
+    if not layer or [first for first, _ in names] != list(range(layer)):
+        return 0
+    rows = [_extent(line, separator) for line in below if line.strip()]
+    others = [(first, last) for first, last in rows if first < layer]
+    return layer if others and all(last <= names[first][1] for first, last in others) else 0
+
+
+def _extent(line: str, separator: str) -> tuple[int, int]:
+    """Numbers of the first and of the last cell of a line that holds something."""
+    filled = [i for i, cell in enumerate(split(line, separator)) if cell.strip()]
+    return (filled[0], filled[-1]) if filled else (0, 0)
 
 
 def _cells(line: str) -> list[str]:

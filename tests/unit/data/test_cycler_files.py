@@ -306,6 +306,18 @@ def test_a_temperature_of_nought_everywhere_is_told_of(tmp_path):
     assert any("no sensor is connected" in note for note in read_measurement(path).notes)
 
 
+@pytest.mark.parametrize("above", ["", "Serial,1234\n"], ids=["nothing above", "a line above"])
+@pytest.mark.parametrize("mark", [str, lambda k: "!" if k % 7 == 3 else ""], ids=["row numbers", "flags"])
+def test_a_first_column_without_a_name_made_layers_of_an_export(tmp_path, above, mark):
+    head, *body = arbin()[1].decode().splitlines()
+    lines = ["," + head, *(f"{mark(k)},{line}" for k, line in enumerate(body))]
+    (tmp_path / "arbin.csv").write_text(above + "\n".join([*lines, ""]))
+    record = read_measurement(tmp_path / "arbin.csv")
+    np.testing.assert_allclose(record.time_s, TIME)
+    np.testing.assert_allclose(record.current_a, CURRENT)
+    assert not any("cycles and steps" in note for note in record.notes)
+
+
 @pytest.mark.parametrize("export", EXPORTS, ids=lambda export: export.__name__)
 def test_every_export_gives_the_same_test(tmp_path, export):
     record = read_measurement(written(tmp_path, export))
