@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from aesi.constants import COLDEST_DEGC, WARMEST_DEGC
-from aesi.data.channels.spectrum_columns import EXAMPLE, NEEDED, find_impedance
+from aesi.data import units
+from aesi.data.channels.spectrum_columns import EXAMPLE, NEEDED, find_impedance, find_temperature
 from aesi.data.readers import open_table
 from aesi.data.readers.table import TableFile, names_listed
 from aesi.data.reading import record_name
@@ -29,7 +30,8 @@ DESCRIBED = ("voltage_v", "temperature_degc", *STATES)
 def read_spectra(path: str | Path) -> tuple[Spectrum, ...]:
     """The spectra of a table with frequency_hz, z_real_ohm, z_imag_ohm, and soc or discharged_ah.
 
-    The first three may have an instrument's names with their units (`freq/Hz`, `Re(Z)/Ohm`, `-Im(Z)/Ohm`).
+    The first three, and the temperature, may have an instrument's names with their units (`freq/Hz`, `Re(Z)/Ohm`,
+    `-Im(Z)/Ohm`, `Temperature/°C`).
     Rows belong to one spectrum as long as these states, and the names in a column `spectrum` where there is one, stay
     the same; the imaginary part is negative where capacitive. voltage_v and temperature_degc are kept where they are
     there, the temperature as the mean over the rows.
@@ -72,10 +74,16 @@ def _columns(table: TableFile) -> dict[str, Array]:
             f"{file} has {header.count(twice[0])} columns named {twice[0]!r}; rename all but one of them."
         )
     found |= {name: (header.index(name), 1.0) for name in DESCRIBED if name in header}
+    temperature = find_temperature(table)
+    if temperature is not None:
+        found["temperature_degc"] = temperature[0], 1.0
     numbers = table.read(tuple(place for place, _ in found.values()))
     columns = {name: factor * each for (name, (_, factor)), each in zip(found.items(), numbers, strict=True)}
     if not len(columns["frequency_hz"]):
         raise DataError(f"{file} has no row below its header; a spectrum needs at least one.")
+    if temperature is not None:
+        degc = units.to_si("temperature_degc", columns["temperature_degc"], temperature[1])
+        columns["temperature_degc"] = degc
     for name, values in columns.items():
         if not np.isfinite(values).all():
             row = int(np.flatnonzero(~np.isfinite(values))[0])

@@ -89,6 +89,33 @@ def test_instruments_names_are_taken_with_their_units(tmp_path, header, rows):
     assert one.z_ohm.tolist() == pytest.approx([0.01 - 0.001j, 0.011 - 0.002j])
 
 
+@pytest.mark.parametrize(
+    ("name", "cell"),
+    [("Temperature/°C", "0.5"), ("T1 (K)", "273.65"), ("Temp [degF]", "32.9"), ("Temperature_degC", "0.5")],
+)
+def test_a_temperature_under_an_instruments_name_was_passed_over_and_25_degc_taken(tmp_path, name, cell):
+    rows = [f"{point},0.5,{cell}" for point in POINTS]
+    (one,) = read_spectra(written(tmp_path, f"{COLUMNS},soc,{name}", *rows))
+    assert one.temperature_degc == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("names", "told"),
+    [
+        ("Temperature", "'Temperature' says no known unit; write it behind the name"),
+        (
+            "T1/°C,T2/°C",
+            "'T1/°C', 'T2/°C' may be the cell's temperature; call the one that is temperature_degc",
+        ),
+        ("T_chamber/°C", "'T_chamber/°C' may be the cell's temperature"),
+    ],
+)
+def test_a_temperature_of_a_spectrum_that_cannot_be_told_is_asked_about(tmp_path, names, told):
+    rows = [f"{point},0.5{',5' * len(names.split(','))}" for point in POINTS]
+    with pytest.raises(DataError, match=told):
+        read_spectra(written(tmp_path, f"{COLUMNS},soc,{names}", *rows))
+
+
 @pytest.mark.parametrize("name", ["Zreal1", "Zreal1/MOhm"])
 def test_an_impedance_without_a_unit_is_told_where_it_belongs(tmp_path, name):
     """As Digatron writes it, below a line of units that names the test."""
