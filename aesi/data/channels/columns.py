@@ -240,6 +240,8 @@ class _Finder:
         found = form.find(quantity, self._table.header) if form else None
         if found is None:
             return False
+        name = self._table.header[found[0]]
+        self._only([i for i, there in enumerate(self._table.header) if _plain(there) == _plain(name)])
         self.position[quantity], unit = found
         self._set_unit(quantity, unit)
         if quantity in QUANTITIES:

@@ -306,6 +306,14 @@ def test_a_temperature_of_nought_everywhere_is_told_of(tmp_path):
     assert any("no sensor is connected" in note for note in read_measurement(path).notes)
 
 
+def test_of_two_columns_of_one_name_in_an_export_the_first_was_taken_without_a_word(tmp_path):
+    head, *body = arbin()[1].decode().splitlines()
+    lines = ["Voltage(V)," + head, *(f"3.6,{line}" for line in body)]
+    (tmp_path / "arbin.csv").write_text("\n".join([*lines, ""]))
+    with pytest.raises(DataError, match=r"has 2 columns named 'Voltage\(V\)' \(numbers 1, 9\); rename all but one"):
+        read_measurement(tmp_path / "arbin.csv")
+
+
 @pytest.mark.parametrize("above", ["", "Serial,1234\n"], ids=["nothing above", "a line above"])
 @pytest.mark.parametrize("mark", [str, lambda k: "!" if k % 7 == 3 else ""], ids=["row numbers", "flags"])
 def test_a_first_column_without_a_name_made_layers_of_an_export(tmp_path, above, mark):
