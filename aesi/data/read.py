@@ -51,7 +51,7 @@ def read_measurement(
 
     columns : quantity -> the file's name for it, for those not named time_s, current_a, voltage_v,
         temperature_degc (optional), as in BDF or as in a known cycler's export; None leaves the temperature out,
-        and a number states it, degC in every row.
+        and a number states it, in every row, in degC or as `units` says.
     sign : which direction of the file's current is positive; None: as the known export has it, else discharge.
         BDF's is charge positive.
     max_rows : more rows than this are decimated (interval averages); None keeps all.

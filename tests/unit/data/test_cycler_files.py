@@ -310,7 +310,9 @@ def test_of_two_columns_of_one_name_in_an_export_the_first_was_taken_without_a_w
     head, *body = arbin()[1].decode().splitlines()
     lines = ["Voltage(V)," + head, *(f"3.6,{line}" for line in body)]
     (tmp_path / "arbin.csv").write_text("\n".join([*lines, ""]))
-    with pytest.raises(DataError, match=r"has 2 columns named 'Voltage\(V\)' \(numbers 1, 9\); rename all but one"):
+    with pytest.raises(
+        DataError, match=r"has 2 columns named 'Voltage\(V\)' \(numbers 1, 9\); rename all but one"
+    ):
         read_measurement(tmp_path / "arbin.csv")
 
 

@@ -424,6 +424,17 @@ def test_a_temperature_that_is_known_needed_a_column(tmp_path, stated):
     ]
 
 
+@pytest.mark.parametrize(("stated", "unit"), [("77", "degF"), ("298.15", "K")])
+def test_the_unit_of_a_stated_temperature_was_dropped(tmp_path, stated, unit):
+    record = read_measurement(
+        written(tmp_path, text()), {"temperature_degc": stated}, units={"temperature_degc": unit}
+    )
+    np.testing.assert_allclose(record.temperature_degc, 25.0)
+    assert record.notes == (
+        f"drive.csv: temperature_degc is {stated} {unit}, 25 degC, in every row, as stated.",
+    )
+
+
 def test_a_stated_temperature_that_no_cell_has_is_refused(tmp_path):
     path = tmp_path / "drive.csv"
     path.write_text(text())
