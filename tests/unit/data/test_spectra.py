@@ -33,6 +33,24 @@ def test_spectra_of_one_state_are_told_apart_by_their_names(tmp_path, names):
     assert len(cold.frequency_hz) == len(warm.frequency_hz) == 2
 
 
+@pytest.mark.parametrize("again", [(), ("10,0.011,-0.002",)], ids=["a sweep", "with a frequency twice"])
+def test_a_state_that_is_counted_cut_a_spectrum_into_one_a_row(tmp_path, again):
+    points = [*POINTS, *again, "1,0.012,-0.003", "0.1,0.013,-0.004"]
+    rows = [f"{p},{ah + 1e-6 * k}" for ah in (0.5, 0.7) for k, p in enumerate(points)]
+    high, low = read_spectra(written(tmp_path, f"{COLUMNS},discharged_ah", *rows))
+    assert (high.discharged_ah, low.discharged_ah) == (0.5, 0.7)
+    assert len(high.frequency_hz) == len(low.frequency_hz) == len(points)
+
+
+@pytest.mark.parametrize("state", ["soc", "discharged_ah"])
+def test_rows_of_several_spectra_that_alternate_are_refused(tmp_path, state):
+    rows = [f"{point},{at}" for point in POINTS for at in (0.5, 0.4)]
+    with pytest.raises(
+        DataError, match=rf"row 3 \(line 4\), column {state}: 0.5, .* began at 0.4; put the rows"
+    ):
+        read_spectra(written(tmp_path, f"{COLUMNS},{state}", *rows))
+
+
 def test_spectra_of_several_temperatures_were_taken_for_one_of_their_mean(tmp_path):
     rows = [f"{point},0.5,{degc}" for degc in (0, 25) for point in POINTS]
     with pytest.raises(
