@@ -160,3 +160,11 @@ def test_an_imaginary_part_as_nyquist_plots_have_it_was_drawn_the_wrong_way_up(t
     rows = ("100,0.010,-0.001,0.5", "0.1,0.011,0.002,0.5", "0.01,0.012,0.004,0.5")
     with pytest.raises(DataError, match=r"row 2 \(line 3\), column z_imag_ohm: .* turn its sign"):
         read_spectra(written(tmp_path, f"{COLUMNS},soc", *rows))
+
+
+def test_an_imaginary_part_with_the_wrong_sign_was_read_where_the_sweep_ends_at_1_hz(tmp_path):
+    rows = ("100,0.010,-0.001,0.5", "10,0.011,0.002,0.5", "1,0.012,0.004,0.5")
+    with pytest.raises(
+        DataError, match=r"row 2 \(line 3\), column z_imag_ohm: .* up to 10 Hz, .* turn its sign"
+    ):
+        read_spectra(written(tmp_path, f"{COLUMNS},soc", *rows))
