@@ -13,11 +13,11 @@ from aesi.data.readers.formats.format import Format
 from aesi.data.readers.heading import (
     LINES_LOOKED_AT,
     NUMBER,
-    SEPARATORS,
     WITH_COMMA,
     find_heading,
     first_of_numbers,
     likely_heading,
+    separator_of,
     split,
 )
 from aesi.data.readers.table import SHOWN
@@ -87,7 +87,7 @@ def layout_of(text: str, encoding: str, *, whole: bool, name: str, wanted: Colle
     if not whole:
         lines = lines[:-1]  # the last one may be cut by the size of the look
     notes: list[str] = []
-    rows = [_cells(line) for line in lines[:LINES_LOOKED_AT]]
+    rows = [_cells(lines, at) for at in range(min(len(lines), LINES_LOOKED_AT))]
     heading = find_heading(rows, wanted) or likely_heading(_rows_from(lines))
     nameless = first_of_numbers(_rows_from(lines)) if heading is None else None
     if heading is not None:
@@ -100,7 +100,7 @@ def layout_of(text: str, encoding: str, *, whole: bool, name: str, wanted: Colle
     else:
         start, header = _first_line(lines, name)
         first_row = start + 1
-    separator = max(SEPARATORS, key=lines[start].count)
+    separator = _separator_at(lines, start)
     if start:
         notes.append(
             f"{start} lines before the {'table' if nameless is not None else 'header'} were passed over."
@@ -127,7 +127,7 @@ def _rows_from(lines: Sequence[str]) -> Iterator[list[list[str]]]:
     """Of each line, its cells and those of the two below, all split as the line itself is: decimal commas may outnumber
     the separators below."""
     for start, line in enumerate(lines[:LINES_LOOKED_AT]):
-        separator = max(SEPARATORS, key=line.count)
+        separator = _separator_at(lines, start)
         below = lines[start + 1 : start + 3]
         yield [
             [] if line.startswith(COMMENT) else split(line, separator),
@@ -156,8 +156,12 @@ def _extent(line: str, separator: str) -> tuple[int, int]:
     return (filled[0], filled[-1]) if filled else (0, 0)
 
 
-def _cells(line: str) -> list[str]:
-    return [] if line.startswith(COMMENT) else split(line, max(SEPARATORS, key=line.count))
+def _cells(lines: Sequence[str], at: int) -> list[str]:
+    return [] if lines[at].startswith(COMMENT) else split(lines[at], _separator_at(lines, at))
+
+
+def _separator_at(lines: Sequence[str], at: int) -> str:
+    return separator_of(lines[at], lines[at + 1 : at + 3])
 
 
 def _first_line(lines: Sequence[str], name: str) -> tuple[int, tuple[str, ...]]:
@@ -165,7 +169,7 @@ def _first_line(lines: Sequence[str], name: str) -> tuple[int, tuple[str, ...]]:
     start = next((i for i, line in enumerate(lines) if line.strip() and not line.startswith(COMMENT)), None)
     if start is None:
         raise DataError(f"{name} has no header line; the first line should name the columns.")
-    separator = max(SEPARATORS, key=lines[start].count)
+    separator = _separator_at(lines, start)
     try:
         header = tuple(cell.strip() for cell in next(csv.reader([lines[start]], delimiter=separator)))
     except (csv.Error, StopIteration) as error:

@@ -380,6 +380,18 @@ def test_a_table_without_names_says_its_first_row_and_how_columns_are_called(tmp
     assert "#2 '0.0', #3 '3.6'" in said
 
 
+@pytest.mark.parametrize("separator", [";", "\t"])
+@pytest.mark.parametrize("decimal", [".", ","])
+@pytest.mark.parametrize(
+    "names", [(), ("Zeit, s", "Strom, A", "U1, U2, V")], ids=["no names", "names with commas"]
+)
+def test_a_table_was_cut_at_the_commas_of_its_numbers_or_names(tmp_path, separator, decimal, names):
+    columns = dict(zip(BY_NUMBER, names or BY_NUMBER.values(), strict=True))
+    rows = text(header="", separator=separator).replace(".", decimal).lstrip()
+    path = written(tmp_path, f"{separator.join(names)}\n{rows}".lstrip(), "drive.txt")
+    assert_same(read_measurement(path, columns))
+
+
 def test_a_number_that_no_column_has_is_told(tmp_path):
     path = tmp_path / "drive.csv"
     path.write_text(NAMELESS)
