@@ -6,8 +6,8 @@ import codecs
 import csv
 import io
 import re
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
 from aesi.data.readers.formats.format import Format
 from aesi.data.readers.heading import (
@@ -44,6 +44,7 @@ LONE_NUL = re.compile(rb"^\x00(?=\r?$)", re.MULTILINE)
 class Layout:
     """How a text table is written: what a look at its head tells.
 
+    decimal : '' where the lines that were looked at hold whole numbers alone.
     layer : empty cells that a row of this table begins with, in a report that holds those of cycles and steps too.
     """
 
@@ -112,15 +113,20 @@ def layout_of(text: str, encoding: str, *, whole: bool, name: str, wanted: Colle
     if whole and text and not text.endswith(("\n", "\r")):
         notes.append("The last line does not end: if the file was cut there, its last number is too short.")
     below = lines[first_row : first_row + LINES_BELOW]
-    decimal = _decimal(below, separator)
-    if decimal == ",":
-        notes.append("Numbers were read with a decimal comma.")
+    decimal = decimal_in((split(line, separator) for line in below), separator)
     header = _as_wide_as_the_rows(header, below, separator)
     form, units = (heading.format, heading.units) if heading else (None, ())
     layer = _layer(lines[:start], header, below, separator) if form else 0
     if layer:
         notes.append("The rows of cycles and steps between the records were passed over.")
-    return Layout(encoding, separator, decimal, header, first_row, tuple(notes), form, units, layer)
+    layout = Layout(encoding, separator, "", header, first_row, tuple(notes), form, units, layer)
+    return layout if decimal is None else with_decimal(layout, decimal)
+
+
+def with_decimal(layout: Layout, decimal: str) -> Layout:
+    """The layout with a decimal sign, and a sentence on one that is a comma."""
+    told = ("Numbers were read with a decimal comma.",) if decimal == "," else ()
+    return replace(layout, decimal=decimal, notes=(*layout.notes, *told))
 
 
 def _rows_from(lines: Sequence[str]) -> Iterator[list[list[str]]]:
@@ -212,15 +218,15 @@ def _as_wide_as_the_rows(header: tuple[str, ...], below: Sequence[str], separato
     return header
 
 
-def _decimal(lines: list[str], separator: str) -> str:
-    """A comma, where more of the first cells have a comma than a point.
+def decimal_in(rows: Iterable[Sequence[str]], separator: str) -> str | None:
+    """A comma, where more of the cells have a comma than a point; None where no cell has either.
 
     Between commas such cells are quoted, and a comma may be one between thousands, which has three digits behind it
     and none but 1 to 9 in front: where all are so, it is left to be refused.
     """
-    cells = [cell.strip() for line in lines for cell in split(line, separator)]
+    cells = [cell.strip() for row in rows for cell in row]
     with_comma = [cell for cell in cells if WITH_COMMA.fullmatch(cell)]
     points = sum("." in cell and bool(NUMBER.fullmatch(cell)) for cell in cells)
     if separator == "," and all(THOUSANDS.fullmatch(cell) for cell in with_comma):
         return "."
-    return "," if len(with_comma) > points else "."
+    return "," if len(with_comma) > points else "." if points else None

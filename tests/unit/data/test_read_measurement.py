@@ -392,6 +392,20 @@ def test_a_table_was_cut_at_the_commas_of_its_numbers_or_names(tmp_path, separat
     assert_same(read_measurement(path, columns))
 
 
+@pytest.mark.parametrize("decimal", [".", ","])
+def test_a_decimal_comma_was_not_seen_behind_a_rest_in_whole_numbers(tmp_path, decimal):
+    rest_s = 120
+    current = np.concatenate([np.zeros(rest_s), CURRENT])
+    voltage = np.concatenate([np.full(rest_s, 3700.0), 1e3 * VOLTAGE])
+    rows = (
+        f"{t};{i:g};{v:.6g}".replace(".", decimal)
+        for t, (i, v) in enumerate(zip(current, voltage, strict=True))
+    )
+    path = written(tmp_path, "\n".join(["time_s;current_a;voltage_v", *rows, ""]))
+    record = read_measurement(path, units={"voltage_v": "mV"})
+    np.testing.assert_allclose(record.voltage_v[rest_s:], VOLTAGE, atol=1e-3)
+
+
 def test_a_number_that_no_column_has_is_told(tmp_path):
     path = tmp_path / "drive.csv"
     path.write_text(NAMELESS)
