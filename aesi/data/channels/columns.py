@@ -251,6 +251,13 @@ class _Finder:
             return False
         name = self._table.header[found[0]]
         self._only([i for i, there in enumerate(self._table.header) if _plain(there) == _plain(name)])
+        other = form.to_subtract(quantity, found[0], self._table.header) if form else None
+        if other is not None:
+            raise DataError(
+                f"{self._file}: {name!r} and {other!r} are potentials against a reference, and {quantity} of the cell "
+                f"is their difference; export it as a column of its own, or, if {name!r} is the whole cell's, say so: "
+                f"{headers.of_column(quantity, name)}."
+            )
         self.position[quantity], unit = found
         self._set_unit(quantity, unit)
         if quantity in QUANTITIES:

@@ -306,6 +306,18 @@ def test_a_temperature_of_nought_everywhere_is_told_of(tmp_path):
     assert any("no sensor is connected" in note for note in read_measurement(path).notes)
 
 
+def test_of_three_electrodes_the_potential_of_one_was_taken_for_the_voltage_of_the_cell(tmp_path):
+    header = "time/s\tEwe/V\tEce/V\t<I>/mA"
+    lines = [header, *rows(TIME, VOLTAGE + 0.1, TIME * 0 + 0.1, -1e3 * CURRENT, separator="\t")]
+    path = tmp_path / "three.mpt"
+    path.write_text("\n".join([*lines, ""]))
+    with pytest.raises(
+        DataError, match=r"'Ewe/V' and 'Ece/V' are potentials .* --column voltage_v=\"Ewe/V\""
+    ):
+        read_measurement(path)
+    assert read_measurement(path, {"voltage_v": "Ewe/V"}).voltage_v == pytest.approx(VOLTAGE + 0.1)
+
+
 def test_of_two_columns_of_one_name_in_an_export_the_first_was_taken_without_a_word(tmp_path):
     head, *body = arbin()[1].decode().splitlines()
     lines = ["Voltage(V)," + head, *(f"3.6,{line}" for line in body)]
