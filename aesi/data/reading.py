@@ -76,6 +76,11 @@ class Reading:
         return replace(self, **changes)
 
 
+def column_name(given: Any) -> Any:
+    """A column as it is given; a number, which states a temperature, as text."""
+    return str(given) if isinstance(given, int | float) and not isinstance(given, bool) else given
+
+
 def bounds(name: str, text: str | None) -> tuple[float, float] | None:
     """'3' as (3, 3), '3:5' as (3, 5); None for None.  Raises DataError for anything else."""
     if text is None:

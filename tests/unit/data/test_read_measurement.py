@@ -439,7 +439,7 @@ def test_temperature_can_be_left_out(tmp_path):
     assert read_measurement(path, {"temperature_degc": None}).temperature_degc is None
 
 
-@pytest.mark.parametrize("stated", ["40", "-10.5", "0"])
+@pytest.mark.parametrize("stated", ["40", "-10.5", "0", 40, -10.5, 0])
 def test_a_temperature_that_is_known_needed_a_column(tmp_path, stated):
     path = tmp_path / "drive.csv"
     path.write_text(text())
