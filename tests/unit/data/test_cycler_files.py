@@ -306,6 +306,20 @@ def test_a_temperature_of_nought_everywhere_is_told_of(tmp_path):
     assert any("no sensor is connected" in note for note in read_measurement(path).notes)
 
 
+@pytest.mark.parametrize("form", ["h:mm:ss", "[h]:mm:ss"])
+@pytest.mark.parametrize("start_d", [0.995, 61.995])
+def test_a_time_of_the_day_in_a_sheet_ended_at_24_hours(tmp_path, form, start_d):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    book.active.append(["time_s", "current_a", "voltage_v"])
+    for row in zip(start_d + TIME / 86400.0, CURRENT.tolist(), VOLTAGE.tolist(), strict=True):
+        book.active.append([float(cell) for cell in row])
+        book.active.cell(book.active.max_row, 1).number_format = form
+    book.save(tmp_path / "long.xlsx")
+    record = read_measurement(tmp_path / "long.xlsx", units={"time_s": "h:m:s"})
+    np.testing.assert_allclose(record.time_s, 86400.0 * start_d + TIME, atol=1e-3)
+
+
 def test_of_three_electrodes_the_potential_of_one_was_taken_for_the_voltage_of_the_cell(tmp_path):
     header = "time/s\tEwe/V\tEce/V\t<I>/mA"
     lines = [header, *rows(TIME, VOLTAGE + 0.1, TIME * 0 + 0.1, -1e3 * CURRENT, separator="\t")]
