@@ -120,7 +120,7 @@ def _word(cell: Any) -> str:
 def _plain(cell: Any) -> Any:
     """Clock times as h:m:s and dates as ISO 8601; all else as it is."""
     if isinstance(cell, datetime.datetime) and cell.year <= LAST_YEAR_OF_CLOCKS:
-        from openpyxl.utils.datetime import to_excel
+        from openpyxl.utils.datetime import to_excel  # type: ignore[import-untyped]
 
         cell = datetime.timedelta(days=to_excel(cell))
     if isinstance(cell, datetime.timedelta):
