@@ -155,6 +155,7 @@ class Contribution:
 class Effect:
     """One effect; `doc` is the docstring of its file: summary, equation, where it holds, source.
 
+    file, code : of a user's own, where it was read and what stood there.
     infers : the quantity that the effect supplies where it was not measured; with the measurement it has nothing to
     say and does not compete.
     refines : the approximation of the model itself that the effect takes back; it is settled before anything is sought
@@ -179,6 +180,7 @@ class Effect:
     on_voltage: Callable[..., Contribution] | None = None
     on_reading: Callable[..., Array] | None = None
     file: str | None = None
+    code: bytes | None = None
     infers: Measurable | None = None
     refines: Refinement | None = None
     of_design: bool = False
