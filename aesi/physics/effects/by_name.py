@@ -124,12 +124,12 @@ def _load(path: str, content: bytes) -> Effect:
 
 def listing(effects: Iterable[Effect]) -> str:
     """A line an effect: id, kind, what it is."""
-    return "\n".join(f"{e.id:36s} {e.kind:11s} {e.summary}" for e in effects)
+    return "\n".join(f"{e.id:36s} {e.kind_told:11s} {e.summary}" for e in effects)
 
 
 def describe(effect: Effect) -> str:
     """One effect as plain text: equation, validity, source, parameters."""
-    lines = [f"{effect.id} ({effect.kind})", effect.summary + ".", "", effect.equation, ""]
+    lines = [f"{effect.id} ({effect.kind_told})", effect.summary + ".", "", effect.equation, ""]
     lines += [effect.validity, f"Source: {effect.source}", "", "Parameters:"]
     for key, p in effect.parameters.items():
         scale = ", logarithmic" if p.log else ", fitted by its square" if p.even else ""
