@@ -58,6 +58,16 @@ class BetweenStamps:
         """(m,) values at the new stamps, on straight lines between rows."""
         return np.interp(self.stamps_s, self.time_s, values)
 
+    @property
+    def dense(self) -> bool:
+        """Whether the rows are denser than the stamps, so that there is something to average."""
+        return bool(np.median(np.diff(self.time_s)) < DENSE * np.median(np.diff(self.stamps_s)))
+
+    def as_voltage(self, values: Array) -> Array:
+        """(m,) as `to_even` brings a measured voltage to the stamps: `linear` of dense rows, else `sampled`. What a
+        model says at the rows is brought there alike, or else the two differ where the model is exact."""
+        return self.linear(values) if self.dense else self.sampled(values)
+
     def _average(self, area: Array, first: float) -> Array:
         return np.concatenate([[first], np.diff(area) / np.diff(self.stamps_s)])
 
@@ -157,8 +167,7 @@ def in_runs(measurement: Measurement, run: int) -> Measurement:
 
 def _onto(measurement: Measurement, stamps: Array, note: str, hold: Hold) -> Measurement:
     intervals = BetweenStamps(measurement.time_s, stamps)
-    dense = bool(np.median(np.diff(measurement.time_s)) < DENSE * np.median(np.diff(stamps)))
-    along, voltage = (intervals.linear, AVERAGES) if dense else (intervals.sampled, AT_STAMPS)
+    along, voltage = intervals.as_voltage, AVERAGES if intervals.dense else AT_STAMPS
     charge, current = (intervals.held, AVERAGES) if hold == "backward" else (along, voltage)
     temperature = measurement.temperature_degc
     how = f"current and voltage {voltage}" if current == voltage else f"current {current}, voltage {voltage}"

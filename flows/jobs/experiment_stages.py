@@ -153,7 +153,7 @@ class ExperimentJob:
         summary = self.run("report", lambda: write_outputs(folder, result))
         self.console.say(summary["finding"])
         self.tracker.json(COMPARISON, self.run("comparison", lambda: comparison(result)))
-        track_result(self.tracker, folder, summary, found.number, result.fitted, result.config.note)
+        track_result(self.tracker, folder, summary, found.numbers, result.fitted, result.config.note)
         return summary
 
     def _publish(self, folder: Path, summary: Mapping[str, Any], config: ExperimentConfig) -> None:

@@ -36,6 +36,7 @@ from flows.tracking.experiment_log import (
     DECLARED,
     INPUTS,
     LEFT_OUT,
+    MEMBERS,
     RECORDS,
     candidate_metrics,
     coefficients,
@@ -53,6 +54,8 @@ class Rebuilt:
 
     left_out : the training drives under physics that has not seen them.  tracked, metrics : its figures then and now,
     by MLflow's names.
+    members : numbers of the candidates that the models of its run are the mean of, of one that they are; none where
+    the run has not ended.
     """
 
     run_id: str
@@ -64,6 +67,7 @@ class Rebuilt:
     left_out: LeftOutDrives
     tracked: Mapping[str, float]
     metrics: Mapping[str, float]
+    members: tuple[int, ...] = ()
 
     @property
     def differing(self) -> dict[str, tuple[float, float]]:
@@ -100,7 +104,16 @@ def rebuild(run_id: str, uri: str | None = None) -> Rebuilt:
     judged = candidate_metrics(candidate, valid_shares(problem, left_out))
     metrics = {name: float(value) for name, value in judged.items()}
     return Rebuilt(
-        run.info.run_id, number, config, declared, problem, candidate, left_out, run.data.metrics, metrics
+        run.info.run_id,
+        number,
+        config,
+        declared,
+        problem,
+        candidate,
+        left_out,
+        run.data.metrics,
+        metrics,
+        tuple(json.loads(parent.data.tags.get(MEMBERS, "[]"))),
     )
 
 
@@ -141,14 +154,22 @@ def save(rebuilt: Rebuilt, out: Path) -> Path:
 
 
 def said(rebuilt: Rebuilt, out: Path) -> str:
-    """What came back, in one line."""
+    """What came back, in one line; of one of several candidates that the models of a run are the mean of, that too."""
     candidate = rebuilt.candidate
     declared, recalibrated = (rebuilt.metrics[f"free_run/valid_{name}"] for name in AGAINST)
     return (
         f"candidate {rebuilt.number}: {len(candidate.bagging.terms)} and {len(candidate.stability.terms)} terms, "
         f"{reduced(declared)} squared error on validation in free run, {reduced(recalibrated)} than recalibrated; "
-        f"{candidate.better.name} is in {out / MODEL}"
+        f"{candidate.better.name} is in {out / MODEL}{_one_of(rebuilt)}"
     )
+
+
+def _one_of(rebuilt: Rebuilt) -> str:
+    if len(rebuilt.members) < 2 or rebuilt.number not in rebuilt.members:
+        return ""
+    *others, last = rebuilt.members
+    numbers = f"{', '.join(map(str, others))} and {last}"
+    return f". It is one of several: the models of the run are the mean of candidates {numbers}"
 
 
 class Differs(AesiError):

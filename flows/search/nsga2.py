@@ -82,7 +82,8 @@ def search(
     storage : None keeps the study in memory; a path is a journal file; a URL (with ://) a database. Of one
     process at a time; several share the evaluation of a study (`evaluate_many`), not the study.
     on_candidate : called with index, genome and outcome as each is evaluated.
-    evaluate_many : what evaluates a generation; by default one candidate after the other is evaluated here.
+    evaluate_many : what evaluates a generation, by the weights of the settings; by default one candidate after the
+    other is evaluated here.
     The same seed gives the same candidates, interrupted or not.
     Raises ConfigError for a space of another library. Exceptions of the evaluation are bugs: what the generation has
     finished is stored, and they propagate.
@@ -96,7 +97,7 @@ def search(
     study = _open(storage, name, sampler)
 
     def one_by_one(genomes: Sequence[Genome]) -> Iterable[tuple[int, Outcome]]:
-        return ((k, evaluate(problem, genome)) for k, genome in enumerate(genomes))
+        return ((k, evaluate(problem, genome, settings.weights)) for k, genome in enumerate(genomes))
 
     while (missing := n_trials - len(study.get_trials(deepcopy=False, states=FINISHED))) > 0:
         _generation(

@@ -100,7 +100,7 @@ class SearchResult:
         Raises FitError as `best` does.
         """
         first = self.best().number
-        ranked = sorted(self.feasible, key=lambda trial: (-trial.numbers["fitness"], trial.number))
+        ranked = sorted(self.feasible, key=lambda trial: (-self._fitness(trial), trial.number))
         others = [trial.number for trial in ranked if trial.number != first]
         return (first, *others[: max(1, round(share * len(self.trials))) - 1])
 

@@ -45,11 +45,6 @@ class Found:
     key: str
     scored: dict[int, ScoredCandidate | Failed]
 
-    @property
-    def number(self) -> int:
-        """Of the fittest candidate."""
-        return self.numbers[0]
-
     def candidates(self) -> tuple[Candidate, ...]:
         """All candidates that did not fail."""
         return tuple(one.candidate for one in self.scored.values() if not isinstance(one, Failed))

@@ -26,7 +26,7 @@ from flows.tracking.store import without_login
 from flows.tracking.tracker import Tracker, flat
 from flows.tracking.view import HOW_TO_READ, NOTE, RUN_COLUMNS, experiment_tags
 
-CHOSEN, UNFITTED = "aesi.chosen", "aesi.unfitted"
+CHOSEN, MEMBERS, UNFITTED = "aesi.chosen", "aesi.members", "aesi.unfitted"
 SETTING, CODE = "aesi.setting", "aesi.code"
 """What runs share that differ by seed alone: what was run on which data, and the program that ran it."""
 INPUTS, RECORDS, LEFT_OUT, DECLARED = "inputs", "records.bin", "left_out.bin", "declared"
@@ -139,27 +139,28 @@ def track_result(
     tracker: Tracker,
     folder: Path,
     summary: Mapping[str, Any],
-    number: int,
+    numbers: Sequence[int],
     fitted: Sequence[Fitted],
     note: str = "",
 ) -> None:
-    """The models, the tables, the report and the chosen model; `number` is the candidate's they come from.
+    """The models, the tables, the report and the chosen model; `numbers` are of the candidates that they are the mean
+    of, the fittest first.
 
     note : what the experiment is about, which the run's description begins with.
     """
     chosen = summary["chosen"]
     for row in summary["models"]:
-        numbers = _numbers(row)
-        tracker.nested(f"model:{row['name']}", row["name"], "model", {"model": row["name"]}, numbers)
+        figures = _numbers(row)
+        tracker.nested(f"model:{row['name']}", row["name"], "model", {"model": row["name"]}, figures)
         if row["name"] == chosen:
-            tracker.metrics(numbers)
+            tracker.metrics(figures)
     headline = next(row for row in summary["models"] if row["name"] == chosen)
     tags = {
-        NOTE: f"{note}\n\n{result_line(headline)} Candidate {number} of the search; "
-        "the report is an artifact.".strip()
+        NOTE: f"{note}\n\n{result_line(headline)} {candidates_line(numbers)}; the report is an artifact.".strip(),
+        MEMBERS: json.dumps(list(numbers)),
     }
-    tracker.parameters({"chosen_candidate": number, "chosen_model": chosen}, tags)
-    tracker.mark(f"candidate:{number}", {CHOSEN: "true"})
+    tracker.parameters({"chosen_candidate": numbers[0], "chosen_model": chosen}, tags)
+    tracker.mark(f"candidate:{numbers[0]}", {CHOSEN: "true"})
     for name in (SUMMARY, REPORT, *TABLES.values()):
         tracker.files(folder / name)
     for one in fitted:
@@ -168,6 +169,13 @@ def track_result(
     if (folder / FIGURES).is_dir():
         tracker.files(folder / FIGURES, FIGURES)
     tracker.model(folder / MODEL)
+
+
+def candidates_line(numbers: Sequence[int]) -> str:
+    """'Candidate 12 of the search', or of which candidates the models are the mean."""
+    if len(numbers) == 1:
+        return f"Candidate {numbers[0]} of the search"
+    return f"The mean of candidates {', '.join(map(str, numbers[:-1]))} and {numbers[-1]} of the search"
 
 
 def result_line(row: Mapping[str, Any]) -> str:

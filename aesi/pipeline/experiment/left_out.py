@@ -146,7 +146,7 @@ class TrainingDrives:
             physics.by_name[model].simulate(record.measurement, record.soc0, hold).voltage_v[rows]
             for model in (DECLARED, RECALIBRATED)
         )
-        return slope_on(record.measurement.voltage_v[rows] - declared_v, recalibrated_v - declared_v)
+        return slope_on(record.voltage_v[rows] - declared_v, recalibrated_v - declared_v)
 
     def _without(self, piece: Piece) -> dict[str, FitRecord]:
         """The records as a fit without the piece sees them."""

@@ -36,6 +36,7 @@ from aesi.pipeline.experiment.sources import (
 from aesi.pipeline.notes import of_contradiction, of_day, on_temperatures, temperature_sentence
 from aesi.pipeline.product.contents import contents
 from aesi.pipeline.product.declared import declared_model
+from aesi.pipeline.product.deviations import PhysicsStart
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import ErrorSeries, Hold, LeftOutDrives, Measurement, Role, Split, hold_sentence
 
@@ -126,7 +127,7 @@ def _load(config: ExperimentConfig) -> Loaded:
     given = replace(file, effects=(*file.effects, *_effects(config)), model=config.cell.model or file.model)
     sources = sources_of(config, path)
     records, starts, told = _on_grid(config, given, sources)
-    training = _training(config, records, sources.roles)
+    training = _training(config, given, records, sources.roles)
     physics, left_out = _physics(given, training)
     series, of_empty = _series(physics, training)
     split = by_role(config.data, series, sources.roles)
@@ -160,13 +161,18 @@ def _load(config: ExperimentConfig) -> Loaded:
 
 
 def _training(
-    config: ExperimentConfig, records: dict[str, FitRecord], roles: Mapping[Role, Sequence[str]]
+    config: ExperimentConfig,
+    given: HybridModel,
+    records: Mapping[str, FitRecord],
+    roles: Mapping[Role, Sequence[str]],
 ) -> TrainingDrives:
     """The drives that train, whose rows are opened to fits in the records."""
     drives = training_drives(config.data, records, roles)
+    declared = PhysicsStart(given.cell, given.cell, given.effects, model=given.model)
+    opened = {name: records[name].as_declared(declared, config.data.hold) for name, _ in drives}
     for name, rows in drives:
-        records[name].rows[rows] = True
-    return TrainingDrives(config, records, drives, roles)
+        opened[name].rows[rows] = True
+    return TrainingDrives(config, {**records, **opened}, drives, roles)
 
 
 def _of_starts(
@@ -271,7 +277,7 @@ def _on_grid(
             held,
             *sampled,
             temperature_sentence(cell, measurement, given.effects),
-            *map(with_keys, of_contradiction(given, even, start.soc, data.hold)),
+            *map(with_keys, of_contradiction(given, measurement, start.soc, data.hold)),
             *map(with_keys, even.notes),
         ]
         records[name] = no_rows(even, start.soc, start.read_sd, begins)
@@ -307,18 +313,19 @@ def _of_sampling(measurement: Measurement, even: Measurement, dt_s: float, *, ju
 
 def _refuse(physics: PhysicsModels, name: str, record: FitRecord, hold: Hold) -> None:
     """Raise what a simulation that may not run empty says, with the record and what an experiment can do about it."""
-    chosen, data = physics.chosen, record.measurement
+    chosen = physics.chosen
     try:
-        simulate(
-            chosen.cell,
-            data.time_s,
-            data.current_a,
-            physics.begin(physics.start, record, hold)[0],
-            chosen.effects,
-            data.temperature_degc,
-            hold,
-            model=chosen.model,
-        )
+        for data in (record.logged, record.measurement):
+            simulate(
+                chosen.cell,
+                data.time_s,
+                data.current_a,
+                physics.begin(physics.start, record, hold)[0],
+                chosen.effects,
+                data.temperature_degc,
+                hold,
+                model=chosen.model,
+            )
     except SimulationError as error:
         raise SimulationError(
             f"{Path(name).name}: {str(error).removesuffix(RUN_ON)}, or end the file before that, or give it as a test, "

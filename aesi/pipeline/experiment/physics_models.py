@@ -35,7 +35,7 @@ from aesi.pipeline.product.deviations import (
     slopes_v,
     start_v,
 )
-from aesi.pipeline.product.error_series import error_series
+from aesi.pipeline.product.error_series import as_resampled, error_series
 from aesi.records import ErrorSeries, Hold, Measurement, Run
 
 DECLARED = "ESPM"
@@ -95,44 +95,45 @@ class PhysicsModels:
         return self.by_name[name].run(record.measurement if rows is None else rows, soc0, hold)
 
     def series(self, record: FitRecord, dt_s: float, hold: Hold) -> tuple[ErrorSeries, bool]:
-        """The error of the chosen physics along a record, what the others say beside it, and whether it ran empty."""
-        runs = {name: self.run(name, record, hold) for name in self.by_name}
-        run = runs[self.start]
-        series = error_series(record.measurement, run, dt_s)
-        others = {name: each.voltage_v for name, each in runs.items()}
-        out = [each.series["depleted"] > 0.0 for each in runs.values()]
-        first = min((int(np.argmax(rows)) for rows in out if rows.any()), default=None)
+        """The error of the chosen physics along a record, what the others say beside it, and whether it ran empty.
+
+        Voltages are simulated at the rows as they were logged; what a correction reads, at the even ones.
+        """
+        runs = {name: self.run(name, record, hold, record.logged) for name in self.by_name}
+        says = {name: each.voltage_v for name, each in runs.items()}
+        read = [runs[self.start]]
+        series = replace(error_series(record.logged, read[0], dt_s), physics=says)
+        if record.logged is not record.measurement:
+            read.append(self.run(self.start, record, hold))
+            # No correction is asked at these rows.
+            own = replace(series, inputs=record.logged.current_a[:, None], input_names=("I",))
+            series = as_resampled(error_series(record.measurement, read[1], dt_s), own)
         series = replace(
             series,
-            physics=others,
             missed_v=self.by_name[RECALIBRATED].missed_v,
-            ran_out_s=None if first is None else float(run.time_s[first]),
-            own=self._own(record, dt_s, hold),
+            ran_out_s=min(
+                (t for run in (*runs.values(), *read) if (t := _ran_out_s(run)) is not None), default=None
+            ),
         )
-        return series, bool(run.series["depleted"].any())
-
-    def _own(self, record: FitRecord, dt_s: float, hold: Hold) -> ErrorSeries | None:
-        """The error over the rows as they were logged; None where these are the even ones, or not known."""
-        rows = None if record.begins is None else record.begins.measured
-        if rows is None or rows is record.measurement:
-            return None
-        runs = {name: self.run(name, record, hold, rows) for name in self.by_name}
-        return replace(
-            error_series(rows, runs[self.start], dt_s),
-            inputs=rows.current_a[:, None],  # no correction is asked at these rows
-            input_names=("I",),
-            physics={name: each.voltage_v for name, each in runs.items()},
-        )
+        return series, any(_ran_out_s(run) is not None for run in read)
 
     def with_slopes(self, series: ErrorSeries, record: FitRecord, hold: Hold) -> ErrorSeries:
         """The series of the record with what each parameter of the chosen physics, and its start, is worth along it."""
         chosen, data = self.chosen, record.measurement
         soc0, soc0_sd = self.begin(self.start, record, hold)
-        slopes = slopes_v(chosen.cell, chosen.effects, data, soc0, hold, chosen.model, series.model_v)
+        # Neighbours are told apart at the even rows, where each is simulated.
+        model_v = chosen.run(data, soc0, hold).voltage_v
+        slopes = slopes_v(chosen.cell, chosen.effects, data, soc0, hold, chosen.model, model_v)
         begins_v = None
         if soc0_sd > 0.0:
-            begins_v = start_v(chosen, data, soc0, soc0_sd, hold, series.model_v)
+            begins_v = start_v(chosen, data, soc0, soc0_sd, hold, model_v)
         return replace(series, slopes_v=slopes, start_v=begins_v)
+
+
+def _ran_out_s(run: Run) -> float | None:
+    """s, when a run is first held where it ran empty or full; None where it never is."""
+    out = run.series["depleted"] > 0.0
+    return float(run.time_s[np.argmax(out)]) if out.any() else None
 
 
 def physics_models(

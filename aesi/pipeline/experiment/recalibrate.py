@@ -37,6 +37,7 @@ from functools import cached_property
 import numpy as np
 
 from aesi.calibration.ageing import LOSS_SD
+from aesi.data.resample import BetweenStamps
 from aesi.errors import AesiError
 from aesi.numerics.bounded import descend, slope_within
 from aesi.numerics.typing import Array, BoolArray
@@ -106,6 +107,7 @@ class FitRecord:
 
     soc0_sd : standard deviation of the start where it was read from a voltage; nought elsewhere.
     begins : for another cell to tell where it starts; None where soc0 is all that is known.
+    lost_v : (n,) V that resampling takes from the voltage of the declared model, see `as_declared`; None where nothing.
     """
 
     measurement: Measurement
@@ -113,6 +115,34 @@ class FitRecord:
     rows: BoolArray
     soc0_sd: float = 0.0
     begins: Beginning | None = None
+    lost_v: Array | None = None
+
+    @property
+    def logged(self) -> Measurement:
+        """The rows as they were logged; the even ones where these are all that is known."""
+        return self.measurement if self.begins is None else self.begins.measured
+
+    @property
+    def voltage_v(self) -> Array:
+        """(n,) V for a simulation of the even rows to give: as measured, less what resampling did to it."""
+        return self.measurement.voltage_v - (0.0 if self.lost_v is None else self.lost_v)
+
+    def as_declared(self, declared: PhysicsStart, hold: Hold) -> FitRecord:
+        """The record with what resampling does to the declared model: its voltage at the rows as logged, brought to the
+        stamps as the measured one was, less its voltage by a simulation of the stamps.
+
+        Other physics are fitted with the same, so that a fit need not simulate all rows. Two drives of a Panasonic
+        18650PF in rows of 0.1 s, simulated one deviation off in everything with 1 mV of noise, and fitted in steps of
+        1 s: this leaves 1.1 to 1.2 mV RMS at the rows of them and of three others, worked out again for what was
+        fitted 1.1 to 1.15, and nothing taken off 1.4 to 2.6.
+        """
+        if self.logged is self.measurement:
+            return self
+        logged, even = (
+            declared.simulate(rows, self.soc0, hold).voltage_v for rows in (self.logged, self.measurement)
+        )
+        brought = BetweenStamps(self.logged.time_s, self.measurement.time_s).as_voltage(logged)
+        return replace(self, lost_v=brought - even)
 
 
 def recalibrate(
@@ -217,7 +247,7 @@ class _Fit:
         rows = np.flatnonzero(record.rows)[::every]
         run = physics.simulate(data, record.soc0, self.hold)
         weight = np.sqrt(every_s / MEMORY_S) / self.error_v
-        left: Array = weight * (data.voltage_v - run.voltage_v)[rows]
+        left: Array = weight * (record.voltage_v - run.voltage_v)[rows]
         return _without_own(left, weight * self._own_v[data.name][rows]) if self.own_charges else left
 
     @cached_property

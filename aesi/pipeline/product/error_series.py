@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from aesi.constants import ZERO_CELSIUS_K
+from aesi.data.resample import BetweenStamps
 from aesi.records import INPUT_NAMES, ErrorSeries, Measurement, Run
 
 
@@ -25,4 +28,24 @@ def error_series(measurement: Measurement, run: Run, dt_s: float) -> ErrorSeries
         soc=run.series["soc"],
         model_v=run.voltage_v,
         temperature_degc=run.series["temperature_k"] - ZERO_CELSIUS_K if degc is None else degc,
+    )
+
+
+def as_resampled(even: ErrorSeries, own: ErrorSeries) -> ErrorSeries:
+    """The error at even stamps as that of a record's own rows (`ErrorSeries.own`), brought there as the measured
+    voltage was: an average is compared with the average of what the model says, not with what it says at the stamp.
+
+    even : of the measurement on its stamps, by a simulation of these.  own : of the rows that it was made of, by a
+    simulation of the same physics from the same start; its `physics` become those of the stamps.
+    A step of a current that is held over the step moves a cell's voltage by millivolts until its end: of a record that
+    a calibrated LG HG2 and Panasonic 18650PF themselves simulate in rows of 0.1 s, steps of 1 s were 4 mV RMS off.
+    """
+    brought = BetweenStamps(own.time_s, even.time_s).as_voltage
+    model_v = brought(own.model_v)
+    return replace(
+        even,
+        error_v=even.error_v + even.model_v - model_v,
+        model_v=model_v,
+        physics={name: brought(voltage) for name, voltage in own.physics.items()},
+        own=own,
     )

@@ -96,7 +96,7 @@ def _tried(problem: Problem, leaves: int, seed: int, judge: Judge) -> Iterator[_
     left_out = [_left_out(problem, fold, leaves, seed) for fold in range(len(problem.folds))]
     for number, trees in enumerate(TREES):
         given = np.concatenate([each[number] for each in left_out])
-        runs, memory = runs_without_feedback(problem, np.column_stack([given] * 3))
+        runs, memory = runs_without_feedback(problem, np.column_stack([given] * 2))
         regressor = _regressor(leaves, trees, seed)
         model = BoostedErrorModel(
             regressor.fit(problem.inputs, problem.target, problem.row_weights),

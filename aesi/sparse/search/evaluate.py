@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aesi.numerics.metrics import pearson
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.records import Failed
 from aesi.sparse.ensemble import Ensemble, best_members, combine
@@ -67,8 +66,8 @@ class Candidate:
     valid_losses : that of AESI I and that of AESI II.
     loss_sparse : number of active terms of AESI I.
     fitness : 1 - (g1 loss_oob + g2 loss_valid + g3 loss_sparse / library size).
-    pearson_train, pearson_valid : correlation of error and prediction of AESI I, in free run (on training
-    rows, started anew with each fold).
+    pearson_train, pearson_valid : correlation of error and prediction of AESI I, in free run: on training
+    rows by fits without the piece around each, started anew with each, and on validation.
     free_run_valid_mser_pct, one_step_valid_rmse_v : of AESI I on the validation records (of the fold models
     on the folds where there are none); the first against the physics that is corrected.
     fold_sums : (2, n_folds, 3) for `aesi.sparse.search.pick.nested`, of AESI I and II.
@@ -139,11 +138,11 @@ def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = 
         return combined
     ensemble, loss_oob = combined
     fold_fits, refits = _fold_fits(problem, columns, ensemble.stability != 0, solver)
-    runs, memory = fold_runs(problem, active, fold_fits, refits, ensemble.bagging)
+    runs, memory = fold_runs(problem, active, fold_fits, refits)
     bagging, stability = (
         faded(sparse_model(problem, active, coefficients, memory, name, ensemble), problem, amplitude)
         for name, coefficients, amplitude in zip(
-            ENSEMBLES, (ensemble.bagging, ensemble.stability), runs.amplitudes[:2], strict=True
+            ENSEMBLES, (ensemble.bagging, ensemble.stability), runs.amplitudes, strict=True
         )
     )
     judged = on_validation(problem, runs, (bagging, stability))
@@ -160,14 +159,14 @@ def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = 
         loss_valid=loss_valid,
         loss_sparse=count,
         fitness=fitness((loss_oob, loss_valid, count), len(problem.library), weights),
-        pearson_train=pearson(problem.target, runs.free_run[:, Fit.SERVED]),
+        pearson_train=runs.judge(problem, Fit.FOLD).pearson,
         pearson_valid=valid.pearson,
         free_run_valid_mser_pct=valid.mser_pct,
         one_step_valid_rmse_v=valid.one_step_rmse_v,
         bagging=bagging,
         stability=stability,
         residuals=_out_of_fold(problem, runs),
-        fold_sums=runs.sums[:2],
+        fold_sums=runs.sums,
         valid_losses=valid_losses,
     )
 
@@ -230,7 +229,7 @@ def _with_left_out(problem: Problem, runs: FoldRuns, judged: Sequence[Judged]) -
 
 
 def _out_of_fold(problem: Problem, runs: FoldRuns) -> tuple[OutOfFoldResiduals, ...]:
-    left = problem.scaling.error_volts_per_unit * (problem.unseen_target[:, None] - runs.one_step[:, :2])
+    left = problem.scaling.error_volts_per_unit * (problem.unseen_target[:, None] - runs.one_step)
     return tuple(
         OutOfFoldResiduals(record.name, left[a:b, 0], left[a:b, 1])
         for record, (a, b) in zip(problem.split.train, problem.spans, strict=True)

@@ -64,30 +64,28 @@ def one_step_predictions(problem: Problem, drive: Array, functions: IntArray, ro
 class Fit(IntEnum):
     """Whose predictions a column of `FoldRuns` holds.
 
-    FOLD, STABLE : of a fit without the fold, to all terms and to the stable ones; they stand for AESI I and II.
-    SERVED : AESI I itself, which has seen the fold.
+    Both are of a fit without the fold: FOLD to all terms, STABLE to the stable ones. They stand for AESI I and II.
     """
 
     FOLD = 0
     STABLE = 1
-    SERVED = 2
 
 
 @dataclass(frozen=True, eq=False)
 class FoldRuns:
-    """(n, 3) scaled predictions in each regime, a column each `Fit`.
+    """(n, 2) scaled predictions in each regime, a column each `Fit`.
 
     from_none : free run by the inputs alone, no measured error at its start; `free_run` for models with feedback.
     Corrections fade in all of them by nearness and amplitude, not by leverage (fade.py).
-    amplitudes : (3,) of equation (2) there.  sums : (3, n_folds, 3), for each of the three and each fold the sums
-    of e**2, e p and p**2, with p the prediction `from_none` before the amplitude; scaled.
+    amplitudes : (2,) of equation (2) there.  sums : (2, n_folds, 3), for both and each fold the sums of e**2, e p and
+    p**2, with p the prediction `from_none` before the amplitude; scaled.
     """
 
     one_step: Array
     free_run: Array
     from_none: Array
     sums: Array
-    amplitudes: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    amplitudes: tuple[float, float] = (1.0, 1.0)
 
     def judge(self, problem: Problem, column: Fit) -> Judged:
         """How one of the fits did over all pieces."""
@@ -107,13 +105,11 @@ class FoldRuns:
         )
 
 
-def fold_runs(
-    problem: Problem, active: IntArray, fits: Array, refits: Array, bagging: Array
-) -> tuple[FoldRuns, float]:
+def fold_runs(problem: Problem, active: IntArray, fits: Array, refits: Array) -> tuple[FoldRuns, float]:
     """Free and one-step runs over each piece by models fitted on the others; and the memory of the residual, for models
     without feedback."""
     drives = [
-        drive_of(problem, active, np.stack([fit, refit, bagging]), slice(a, b))
+        drive_of(problem, active, np.stack([fit, refit]), slice(a, b))
         for (a, b), fit, refit in zip(problem.folds, fits, refits, strict=True)
     ]
     if not any(functions.any() for _, functions in drives):
@@ -124,7 +120,7 @@ def fold_runs(
         one = one_step_predictions(problem, drive, functions, rows)
         restart = np.zeros(b - a, dtype=bool)
         restart[0] = True
-        free = free_predictions(problem, drive, functions, rows, restart, np.zeros(3))
+        free = free_predictions(problem, drive, functions, rows, restart, np.zeros(2))
         parts.append((one, free))
     free_run_ = np.vstack([free for _, free in parts])
     sums = _sums(problem, free_run_)
@@ -141,7 +137,7 @@ def _sums(problem: Problem, given: Array) -> Array:
 def runs_without_feedback(problem: Problem, given: Array) -> tuple[FoldRuns, float]:
     """`fold_runs` of models without feedback.
 
-    given : (n, 3) scaled predictions by the inputs alone, of rows that the models have not seen."""
+    given : (n, 2) scaled predictions by the inputs alone, of rows that the models have not seen."""
     amplitudes = [1.0] * given.shape[1]
     sums = _sums(problem, given)
     if problem.options.fade:
@@ -158,7 +154,7 @@ def runs_without_feedback(problem: Problem, given: Array) -> tuple[FoldRuns, flo
         for j, column in enumerate(given[a:b].T):
             one[a:b, j] = free_run.remember_ahead(column, memory, problem.unseen_error[a:b], 1)
             free[a:b, j] = free_run.remember(column, memory, problem.unseen_error[a])
-    return FoldRuns(one, free, given, sums, (amplitudes[0], amplitudes[1], amplitudes[2])), memory
+    return FoldRuns(one, free, given, sums, (amplitudes[0], amplitudes[1])), memory
 
 
 def memory_of(problem: Problem, given: Sequence[Array]) -> float:

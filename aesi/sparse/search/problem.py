@@ -48,8 +48,8 @@ class Options:
     regime : what the losses measure.  outside : what happens beyond the trained range.
     feedback : whether terms may hold the error at all.
     fade : whether a correction without such terms is shrunk towards the physics (fade.py).
-    balance : let every record count alike, in fits and losses, whatever the size of its error. Otherwise one
-    record near the end of discharge, where the error is largest, decides the model for all others.
+    balance : let every record count alike, in fits and losses, whatever its length and, but for the smallest, its
+    error. Otherwise one near the end of discharge, where the error is largest, decides the model for all others.
     """
 
     inputs: tuple[str, ...] | None = None

@@ -118,14 +118,15 @@ def nearness_of_left_out(inputs: Array, soc: Array, temperature_degc: Array, fol
 
 
 LEAST_SHARE = 0.1
-"""A record whose bare error is smaller than this share of the mean counts as if it were this large: a record on
-which the physics is all but exact should not rule the fit."""
+"""A record whose mean squared error is smaller than this share of the mean over records counts as if it were this
+large: a record on which the physics is all but exact should not rule the fit."""
 
 
 def balanced_weights(spans: Sequence[Span], bare: Array) -> Array:
     """(n,) mean 1: a weight a row, by which every record's bare error (n,) adds the same to a sum of squares."""
-    squares = np.array([np.sum(bare[a:b] ** 2) for a, b in spans])
     sizes = np.array([b - a for a, b in spans])
+    rows = np.maximum(sizes, 1)  # a record of a single sample has no row to judge
+    squares = np.array([np.sum(bare[a:b] ** 2) for a, b in spans]) / rows
     each = 1.0 / np.maximum(squares, LEAST_SHARE * squares.mean())
-    weights: Array = np.repeat(each, sizes)
+    weights: Array = np.repeat(each / rows, sizes)
     return weights / weights.mean()

@@ -5,6 +5,7 @@ import io
 import json
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -83,12 +84,17 @@ def test_a_candidate_could_not_be_made_again_from_what_was_tracked(store_alone, 
     assert np.isfinite(prediction.voltage_v).all()
 
 
-def test_the_run_of_an_experiment_gives_the_candidate_that_it_chose(store_alone):
-    from flows.results.candidate import rebuild
+def test_the_run_of_an_experiment_gives_the_candidate_that_it_chose(store_alone, tmp_path):
+    from flows.results.candidate import rebuild, said
 
     (run,) = runs_of(store_alone, "run")
     for name in (run.info.run_id, run.info.run_id[:8]):  # as pages show it
-        assert rebuild(name, store_alone).number == int(run.data.params["chosen_candidate"])
+        rebuilt = rebuild(name, store_alone)
+        assert rebuilt.number == int(run.data.params["chosen_candidate"])
+        assert rebuilt.members == (rebuilt.number,)
+    assert "one of several" not in said(rebuilt, tmp_path)
+    one_of_two = replace(rebuilt, members=(rebuilt.number, 99))
+    assert f"the mean of candidates {rebuilt.number} and 99" in said(one_of_two, tmp_path)
 
 
 def test_another_run_is_refused_in_one_sentence(store_alone):

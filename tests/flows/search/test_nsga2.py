@@ -6,7 +6,7 @@ import pytest
 
 from aesi.errors import FitError
 from aesi.records import Failed
-from aesi.sparse import FitnessWeights, Genome, evaluate
+from aesi.sparse import FitnessWeights, Genome, evaluate, fitness
 from flows.search.nsga2 import Constraints, SearchSettings, search
 
 
@@ -165,3 +165,14 @@ def test_the_fittest_are_a_share_of_all_and_begin_with_the_pick(problem):
     others = [value for number, value in fitnesses.items() if number not in numbers]
     assert min(fitnesses[number] for number in numbers) >= max(others)
     assert result.fittest(0.0) == numbers[:1]
+
+
+def test_candidates_were_ranked_by_the_default_weights_whatever_was_asked(problem):
+    weights = FitnessWeights(0.1, 0.1, 2.0)
+    result = search(problem, 6, 0, SearchSettings(6, Constraints(-1.0, -1.0), weights))
+    kept = [trial for trial in result.trials if trial.losses is not None]
+    assert len(kept) > 1
+    for trial in kept:
+        assert trial.numbers["fitness"] == pytest.approx(fitness(trial.losses, len(problem.library), weights))
+    ranked = sorted(kept, key=lambda trial: -fitness(trial.losses, len(problem.library), weights))
+    assert result.fittest(1.0) == tuple(trial.number for trial in ranked)

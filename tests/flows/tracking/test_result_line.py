@@ -1,6 +1,6 @@
 """What a tracked run says of itself in one sentence."""
 
-from flows.tracking.experiment_log import result_line
+from flows.tracking.experiment_log import candidates_line, result_line
 
 ROW = {
     "name": "ESPM + AESI I",
@@ -28,3 +28,9 @@ def test_a_reduction_below_nought_is_more_and_not_a_negative_less():
     assert result_line({"name": "ESPM + AESI II", "free_run": worse, "intervals": None}) == (
         "ESPM + AESI II: 1.7 % more squared error on test in free run (8.54 mV), 26.5 % less than recalibrated."
     )
+
+
+def test_a_run_named_one_candidate_where_its_models_are_the_mean_of_several():
+    assert candidates_line((12,)) == "Candidate 12 of the search"
+    assert candidates_line((12, 3)) == "The mean of candidates 12 and 3 of the search"
+    assert candidates_line((12, 3, 7)) == "The mean of candidates 12, 3 and 7 of the search"

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from small_experiment import BPX, NOISE_V, SOC0, experiment, write_record
 
-from aesi.physics import Cell
+from aesi.data.resample import to_even
+from aesi.physics import Cell, simulate
 from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.experiment.fit import Fitted, build_problem
 from aesi.pipeline.experiment.judging.evaluate import evaluate_models
@@ -17,6 +18,7 @@ from aesi.pipeline.experiment.physics_models import (
     PhysicsModels,
     no_rows,
 )
+from aesi.pipeline.experiment.recalibrate import Beginning
 from aesi.pipeline.product.deviations import PhysicsStart
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Measurement
@@ -67,6 +69,28 @@ def test_a_series_knows_from_when_on_a_physics_model_ran_out():
     assert not series.take(slice(first, None)).runs.any()
     full, empty = models.series(no_rows(record, 0.9), 1.0, "linear")
     assert (empty, full.ran_out_s) == (False, None)
+
+
+@pytest.mark.parametrize("hold", ["backward", "linear"])
+@pytest.mark.parametrize("spread", [0.0, 0.4])
+def test_a_model_that_is_exact_erred_where_rows_are_denser_than_steps(hold, spread):
+    cell, rng = Cell.from_bpx(BPX), np.random.default_rng(0)
+    time_s = 0.1 * (np.arange(1201) + spread * rng.uniform(-1.0, 1.0, 1201))
+    current_a = rng.normal(0.0, 30.0, 122)[np.ceil(time_s).astype(int)]
+    run = simulate(cell, time_s, current_a, 0.6, hold=hold)
+    rows = Measurement(time_s, current_a, run.voltage_v)
+    even = to_even(rows, 1.0, hold)
+    exact = PhysicsStart(cell, cell, ())
+    models = PhysicsModels({DECLARED: exact, RECALIBRATED: exact}, DECLARED)
+    record = no_rows(even, 0.6, begins=Beginning(rows, 0.6, False))
+    series, _ = models.series(record, 1.0, hold)
+    np.testing.assert_allclose(series.error_v, 0.0, atol=1e-9)
+    np.testing.assert_allclose(series.left_by(RECALIBRATED), 0.0, atol=1e-9)
+    np.testing.assert_allclose(series.model_v, even.voltage_v, atol=1e-9)
+    # At the stamps it says something else, and a fit allows for that.
+    at_stamps_v = exact.simulate(even, 0.6, hold).voltage_v
+    assert rms(even.voltage_v - at_stamps_v) > 1e-3
+    np.testing.assert_allclose(record.as_declared(exact, hold).voltage_v, at_stamps_v, atol=1e-9)
 
 
 def test_the_saved_cell_is_the_one_that_is_corrected(loaded):

@@ -83,6 +83,22 @@ def test_a_model_that_misses_40_mv_followed_them_as_far_as_one_that_misses_10():
     assert recalibrate(CELL, (), {"one": record}, "linear").missed_v == MODEL_ERROR_V
 
 
+def test_averaging_over_steps_moved_a_cell_that_is_as_declared(tmp_path):
+    time_s = np.round(np.arange(0.0, 600.05, 0.1), 6)
+    for name, seed in (("train", 0), ("test", 1)):
+        current = np.random.default_rng(seed).normal(0.0, 30.0, 602)[np.ceil(time_s).astype(int)]
+        run = simulate(CELL, time_s, current, 0.6, hold="backward")
+        made = Measurement(time_s, current, run.voltage_v)
+        made.to_frame().to_csv(tmp_path / f"{name}.csv", index=False)
+    files = {role: [str(tmp_path / f"{role}.csv")] for role in ("train", "test")}
+    config = parse_experiment(
+        {"name": "one", "data": {"kind": "files", **files}, "cell": {"bpx": str(BPX), "soc0": 0.6}}
+    )
+    (train,) = load(config).split.train
+    assert 1e3 * rms(train.left_by(DECLARED)) < 0.01
+    assert 1e3 * rms(train.left_by(RECALIBRATED)) < 0.01
+
+
 def test_an_initial_state_that_is_fitted_alone_is_the_charge_of_all_records():
     low = {name: discharged(name, -OFF) for name in ("one", "other")}
     found = recalibrate(CELL, (), low, "linear", INITIAL_STATE, own_charges=True)

@@ -8,9 +8,10 @@ from aesi.errors import DataError
 from aesi.numerics.metrics import mser
 from aesi.records import Failed, Split
 from aesi.sparse import Candidate, FitnessWeights, Genome, Options, Problem, evaluate, fitness
+from aesi.sparse.baselines.sindy_c import evaluate_sindy_c
 from aesi.sparse.ranking import svd_ranking, svd_scores
 from aesi.sparse.search.fold_models import fold_models
-from aesi.sparse.search.judge import fold_runs
+from aesi.sparse.search.judge import Fit, fold_runs
 from aesi.sparse.stridge import STRidge
 from aesi.sparse.terms.library import Library, Term
 
@@ -64,11 +65,23 @@ def test_free_runs_of_the_search_equal_those_of_the_model(feedback_problem):
     table = candidate.bagging.coefficient_table()
     coefficients = np.array([table.get(name, 0.0) for name in names])
     fits = np.tile(coefficients, (len(problem.folds), 1))
-    runs, _ = fold_runs(problem, active, fits, fits, coefficients)
+    runs, _ = fold_runs(problem, active, fits, fits)
     first = problem.split.train[0].take(slice(0, problem.folds[0][1] + 1))
     model = replace(candidate.bagging, memory=0.0)
     expected = problem.scaling.error_to_scaled(model.free_run(first).error_v[1:])
-    np.testing.assert_allclose(runs.free_run[: len(expected), 2], expected, atol=1e-10)
+    np.testing.assert_allclose(runs.free_run[: len(expected), Fit.FOLD], expected, atol=1e-10)
+
+
+def test_a_candidate_that_fits_noise_was_admitted_by_its_correlation_on_rows_that_it_had_seen():
+    record = make_record(seed=0, n=400)
+    rng = np.random.default_rng(0)
+    noise = replace(record, error_v=5e-3 * rng.standard_normal(len(record)))
+    problem = Problem.build(Split((noise,), (), ()), Options(p_c=3, d=2, resamples=20, block=50, fade=False))
+    candidate = evaluate(problem, whole(problem, 1e-6, 1e-6, feedback=False, p_c=3))
+    seen = np.corrcoef(noise.error_v[1:], candidate.bagging.free_run(noise).error_v[1:])[0, 1]
+    assert candidate.pearson_train < 0.1 < 0.25 < seen
+    single = evaluate_sindy_c(problem, candidate.genome)
+    assert single.pearson_train == pytest.approx(candidate.pearson_train, abs=0.02)
 
 
 def test_residuals_are_out_of_fold_and_complete(problem, split):
