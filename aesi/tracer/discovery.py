@@ -261,10 +261,11 @@ def _discovery_of(
     others = left_by_fit(fitted, other_temperatures(problem))
     at_other = {records[k].name: other for k, other in others.items()} | of_unseen(fitted, tested)
     evidence = _without_fault(evidence, others)
-    states: States = {"before": declared, "recalibrated": evidence.recalibrated, "after": evidence.after}
+    fits: States = {"before": declared, "recalibrated": evidence.recalibrated, "after": evidence.after}
+    states = {name: state.of_one_age() for name, state in fits.items()}  # errors are told of what is written
     files = outcomes(records, states, tested, rng)
     inside, soc0 = evidence.after.settled()
-    left = _structure_of(records, evidence.after)
+    left = _structure_of(records, states["after"])
     return Discovery(
         cell=inside.cell,
         verdict=verdict,
@@ -289,7 +290,7 @@ def _discovery_of(
         ),
         other_temperature=tuple(at_other),
         written={name: (evidence.after.values or {})[name] for name in evidence.after.hypothesis},
-        own={state: own_parameters(states[state]) for state in ("recalibrated", "after")},
+        own={state: own_parameters(fits[state]) for state in ("recalibrated", "after")},
         tried=problem.competing(),
         seconds=seconds,
         simulations=simulations,
@@ -315,7 +316,7 @@ def _test_error_v(
 ) -> float | None:
     """RMSE on data that no fit has seen, V; None where the model cannot be simulated there."""
     try:
-        return test_rmse_v(ModelState.of(problem, one), problem.records, tested)
+        return test_rmse_v(ModelState.of(problem, one).of_one_age(), problem.records, tested)
     except AesiError:  # it was simulated on the fit part alone
         return None
 
