@@ -19,7 +19,7 @@ from aesi.physics.effects import CATALOGUE
 from aesi.physics.initial_state import REST_C_RATE
 from aesi.physics.simulation import ModelName
 from aesi.physics.start.temperature import OtherTemperature
-from aesi.records import Hold, Measurement, Run
+from aesi.records import Hold, Measurement
 from aesi.tracer.case.checks import check_compared, check_record, check_same_cell
 from aesi.tracer.case.energies import ACTIVATION_ENERGIES
 from aesi.tracer.case.free_parameter import OF_ONE_RECORD, by_owner
@@ -316,9 +316,10 @@ def _test_error_v(
 ) -> float | None:
     """RMSE on data that no fit has seen, V; None where the model cannot be simulated there."""
     try:
-        return test_rmse_v(ModelState.of(problem, one).of_one_age(), problem.records, tested)
+        error_v = test_rmse_v(ModelState.of(problem, one).of_one_age(), problem.records, tested)
     except AesiError:  # it was simulated on the fit part alone
         return None
+    return error_v if np.isfinite(error_v) else None
 
 
 def _notes(evidence: Evidence, tested: Sequence[PreparedRecord], left: ResidualStructure) -> tuple[str, ...]:
@@ -345,9 +346,7 @@ def _notes(evidence: Evidence, tested: Sequence[PreparedRecord], left: ResidualS
 def _structure_of(records: Sequence[PreparedRecord], state: ModelState) -> ResidualStructure:
     runs, residuals = [], []
     for index, record in enumerate(records):
-        run = state.simulated(record, index, thin=True)
-        keep = slice(0, record.n_fit)
-        series = {name: column[keep] for name, column in run.series.items()}
-        runs.append(Run(run.time_s[keep], run.current_a[keep], run.voltage_v[keep], series))
-        residuals.append((record.thin.voltage_v - run.voltage_v)[keep])
+        seen = record.thin.take(slice(0, record.n_fit))
+        runs.append(state.simulated(replace(record, thin=seen), index, thin=True))
+        residuals.append(seen.voltage_v - runs[-1].voltage_v)
     return ResidualStructure(explain(runs, residuals), measure(runs, residuals))
