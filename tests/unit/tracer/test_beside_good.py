@@ -1,6 +1,6 @@
 """Records beside others of the same cell that are known to be good: what is different about the first?"""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +11,7 @@ from aesi.physics.effects import CATALOGUE
 from aesi.tracer import discover
 from aesi.tracer.case.free_parameter import acting_on, of_all_records
 from aesi.tracer.case.problem import BESIDE_TIMES
-from aesi.tracer.decide.beside import Usual, judged_beside, left_v, of_one_age
+from aesi.tracer.decide.beside import judged_beside, left_v, of_one_age
 from aesi.tracer.decide.verdict import Thresholds, Verdict
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.search.archive import context_of
@@ -165,9 +165,17 @@ def test_the_noise_of_one_kind_of_record_was_taken_off_the_error_of_the_other(mo
     assert [left_v(path, None, kind) for kind in (rows, ~rows)] == pytest.approx([4e-3, 12e-3])
 
 
+@dataclass(frozen=True)
+class Named:
+    """A hypothesis of which only the names are asked for."""
+
+    hypothesis: tuple[str, ...]
+
+
 @pytest.mark.parametrize(("gain", "named"), [(30.0, ()), (50.0, ("a",))])
 def test_what_leaves_more_than_the_good_records_has_to_say_it_at_that_error(monkeypatch, gain, named):
-    """Twice the error is a quarter of the nats: of 30 are left 7.5, where 10 were asked for."""
+    """Twice the error is a quarter of the nats: of 30 are left 7.5, where 10 were asked for. What is left then, 16 mV,
+    is that of the model without the name; it was that of the refused one."""
     good = np.array([True, False])
     problem = SimpleNamespace(
         good_rows=good,
@@ -176,18 +184,23 @@ def test_what_leaves_more_than_the_good_records_has_to_say_it_at_that_error(monk
         noise_v=1e-3,
         records=[SimpleNamespace(name="other", good=False)],
     )
-    base, chosen = SimpleNamespace(hypothesis=()), SimpleNamespace(hypothesis=("a",))
+    base, chosen = Named(()), Named(("a",))
     path = SimpleNamespace(
         problem=problem, base=base, chosen=chosen, steps=(), admission_nats=10.0, gain=lambda one: gain
     )
-    monkeypatch.setattr("aesi.tracer.decide.beside.left_v", lambda path, one, rows: 4e-3 if rows[0] else 8e-3)
+    left = {base: 16e-3, chosen: 8e-3}
+    monkeypatch.setattr(
+        "aesi.tracer.decide.beside.left_v", lambda path, one, rows: 4e-3 if rows[0] else left[one]
+    )
     monkeypatch.setattr("aesi.tracer.decide.beside.look_alikes", lambda *given: ((), 1.0))
-    verdict = judged_beside(path, Thresholds(), Usual.of(path, Thresholds()))
+    verdict = judged_beside(path, Thresholds())
     assert (verdict.word, verdict.effects) == ("unknown", named)
-    # Without a name the confidence of `unknown` is read off the logarithm of what is left over what may be, 8 over 4 mV
-    # with 0.6 that right hypotheses leave anyway, and what two records of a million rows each differ by.
+    assert verdict.structured_v == (8e-3 if named else 16e-3)
+    assert ("8.0 mV after" in verdict.reason) == bool(named)
+    # Without a name the confidence of `unknown` is read off the logarithm of what is left over what may be, 16 over
+    # 4 mV with 0.6 that right hypotheses leave anyway, and what two records of a million rows each differ by.
     may_be = np.hypot(4.0, np.hypot(0.45, 0.4))
-    assert verdict.margin == (1.0 if named else pytest.approx(np.log(8.0 / may_be), abs=2e-3))
+    assert verdict.margin == (1.0 if named else pytest.approx(np.log(16.0 / may_be), abs=2e-3))
 
 
 def said(name, total, scatter=1.0):
