@@ -19,6 +19,7 @@ from aesi.numerics.typing import BoolArray
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.decide.carry_over import ORDINARY_C, range_fault
 from aesi.tracer.decide.evidence import MEASURED_EFFECTS, Answer, Evidence, with_confidence
+from aesi.tracer.decide.shared import searched_unshared
 from aesi.tracer.decide.verdict import Thresholds, Verdict, best_gain, beyond, look_alikes, tolerance_v
 from aesi.tracer.decide.written import limits_of
 from aesi.tracer.likelihood.fit import FittedHypothesis, held_out_residual
@@ -26,7 +27,6 @@ from aesi.tracer.likelihood.growth import Explanation, Parent
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import fitted_hypothesis
-from aesi.tracer.search.forward import searched
 from aesi.tracer.search.grown import grown_with
 from aesi.tracer.search.path import Path, Report
 from aesi.tracer.search.plausible import alike, lag, sds_behind
@@ -41,13 +41,16 @@ def gathered_beside(
     Raises DataError where the model cannot be simulated on the records.
     """
     beside = replace(problem, trust="beside")
-    path = searched(beside, min(max_effects, MEASURED_EFFECTS), archive, report)
+    found = searched_unshared(beside, min(max_effects, MEASURED_EFFECTS), archive, report)
+    path = replace(found.path, notes=(*found.path.notes, *found.shared))
     verdict = judged_beside(path, thresholds)
     if verdict.word != "none":
         believed = path.chosen if verdict.effects else path.base
         usual = Usual.of(path, believed, thresholds)
         aged = [
-            one for one in _of_another_age(path, archive) if usual.said_nats(path, one) > path.admission_nats
+            one
+            for one in _of_another_age(path, found.archive)
+            if usual.said_nats(path, one) > path.admission_nats
         ]
         verdict = of_one_age(verdict, believed, aged)
     return Answer(path, verdict, {"beside": path}, partial(_settled, path))

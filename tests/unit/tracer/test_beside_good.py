@@ -12,6 +12,7 @@ from aesi.tracer import discover
 from aesi.tracer.case.free_parameter import acting_on, of_all_records
 from aesi.tracer.case.problem import BESIDE_TIMES
 from aesi.tracer.decide.beside import judged_beside, left_v, of_one_age
+from aesi.tracer.decide.shared import in_all_records
 from aesi.tracer.decide.verdict import Thresholds, Verdict
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.search.archive import context_of
@@ -61,6 +62,41 @@ def test_nothing_is_found_without_a_fault(cell, tried, erring):
     found = discover(cell, [erring("other", 2)], soc0=0.9, effects=tried, good=[erring("good", 1)])
     assert found.verdict.word == "none"
     assert found.verdict.effects == ()
+
+
+CONTACT = CATALOGUE["series_resistance"]
+
+
+def test_a_contact_that_good_records_have_too_was_found_as_a_difference(cell, tried, erring):
+    in_both = [CONTACT.activate(resistance_ohm=5e-4)]
+    good, other = erring("good", 1, effects=in_both), erring("other", 2, effects=in_both)
+    found = discover(cell, [other], soc0=0.9, effects=tried, good=[good])
+    assert (found.verdict.word, found.verdict.effects) == ("none", ())
+    (note,) = (note for note in found.notes if "taken as what all share" in note)
+    assert note.startswith("series_resistance in all records says")
+
+
+def test_a_contact_beyond_that_of_the_good_records_has_the_size_of_the_difference(cell, tried, erring):
+    good, other = (
+        erring(name, seed, effects=[CONTACT.activate(resistance_ohm=ohm)])
+        for name, seed, ohm in (("good", 1, 5e-4), ("other", 2, 10e-4))
+    )
+    found = discover(cell, [other], soc0=0.9, effects=tried, good=[good])
+    assert (found.verdict.word, found.verdict.effects) == ("found", ("series_resistance",))
+    size = next(c for c in found.candidates if c.effect == "series_resistance").parameters["resistance_ohm"]
+    assert size.low <= 5e-4 <= size.high
+
+
+def test_what_is_open_in_all_records_may_go_as_far_as_where_it_is_tried(cell, make):
+    """Also of an instrument, of what cells have another spread of, and on a logarithmic scale."""
+    problem = replace(inverse_problem(cell, [make()], 0.9, good=[make(seed=3)]), trust="beside")
+    for name in ("clock_skew", "series_resistance", "current_sensor_gain", "solid_diffusivity"):
+        opened = in_all_records(problem, name)
+        tried = np.array([(f.sd, f.centre) for f in problem.parameters_of(name)])
+        again = [(f.sd, f.centre) for f in opened.parameters_of(name)]
+        shared = [(f.sd, f.centre) for f in opened.free(()) if f.owner == of_all_records(name)]
+        assert np.array(again) == pytest.approx(tried)
+        assert np.array(shared) == pytest.approx(tried)
 
 
 def test_a_good_record_only_has_what_all_records_share():
