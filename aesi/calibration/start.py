@@ -11,6 +11,7 @@ from aesi.constants import J_PER_KJ, SECONDS_PER_HOUR
 from aesi.numerics.typing import Array, BoolArray
 from aesi.over_time import stamp
 from aesi.physics.cell import Cell
+from aesi.physics.rest.open_circuit import OpenCircuit
 from aesi.records import Hold, Measurement
 
 TYPICAL_SOLID_EA_J_MOL = 30e3
@@ -183,6 +184,9 @@ def _full_discharge_ah(cell: Cell, data: Measurement) -> float | None:
     """Charge from full to empty: the most that a stretch of the record takes from one to the other, None where none
     does. A stretch begins where the cell is full, and ends where it has been charged to there again."""
     full = data.voltage_v >= cell.upper_voltage_v - FULL_WINDOW_V
+    # A full cell of a flat potential falls by more at rest; where it is being charged, any state may be as high.
+    charged = data.current_a < -OPEN_SHARE * np.abs(data.current_a).max()
+    full |= ~charged & (data.voltage_v >= OpenCircuit(cell).lingers_from_v)
     taken_ah = data.discharged_ah(_counted(data))
     most: float | None = None
     position = 0

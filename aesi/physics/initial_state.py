@@ -35,6 +35,7 @@ from aesi.physics.effect import ActiveEffect, Record, as_cell_saw, instruments_f
 from aesi.physics.rest.open_circuit import CHARGED_V, GIVEN_SD, GOOD_READING_V, READING_V, OpenCircuit
 from aesi.physics.rest.voltage import first_rows_v, freed_of_instruments, freed_of_series
 from aesi.physics.simulation import ModelName, model_with
+from aesi.physics.start.charge import told_by_charge
 from aesi.physics.start.load import DROP_ERROR, FLOWED_S, LoadedStart
 from aesi.physics.start.relaxing import Rest, resting_rows, settled_voltage
 from aesi.physics.start.state import Basis, InitialState
@@ -173,8 +174,14 @@ class _Start:
         self.load = LoadedStart(self.open_circuit, record, hold, model_name)
 
     def read(self) -> InitialState:
-        """From the voltage."""
-        return self._at_rest() if self._rests() else self._under_load()
+        """From the voltage, and under load from the charge that the record moves, too."""
+        read = self._at_rest() if self._rests() else self._under_load()
+        # The reading of a rest is its likeliest state, not a mean that what is cut off would move.
+        return (
+            read
+            if read.basis != "load"
+            else told_by_charge(read, self.record, self.hold, self.declared.capacity_ah)
+        )
 
     def _rests(self) -> bool:
         return abs(self.current_a) <= REST_C_RATE * self.cell.capacity_ah
@@ -287,8 +294,9 @@ class _Start:
         inside = self.open_circuit.soc_at(ocv_v)
         sd = self.open_circuit.full_sd(ocv_v, DROP_ERROR * drop_v)
         above_v = true_v - self.cell.upper_voltage_v
-        near = f"within {1e3 * CHARGED_V:.0f} mV of"
-        doubt = ""
+        near, doubt = f"within {1e3 * CHARGED_V:.0f} mV of", ""
+        if above_v < -CHARGED_V:
+            near = f"far above the plateau of its potential and {-1e3 * above_v:.0f} mV below"
         if above_v > CHARGED_V:
             near = f"{1e3 * above_v:.0f} mV above"
             doubt = "; check the voltage's sensor, and the cell file, which may be another cell's"

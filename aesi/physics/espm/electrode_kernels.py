@@ -30,6 +30,8 @@ NEWTON_STEPS = 60
 """At most; a handful is usual."""
 NEWTON_TOLERANCE_V = 1e-11
 """Of every potential: well within the 1e-9 V to which an effect vanishes at its neutral value."""
+SMALLEST_STEP = 1.0 / 256.0
+"""Of Newton's, below which it is taken although it does not bring the solution nearer."""
 SMALLEST_SLOPE = 1e-9
 """Of a potential over its current: a flat one takes a finite step."""
 SMALLEST_SHARE = 1e-12
@@ -50,8 +52,12 @@ def solve_electrode(lo, hi, side, total, at, particles, surfaces, memory):  # ty
         phi = solve_units(lo, hi, side, total, at, particles, surfaces, memory)
     regions = memory.ohm.shape[0]
     for r in range(regions):
-        memory.delta[side * regions + r] = memory.new_delta[r]
-        memory.layer[side * regions + r] = memory.new_layer[r]
+        region = side * regions + r
+        if at.dt > 0.0:
+            stored = surfaces.capacity[side] * (memory.new_delta[r] - memory.delta[region]) / at.dt
+            memory.ahead[region] = memory.new_layer[r] - stored
+        memory.delta[region] = memory.new_delta[r]
+        memory.layer[region] = memory.new_layer[r]
         if side == 0 and surfaces.plating[0] > 0.0:
             memory.plated[r] = memory.new_plated[r]
     return phi
@@ -85,19 +91,32 @@ def solve_unit(lo, side, total, at, particles, surfaces, memory):  # type: ignor
 
 @compiled
 def solve_units(lo, hi, side, total, at, particles, surfaces, memory):  # type: ignore[no-untyped-def]
-    """Newton's method on the currents of several units and on Phi, which is returned."""
-    matrix, n, phi = memory.matrix, hi - lo, 0.0
+    """Newton's method on the currents of several units and on Phi, which is returned.
+
+    Where a unit fills, its kinetic drop is a logarithm of the room that is left, and a whole step leaps over the end of
+    it: steps are halved until they bring the solution nearer.
+    """
+    matrix, move, n, phi = memory.matrix, memory.move, hi - lo, 0.0
+    share, nearest, ohm = 1.0, math.inf, 0.0
     for step in range(NEWTON_STEPS):
         evaluate_electrode(lo, hi, side, total, step == 0, at, particles, surfaces, memory)
         if step == 0:
-            phi = memory.potential[0]
+            phi, ohm = memory.potential[0], memory.slope[0]
         worst, off = linearise(lo, hi, side, total, phi, at.chi, particles, memory)
         if worst < NEWTON_TOLERANCE_V and abs(off) * memory.slope[0] < NEWTON_TOLERANCE_V:
             break
-        eliminate(matrix, n + 1)
+        away = max(worst, abs(off) * ohm)
+        if away < nearest or share < SMALLEST_STEP:
+            eliminate(matrix, n + 1)
+            for i in range(n + 1):
+                move[i] = matrix[i, n + 1]
+            nearest, share, ahead = away, 1.0, 1.0
+        else:
+            share *= 0.5
+            ahead = -share
         for i in range(n):
-            memory.y[lo + i] += matrix[i, n + 1]
-        phi += matrix[n, n + 1]
+            memory.y[lo + i] += ahead * move[i]
+        phi += ahead * move[n]
     return phi
 
 
@@ -142,6 +161,7 @@ def evaluate_electrode(lo, hi, side, total, begins, at, particles, surfaces, mem
     first = side * regions
     for r in range(regions):
         memory.total[first + r] = 0.0
+        memory.conductance[r] = 0.0
         memory.new_delta[r] = np.nan
     for i in range(hi - lo):
         u = lo + i
@@ -151,11 +171,12 @@ def evaluate_electrode(lo, hi, side, total, begins, at, particles, surfaces, mem
         )
         memory.gain[i] = 1.0
         memory.total[first + r] += memory.y[u]
+        memory.conductance[r] += 1.0 / memory.slope[i]
+    for i in range(hi - lo):
+        r = particles.place[lo + i, 1]
         if math.isnan(memory.new_delta[r]):
             memory.new_delta[r] = memory.potential[i]
-            extra, d_extra = layer_current(
-                r, side, memory.potential[i], memory.slope[i], begins, at, surfaces, memory
-            )
+            extra, d_extra = layer_current(r, side, memory.potential[i], begins, at, surfaces, memory)
             if side == 0 and surfaces.plating[0] > 0.0:
                 metal, d_metal = metal_current(r, memory.potential[i], at, surfaces, memory)
                 extra += metal
@@ -183,18 +204,24 @@ def surface_potential(u, side, total, at, particles, surfaces, memory):  # type:
     cell = min(int(inside * last), last - 1)
     falls = (ocp[cell + 1] - ocp[cell]) * last if t == inside else -BEYOND_RANGE_V
     u_eq = open_circuit(ocp, t) + at.rise * lookup(surfaces.entropic[side], inside)
+    # The room that the reaction has changes with the current, too.
+    if occupancy > SMALLEST_OCCUPANCY:
+        d_eta *= 1.0 + give[u] * y[u] * (0.5 - t) / occupancy
     return u_eq + eta + resistance * y[u], max(d_eta + resistance - give[u] * falls, SMALLEST_SLOPE)
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def layer_current(r, side, potential, slope, begins, at, surfaces, memory):  # type: ignore[no-untyped-def]
-    """Current (A/m2) into the double layer of region r at the end of the step, and its slope in the potential."""
+def layer_current(r, side, potential, begins, at, surfaces, memory):  # type: ignore[no-untyped-def]
+    """Current (A/m2) into the double layer of region r at the end of the step, and its slope in the potential.
+
+    All units of the region charge it together: its time constant is that of what they conduct in parallel.
+    """
     capacity = surfaces.capacity[side]
     if not (capacity > 0.0 and at.dt > 0.0):
         return 0.0, 0.0
     region = side * memory.ohm.shape[0] + r
     if begins:
-        z = at.dt / (capacity * slope)
+        z = at.dt * memory.conductance[r] / capacity
         memory.fitted[r] = 1.0 / max(relaxed(z), SMALLEST_SHARE) if at.held else end_weight(z)
     weight = memory.fitted[r]
     charging = capacity * (potential - memory.delta[region]) / (at.dt * weight)

@@ -67,10 +67,10 @@ def _memory(particles: Units, salt: Salt, regions: int) -> tuple[Memory, Modes, 
     memory = Memory(
         y=of(units), theta=of(units), pred=of(units), give=of(units), ohm=of((regions, regions)),
         salt=np.ones(len(salt.gauss)), log_salt=of(2 * regions), region_salt=np.ones(2 * regions),
-        delta=of(2 * regions), layer=of(2 * regions), total=of(2 * regions),
+        delta=of(2 * regions), layer=of(2 * regions), ahead=of(2 * regions), total=of(2 * regions),
         plated=of(regions), new_plated=of(regions), kappa=np.ones(2 * regions + 1), deviation=of(2 * regions),
-        potential=of(units), slope=of(units), gain=of(units), matrix=of((units + 1, units + 2)),
-        new_delta=of(regions), new_layer=of(regions), fitted=of(regions),
+        potential=of(units), slope=of(units), gain=of(units), matrix=of((units + 1, units + 2)), move=of(units + 1),
+        new_delta=of(regions), new_layer=of(regions), fitted=of(regions), conductance=of(regions),
     )  # fmt: skip
     modes = Modes(
         z=of((units, order)), means=of(units),

@@ -1,8 +1,9 @@
 """Compiled time stepping of the model with everything that effects may add to it.
 
 Within a step a unit (see `electrode_kernels`) carries its share of the current, linear or held, plus a deviation that
-is constant over the step and found from the electrode's equations at its end: deviations cannot ring, and lithium is
-kept to round-off.
+is constant over the step and found from the electrode's equations at its end: deviations cannot ring. A double layer
+takes most of what it takes where the step begins, and what it takes less in the mean than at the end its particles took
+there: lithium is kept to round-off.
 """
 
 import numpy as np
@@ -13,7 +14,6 @@ from aesi.physics.espm.electrode_kernels import local_conductivity, region_drops
 from aesi.physics.espm.kernels import FASTMATH, compiled, lookup, open_circuit, parts_of, slot_of
 from aesi.physics.espm.layout import StepEnd
 from aesi.physics.espm.transport_kernels import (
-    all_inside,
     arrhenius,
     diffuse,
     heated,
@@ -96,7 +96,7 @@ def run_general(  # type: ignore[no-untyped-def]
             voltage -= i1 * cell.contact
             if heat[0] > 0.0:
                 power = 0.0
-                if fault_at < 0 and all_inside(memory.theta):
+                if fault_at < 0 and surfaces_inside(particles, memory.theta):
                     power = reaction_heat(t_k, cell, particles, surfaces, memory) - i1 * voltage
                 if k > 0:
                     t_k = heated(start_k, mean_heat(watts, power, i0, i1), dt, heat, around_k)
@@ -189,15 +189,21 @@ def units_of(side, particles):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", fastmath=FASTMATH)
 def take_deviations(density, dt, slot, particles, memory, modes):  # type: ignore[no-untyped-def]
-    """Give the particles what their units carried beyond their shares, as if over the whole step."""
+    """Give the particles what their units carried beyond their shares, as if over the whole step, and what double
+    layers took less in the mean than at its end, as if at its beginning."""
+    regions = memory.ohm.shape[0]
     for u in range(modes.means.shape[0]):
-        share = particles.share[u] if particles.place[u, 0] == 0 else -particles.share[u]
+        side = particles.place[u, 0]
+        share = particles.share[u] if side == 0 else -particles.share[u]
         extra = memory.y[u] - share * density
-        if extra != 0.0:
+        # Less of the current than at the end went past the particles; units share it as they do their region.
+        early = memory.ahead[side * regions + particles.place[u, 1]] * particles.share[u] * regions
+        if extra != 0.0 or early != 0.0:
             for j in range(modes.z.shape[1]):
                 weight = modes.w[slot, u, 1, j] + modes.w[slot, u, 2, j]
-                modes.z[u, j] -= particles.gains[u, j] * weight * extra
-            modes.means[u] -= particles.lump[u] * dt * extra
+                kept = modes.w[slot, u, 0, j] * dt
+                modes.z[u, j] -= particles.gains[u, j] * (weight * extra + kept * early)
+            modes.means[u] -= particles.lump[u] * dt * (extra + early)
 
 
 @njit(inline="always", fastmath=FASTMATH)
@@ -215,6 +221,18 @@ def reaction_heat(t_k, cell, particles, surfaces, memory):  # type: ignore[no-un
 
 
 @njit(inline="always", fastmath=FASTMATH)
+def surfaces_inside(particles, theta):  # type: ignore[no-untyped-def]
+    """Is the mean surface of each electrode in [0, 1]?  That of a particle that has filled lies a hair beyond."""
+    mean_n, mean_p = 0.0, 0.0
+    for u in range(theta.shape[0]):
+        if particles.place[u, 0] == 0:
+            mean_n += particles.share[u] * theta[u]
+        else:
+            mean_p += particles.share[u] * theta[u]
+    return 0.0 <= mean_n <= 1.0 and 0.0 <= mean_p <= 1.0
+
+
+@njit(inline="always", fastmath=FASTMATH)
 def record_sample(k, driest, particles, memory, modes, c, out):  # type: ignore[no-untyped-def]
     """Means of the electrodes, salt at the collectors, plated lithium; returns what left its range, 0 for nothing."""
     what = 0
@@ -224,8 +242,8 @@ def record_sample(k, driest, particles, memory, modes, c, out):  # type: ignore[
         side = particles.place[u, 0]
         out[1 + side, k] += particles.share[u] * memory.theta[u]
         out[5 + side, k] += particles.volume[u] * modes.means[u]
-        if what == 0 and not 0.0 <= memory.theta[u] <= 1.0:
-            what = 1 + side
+    if not surfaces_inside(particles, memory.theta):
+        what = 1 if not 0.0 <= out[1, k] <= 1.0 else 2
     out[3, k], out[4, k] = c[0], c[c.shape[0] - 1]
     out[8, k] = np.mean(memory.plated)
     return what if what > 0 or driest > 0.0 else 3

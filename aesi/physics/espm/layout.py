@@ -126,11 +126,12 @@ class Memory(NamedTuple):
     y, theta, pred, give : (units,) A/m2 of cell; surface stoichiometry, that if each unit carried its share, and what
     one unit of deviating current takes from it.  ohm : (regions, regions) ohm m2.
     salt, log_salt, region_salt : at Gauss points over rest; by region its mean logarithm and mean, mol/m3.
-    delta, layer : (2 regions,) V and A/m2 of the double layers.  total : (2 regions,) A/m2.
+    delta, layer, ahead : (2 regions,) V and A/m2 of the double layers, and how far the latter is at the end of the step
+    above its mean.  total : (2 regions,) A/m2.
     plated : (regions,) mol/m3.
     kappa : (2 regions + 1,) S/m, the separator's last.  deviation : (2 regions,) A/m2 beyond its share of the current.
-    potential, slope, gain, matrix : scratch, by unit of one electrode.  new_delta, new_layer, new_plated, fitted : by
-    its regions.
+    potential, slope, gain, matrix, move : scratch, by unit of one electrode.  new_delta, new_layer, new_plated, fitted,
+    conductance : by its regions.
     """
 
     y: Array
@@ -143,6 +144,7 @@ class Memory(NamedTuple):
     region_salt: Array
     delta: Array
     layer: Array
+    ahead: Array
     total: Array
     plated: Array
     new_plated: Array
@@ -152,9 +154,11 @@ class Memory(NamedTuple):
     slope: Array
     gain: Array
     matrix: Array
+    move: Array
     new_delta: Array
     new_layer: Array
     fitted: Array
+    conductance: Array
 
 
 class Modes(NamedTuple):

@@ -24,6 +24,10 @@ GOOD_READING_V = 3e-3
 what else is off: half of what a calibration leaves of a C/20 discharge."""
 CHARGED_V = 0.03
 """How far a full cell's voltage falls at rest: 6 to 30 mV in the charged records of four measured cells."""
+NEARLY_FULL, LINGERING_V = 0.98, 0.1
+"""A full cell of a flat potential rests anywhere between its plateau and its cut-off, an LFP cell at 3.40 to 3.54 V of
+3.65. So it is full, too, if it rests this many volts above what it does at this state of charge, which is more than a
+charge that was broken off there leaves. Above the cut-off, so of no account, where the potential is steep."""
 BEYOND_V = 0.05
 """A voltage this far beyond the declared full or empty still belongs to a full or an empty cell of this kind. A
 convention: with half or twice as much `aesi bench start --set cuts=16` refuses none of 48 rows, and what it is to
@@ -88,7 +92,17 @@ class OpenCircuit:
         """Is this rest voltage that of a full charge?  drop_v : of it is the model's, which may be far too much."""
         as_read = voltage_v - max(drop_v, 0.0)
         highest = max(float(self.ocv[-1]), self.cell.upper_voltage_v)
-        return voltage_v >= self.cell.upper_voltage_v - CHARGED_V and as_read <= highest + BEYOND_V
+        return voltage_v >= self.charged_from_v and as_read <= highest + BEYOND_V
+
+    @property
+    def charged_from_v(self) -> float:
+        """The least rest voltage of a full charge."""
+        return min(self.cell.upper_voltage_v - CHARGED_V, self.lingers_from_v)
+
+    @property
+    def lingers_from_v(self) -> float:
+        """The least rest voltage of a full charge whose voltage falls far."""
+        return self.voltage_at(NEARLY_FULL) + LINGERING_V
 
     def reading(self, voltage_v: float, spread_v: float) -> tuple[float, float]:
         """State of charge of an open-circuit voltage, and half of what the voltage +/- `spread_v` spans; beyond the

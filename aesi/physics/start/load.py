@@ -193,14 +193,13 @@ class LoadedStart:
         squares, nats = np.empty((2, len(soc), len(histories)))
         for h, history in enumerate(histories):
             drop = drops[:, 0 if history.began else 1 + history.kind]
-            covariance = (
-                parts * SHAPE_V**2 * np.eye(parts)
-                + DROP_ERROR**2 * _outer(drop - drop.mean(axis=1, keepdims=True))
-                + history.sd**2 * _outer(left[:, history.kind])
-            )
-            off = (minutes.seen_v - (ocv - drop))[:, :, None]
-            squares[:, h] = (off * np.linalg.solve(covariance, off)).sum(axis=(1, 2))
-            nats[:, h] = np.log(history.prior) - 0.5 * np.linalg.slogdet(covariance)[1]
+            doubts = [
+                DROP_ERROR * (drop - drop.mean(axis=1, keepdims=True)),
+                history.sd * left[:, history.kind],
+            ]
+            off = minutes.seen_v - (ocv - drop)
+            squares[:, h], logdet = _squares_and_logdet(off, np.stack(doubts, axis=2), parts * SHAPE_V**2)
+            nats[:, h] = np.log(history.prior) - 0.5 * logdet
         nats -= 0.5 * squares / max(1.0, float(squares.min()) / parts)
         return np.asarray(np.exp(nats - nats.max()))
 
@@ -280,5 +279,16 @@ def _between(soc: Array, nodes: Array, values: Array) -> Array:
     return between.reshape(len(soc), *values.shape[1:])
 
 
-def _outer(shape: Array) -> Array:
-    return np.asarray(shape[:, :, None] * shape[:, None, :])
+def _squares_and_logdet(off: Array, doubts: Array, variance: float) -> tuple[Array, Array]:
+    """(s,) off' C^-1 off and (s,) log |C| of C = variance I + doubts doubts'.  off : (s, p).  doubts : (s, p, k).
+
+    By the singular values of the doubts, since C itself cannot be inverted where they are large: a formula of a
+    potential may rise by 1e9 V beyond full.
+    """
+    across, size, _ = np.linalg.svd(doubts, full_matrices=False)
+    along = (across * off[:, :, None]).sum(axis=1)
+    rest = off - (across * along[:, None, :]).sum(axis=2)
+    doubtful = variance + size**2
+    squares = (rest**2).sum(axis=1) / variance + (along**2 / doubtful).sum(axis=1)
+    logdet = (off.shape[1] - size.shape[1]) * np.log(variance) + np.log(doubtful).sum(axis=1)
+    return np.asarray(squares), np.asarray(logdet)

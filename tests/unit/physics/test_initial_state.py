@@ -12,9 +12,13 @@ from hypothesis import strategies as st
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import DataError, InputError
 from aesi.physics import Cell, initial_state, simulate
+from aesi.physics.belongs import SOC_MARGIN
+from aesi.physics.cell.relations import LookupTable
 from aesi.physics.effect import Effect, Record, as_cell_saw
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.rest.open_circuit import GOOD_READING_V, READING_V, OpenCircuit
+from aesi.physics.start.charge import told_by_charge
+from aesi.physics.start.state import InitialState
 from aesi.records import Measurement
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
@@ -75,6 +79,58 @@ def test_a_cold_start_under_load_was_told_to_be_of_another_cell():
     assert "mV above the upper cut-off" in found.sentence
     assert found.sentence.endswith("by its first row the cell may have dropped by less than the model does.")
     assert "another cell's" not in found.sentence
+
+
+LFP = Cell.from_bpx(CELLS / "lfp_prada2013.bpx.json")
+
+
+@pytest.mark.parametrize("below_v", [0.05, 0.1])
+def test_a_full_charge_of_a_flat_potential_that_fell_by_more_than_others_do_was_read_as_a_part_of_it(below_v):
+    """An LFP cell rests 0.1 to 0.25 V below its cut-off: a row of rest before C/2 told 0.79 +/- 0.17 of its charge."""
+    time = np.append(0.0, np.arange(1.0, 300.0))
+    run = simulate(LFP, time, np.append(0.0, np.full(299, 0.5 * LFP.capacity_ah)), 0.9975, hold="backward")
+    data = record(time, run.current_a, run.voltage_v)
+    data.voltage_v[0] = LFP.upper_voltage_v - below_v
+    found = initial_state(LFP, data)
+    assert (found.basis, found.soc) == ("full charge", 1.0)
+    assert f"{1e3 * below_v:.0f} mV below the upper cut-off" in found.sentence
+
+
+def test_a_flat_potential_after_a_charge_that_was_broken_off_is_no_full_charge():
+    time = np.arange(0.0, 1800.0, 10.0)
+    charge = simulate(LFP, time, np.full(len(time), -LFP.capacity_ah), 0.3, hold="backward")
+    rest = simulate(LFP, np.arange(2000.0), np.where(np.arange(2000.0) < 1800.0, -LFP.capacity_ah, 0.0), 0.3)
+    assert charge.voltage_v[-1] > rest.voltage_v[1801]
+    found = initial_state(LFP, record(np.arange(190.0), np.zeros(190), rest.voltage_v[1810:2000]))
+    assert found.basis == "rest"
+    assert abs(found.soc - 0.8) < 2.0 * found.sd
+
+
+def test_what_a_voltage_leaves_open_the_charge_that_moves_tells():
+    """A record of 0.96 of the capacity of an LFP cell was read to begin at 0.79, and refused for ending at -0.17."""
+    time = np.arange(0.0, 6901.0, 100.0)
+    amperes = np.full(len(time), 0.5 * LFP.capacity_ah)
+    read = InitialState(0.786, 0.168, "load", "It begins at 0.786 +/- 0.168.")
+    found = told_by_charge(read, record(time, amperes, np.zeros(len(time))), "backward", LFP.capacity_ah)
+    drawn = np.random.default_rng(1).normal(read.soc, read.sd, 400_000)
+    drawn = drawn[(drawn > 6900.0 / 7200.0 - SOC_MARGIN) & (drawn < 1.0 + SOC_MARGIN)]
+    assert found.soc == pytest.approx(drawn.mean(), abs=2e-3)
+    assert found.sd == pytest.approx(drawn.std(), abs=2e-3)
+    assert found.sentence.startswith(
+        "It begins at 0.786 +/- 0.168; as the record moves 0.958 of the capacity, "
+    )
+    wrong = replace(read, soc=0.3)
+    assert told_by_charge(wrong, record(time, amperes, amperes), "backward", LFP.capacity_ah) is wrong
+
+
+def test_a_potential_that_rises_beyond_all_bounds_past_full_had_a_start_under_load_fail():
+    """A formula of an LFP cell is 1e9 V beyond full, and the errors of (1) of a load could not be inverted."""
+    theta = np.linspace(0.0, 1.0, 2001)
+    beyond = np.maximum(LG_M50.positive.theta_min - theta - 1e-3, 0.0)
+    steep = LookupTable(tuple(theta), tuple(LG_M50.positive.ocp(theta.clip(1e-6, 1.0)) + 1e12 * beyond))
+    cell, before = LG_M50.with_positive(ocp=steep), cut_from_a_drive(600)
+    found = initial_state(cell, before[0].take(slice(0, 300)))
+    assert abs(found.soc - before[1]) < 3.0 * found.sd
 
 
 def test_a_start_under_load_was_told_to_rest_at_a_voltage_that_no_cell_has():

@@ -1,0 +1,42 @@
+"""What the charge that a record moves says of the state of charge that it begins at.
+
+A voltage on a flat potential, or in the minutes after a current that nobody saw, says little. A discharge of 0.95 of
+the capacity hardly begins at 0.7, though: it would end further beyond empty than any cell does. What was read is taken
+as normal, and cut off there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import ndtr
+
+from aesi.physics.belongs import SOC_MARGIN
+from aesi.physics.start.state import InitialState
+from aesi.records import Hold, Measurement
+
+CONTRADICTED = 0.02
+"""Share of what was read, within the bounds, below which the charge contradicts it, as two deviations do: such a record
+is of another cell, or in another unit, which is told elsewhere and not mended."""
+MOVED_SDS = 0.1
+"""Of its deviation; what the bounds would move a reading by less than that leaves it as it is."""
+
+
+def told_by_charge(read: InitialState, record: Measurement, hold: Hold, capacity_ah: float) -> InitialState:
+    """What was read under load, where no row of the record is further beyond empty or full than cells hold more than
+    they are declared to; itself where that leaves it as it is, or contradicts it."""
+    moved = record.discharged_ah(hold) / capacity_ah
+    ends = np.array([float(moved.max()) - SOC_MARGIN, 1.0 + SOC_MARGIN + float(moved.min())])
+    low, high = ((ends - read.soc) / read.sd).tolist()
+    share = ndtr(high) - ndtr(low)
+    if share < CONTRADICTED:
+        return read
+    at_low, at_high = np.exp(-0.5 * np.square([low, high])) / np.sqrt(2.0 * np.pi) / share
+    rise = float(at_low - at_high)
+    soc = read.soc + read.sd * rise
+    sd = read.sd * float(np.sqrt(1.0 + low * at_low - high * at_high - rise**2))
+    if abs(soc - read.soc) < MOVED_SDS * read.sd:
+        return read
+    words = f"{read.sentence[:-1]}; as the record moves {np.ptp(moved):.3f} of the capacity, {soc:.3f} +/- {sd:.3f}."
+    return replace(read, soc=soc, sd=sd, sentence=words, ends=None)
