@@ -90,7 +90,7 @@ def main() -> NoReturn:
 
 def _say_compiling() -> None:
     print(
-        "Compiling the models for this machine, once after each installation or update: about a minute ...",
+        "Compiling a model for this machine, once each after an installation or an update: up to a minute ...",
         file=sys.stderr,
         flush=True,
     )

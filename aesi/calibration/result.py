@@ -25,7 +25,9 @@ ROUND_OFF = 1e-9
 """Share of a parameter's interval: a value nearer to nought is nought. A convention."""
 BOUND_SHARE = 0.02
 """A parameter closer to a bound than this share of its range is reported to have ended there."""
-
+NOTABLY = 1.05
+"""Times the start file's error from which on a file errs by more. A fit to a record of the start file itself, with 1 mV
+of noise, ends at 1.02 times: it begins with films and double layers, and the priors hold it there."""
 FAR_SD = 3.0
 """Deviations of a prior from the literature, beyond which no cell is expected: that a fit ends there says something of
 the model. A convention. The double layers of the calibrated files of the repository ended within 2.9; discharges of an
@@ -116,17 +118,18 @@ class Calibration:
                 for start in against
             ),
             *(
-                f"{e.name}: the fit errs by more there than the start file; is it a record of the same cell, at the "
-                "same age and at the temperature that it was taken at?"
+                f"{e.name}: the fit errs by {MV_PER_V * e.after_v:.2f} mV there, the start file by "
+                f"{MV_PER_V * e.before_v:.2f} mV; is it a record of the same cell, at the same age and at the "
+                "temperature that it was taken at?"
                 for e in self.errors
-                if e.after_v > e.before_v
+                if e.after_v > NOTABLY * e.before_v
             ),
             *(
                 f"{e.name}: the file that is written errs by {MV_PER_V * e.simulated_v:.2f} mV there, the start file "
                 f"by {MV_PER_V * e.before_v:.2f} mV: what the fit has of this record alone (its capacity, its start, "
-                "its cycler's zero) is not in the file."
+                "its current sensor's offset) is not in the file."
                 for e in self.errors
-                if e.after_v <= e.before_v < e.simulated_v
+                if e.after_v <= NOTABLY * e.before_v < e.simulated_v
             ),
             *_stand_ins(self.model, self.x),
         )
@@ -175,10 +178,14 @@ def _stand_ins(model: Model, x: Array) -> tuple[str, ...]:
 
 
 def information_weights(model: Model, x: Array) -> Array:
-    """(rows + 2 frequencies + n,) factors on `Model.residual` that make it count as much as it says of its own.
+    """(rows + 2 frequencies + n,) factors on `Model.residual`, at most 1, that make it count as much as it says of its
+    own.
 
     What is left of a record after the fit repeats itself: n rows of first autocorrelation rho are as many as
-    n (1 - rho)/(1 + rho).
+    n (1 - rho)/(1 + rho). A record says no more than it counted for in the fit, however little is left of it: the
+    priors pulled the parameters against that weight, and intervals of a larger one lie about a point that is not
+    theirs. Of twelve drives of virtual cells with 1 mV of noise, which the fit counts 15 times less than that, 95 %
+    intervals of the whole weight left out the true diffusivity of the electrolyte eight times, those of the fit's none.
     """
     out = []
     for record, error, weight in zip(model.records, model.errors(x), model.weights, strict=True):
@@ -187,7 +194,8 @@ def information_weights(model: Model, x: Array) -> Array:
         centred = seen - seen.mean()
         rho = float(np.dot(centred[1:], centred[:-1]) / max(float(np.dot(centred, centred)), 1e-30))
         share = (1.0 - np.clip(rho, 0.0, 0.999)) / (1.0 + np.clip(rho, 0.0, 0.999))
-        out.append(np.sqrt(share) / scale / np.where(weight > 0.0, weight, 1.0))
+        own = np.sqrt(share) / scale / np.where(weight > 0.0, weight, 1.0)
+        out.append(np.minimum(own, 1.0))
     of_spectra = model.spectra.information_weights(model.cell_at(x))
     return np.concatenate([*out, of_spectra, np.ones(model.layout.size)])
 

@@ -74,8 +74,8 @@ def size_assumed(cell: Cell, measurements: Sequence[Measurement]) -> str:
     return (
         f"no record holds a full discharge (from {cell.upper_voltage_v - FULL_WINDOW_V:.4g} V or more to "
         f"{cell.lower_voltage_v + 2 * FULL_WINDOW_V:.4g} V or less, by the cut-offs of the start file): the size of "
-        f"the cell is taken from the start file, {cell.capacity_ah:.3g} Ah, and capacity, lithium and active material "
-        "are off by as much as that is, beyond their intervals."
+        f"the cell is taken from the start file, {cell.capacity_ah:.3g} Ah, and where that is wrong, capacity, lithium "
+        "and active material are wrong by the same factor, which their intervals do not include."
     )
 
 

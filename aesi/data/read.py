@@ -21,7 +21,7 @@ from aesi.data.channels.temperature import temperature_doubts
 from aesi.data.readers import open_table
 from aesi.data.readers.formats.format import Sign
 from aesi.data.readers.table import TableFile
-from aesi.data.reading import Duplicates, Reading, record_name
+from aesi.data.reading import Duplicates, Reading, column_name, record_name
 from aesi.data.resample import decimate
 from aesi.errors import InputError
 from aesi.records import Measurement
@@ -34,7 +34,7 @@ MAX_ROWS = 2_000_000
 
 def read_measurement(
     path: str | Path,
-    columns: Mapping[str, str | None] | None = None,
+    columns: Mapping[str, str | float | None] | None = None,
     sign: Sign | None = None,
     max_rows: int | None = MAX_ROWS,
     *,
@@ -51,7 +51,7 @@ def read_measurement(
 
     columns : quantity -> the file's name for it, for those not named time_s, current_a, voltage_v,
         temperature_degc (optional), as in BDF or as in a known cycler's export; None leaves the temperature out,
-        and a number states it, degC in every row.
+        and a number states it, in every row, in degC or as `units` says.
     sign : which direction of the file's current is positive; None: as the known export has it, else discharge.
         BDF's is charge positive.
     max_rows : more rows than this are decimated (interval averages); None keeps all.
@@ -69,7 +69,8 @@ def read_measurement(
             f"an object of type {type(path).__name__} is no file; what is in memory already is a record as "
             "aesi.Measurement(time_s, current_a, voltage_v)."
         )
-    given = dict(columns or {}) | ({} if state is None else {"state": state})
+    given = {quantity: column_name(name) for quantity, name in (columns or {}).items()}
+    given |= {} if state is None else {"state": state}
     reading = Reading(
         given,
         dict(units or {}),

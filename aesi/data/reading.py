@@ -36,7 +36,7 @@ class Reading:
     """What is said of files; everything else is told by their headers.
 
     columns : quantity, or `state`, `cycle`, `step` -> the file's name for it; None leaves out the temperature, or the
-        voltage of a current to simulate; a number states the temperature, degC in every row.
+        voltage of a current to simulate; a number states the temperature of every row, degC or as `units` says.
     units : quantity -> unit of the file's column (`mA`, `mV`, `ms`, `h`, `K`, `h:m:s`, `date`, a strptime pattern).
     sign : which direction of the file's current is positive; None: that of the export, else discharge.
     state_words : words of the state column -> charge, discharge or rest, where they are not known.
@@ -74,6 +74,11 @@ class Reading:
     def but(self, **changes: Any) -> Reading:
         """The same but for these."""
         return replace(self, **changes)
+
+
+def column_name(given: Any) -> Any:
+    """A column as it is given; a number, which states a temperature, as text."""
+    return str(given) if isinstance(given, int | float) and not isinstance(given, bool) else given
 
 
 def bounds(name: str, text: str | None) -> tuple[float, float] | None:

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from aesi.constants import COLDEST_DEGC, WARMEST_DEGC
-from aesi.data.channels.spectrum_columns import EXAMPLE, NEEDED, find_impedance
+from aesi.data import units
+from aesi.data.channels.spectrum_columns import EXAMPLE, NEEDED, find_impedance, find_temperature
 from aesi.data.readers import open_table
 from aesi.data.readers.table import TableFile, names_listed
 from aesi.data.reading import record_name
@@ -21,18 +22,26 @@ LABEL = "spectrum"
 STATES = ("soc", "discharged_ah")
 MOST_AGAIN = 1
 """Frequencies of one spectrum that come again: one of 27 measured ones has one twice."""
-SLOW_HZ = 1.0
-"""Below it a cell is capacitive: so are all 27 spectra measured of the Panasonic NCR18650PF, in each row."""
+SLOW_HZ = 10.0
+"""Up to it a cell is capacitive: all 27 spectra measured of the Panasonic NCR18650PF are below 1,067 Hz, in each row. A
+cell of a hundred times its size, with the inductance of longer leads, is so some decades lower still."""
+MOST_SOC = 0.01
+MOST_OF_NEXT = 0.1
+"""By which a state may move within a sweep, in state of charge, and as a share of its largest change from one spectrum
+to the next where nothing else tells them apart. Conventions: spectra are taken some per cent apart, and what flows in
+one is thousandths."""
 DESCRIBED = ("voltage_v", "temperature_degc", *STATES)
 
 
 def read_spectra(path: str | Path) -> tuple[Spectrum, ...]:
     """The spectra of a table with frequency_hz, z_real_ohm, z_imag_ohm, and soc or discharged_ah.
 
-    The first three may have an instrument's names with their units (`freq/Hz`, `Re(Z)/Ohm`, `-Im(Z)/Ohm`).
-    Rows belong to one spectrum as long as these states, and the names in a column `spectrum` where there is one, stay
-    the same; the imaginary part is negative where capacitive. voltage_v and temperature_degc are kept where they are
-    there, the temperature as the mean over the rows.
+    The first three, and the temperature, may have an instrument's names with their units (`freq/Hz`, `Re(Z)/Ohm`,
+    `-Im(Z)/Ohm`, `Temperature/°C`).
+    A spectrum ends where its state changes and the frequencies begin anew, or where the name in a column `spectrum`
+    changes: a state that is counted moves a little in each sweep, and its first row stands for all. The imaginary part
+    is negative where capacitive. voltage_v and temperature_degc are kept where they are there, the temperature as the
+    mean over the rows.
     Raises DataError naming file and column.
     """
     table = open_table(path)
@@ -41,11 +50,12 @@ def read_spectra(path: str | Path) -> tuple[Spectrum, ...]:
         raise DataError(f"{table.path.name}, column frequency_hz: a frequency has to be positive.")
     _check_temperature(columns, table)
     _check_capacitive(columns, table)
-    told_apart: list[AnyArray] = [columns[name] for name in STATES if name in columns]
     named = LABEL in table.header
-    if named:
-        told_apart += [np.array(words) for words in table.read_text((table.header.index(LABEL),))]
-    pieces = _pieces(told_apart)
+    labels = np.array(table.read_text((table.header.index(LABEL),))[0]) if named else None
+    pieces = _pieces(columns, labels)
+    for name in STATES:
+        if name in columns:
+            _check_one_state(name, columns[name], pieces, named, table)
     if not named:
         _check_swept_once(columns["frequency_hz"], pieces, table)
     name = record_name(table.path)
@@ -72,10 +82,16 @@ def _columns(table: TableFile) -> dict[str, Array]:
             f"{file} has {header.count(twice[0])} columns named {twice[0]!r}; rename all but one of them."
         )
     found |= {name: (header.index(name), 1.0) for name in DESCRIBED if name in header}
+    temperature = find_temperature(table)
+    if temperature is not None:
+        found["temperature_degc"] = temperature[0], 1.0
     numbers = table.read(tuple(place for place, _ in found.values()))
     columns = {name: factor * each for (name, (_, factor)), each in zip(found.items(), numbers, strict=True)}
     if not len(columns["frequency_hz"]):
         raise DataError(f"{file} has no row below its header; a spectrum needs at least one.")
+    if temperature is not None:
+        degc = units.to_si("temperature_degc", columns["temperature_degc"], temperature[1])
+        columns["temperature_degc"] = degc
     for name, values in columns.items():
         if not np.isfinite(values).all():
             row = int(np.flatnonzero(~np.isfinite(values))[0])
@@ -98,10 +114,10 @@ def _check_temperature(columns: dict[str, Array], table: TableFile) -> None:
 
 def _check_capacitive(columns: dict[str, Array], table: TableFile) -> None:
     """Raises DataError where the imaginary part is positive in all slow rows: written as in a plot of Nyquist, -Im."""
-    slow = np.flatnonzero(columns["frequency_hz"] < SLOW_HZ)
+    slow = np.flatnonzero(columns["frequency_hz"] <= SLOW_HZ)
     if slow.size and (columns["z_imag_ohm"][slow] > 0.0).all():
         raise DataError(
-            f"{table.path.name}, {table.where(int(slow[0]))}, column z_imag_ohm: it is positive in all rows below "
+            f"{table.path.name}, {table.where(int(slow[0]))}, column z_imag_ohm: it is positive in all rows up to "
             f"{SLOW_HZ:g} Hz, where a cell is capacitive and it has to be negative; if it holds -Im(Z), turn its sign."
         )
 
@@ -120,11 +136,51 @@ def _check_swept_once(frequency_hz: Array, pieces: Sequence[slice], table: Table
             )
 
 
-def _pieces(told_apart: Sequence[AnyArray]) -> list[slice]:
-    """Runs of rows over which each of the columns (n,) stays the same."""
-    changes = np.any([column[1:] != column[:-1] for column in told_apart], axis=0)
-    cuts = [0, *(np.flatnonzero(changes) + 1).tolist(), len(told_apart[0])]
-    return [slice(a, b) for a, b in pairwise(cuts)]
+def _check_one_state(name: str, state: Array, pieces: Sequence[slice], named: bool, table: TableFile) -> None:
+    """Raises DataError where a state moves within one sweep as from one spectrum to the next: rows of several spectra
+    are mixed then, or each belongs to another."""
+    change = np.abs(np.diff(state))
+    between = max((float(change[rows.start - 1]) for rows in pieces if rows.start), default=np.inf)
+    most = MOST_SOC if name == "soc" else np.inf
+    for rows in pieces:
+        away = np.abs(state[rows] - state[rows.start])
+        far = np.flatnonzero(away > min(most, np.inf if named else MOST_OF_NEXT * between))
+        if far.size:
+            row = rows.start + int(far[0])
+            raise DataError(
+                f"{table.path.name}, {table.where(row)}, column {name}: {state[row]:g}, where this sweep of the "
+                f"frequencies began at {state[rows.start]:g}; put the rows of one spectrum one after the other, at one "
+                f"state of charge, or name each spectrum in a column {LABEL}."
+            )
+
+
+def _pieces(columns: dict[str, Array], labels: AnyArray | None) -> list[slice]:
+    """The rows of each spectrum.
+
+    labels : (rows,) its name, where the file has any.
+    """
+    way = np.sign(np.diff(columns["frequency_hz"]))
+    moved = np.any([np.diff(columns[name]) != 0 for name in STATES if name in columns], axis=0)
+    renamed = np.zeros(len(way), dtype=bool) if labels is None else labels[1:] != labels[:-1]
+    cuts, swept = [0], 0.0  # swept: up or down, in the spectrum at hand
+    for k, step in enumerate(way):
+        if renamed[k] or (moved[k] and not _goes_on(way[k:], swept)):
+            cuts.append(k + 1)
+            swept = 0.0
+        else:
+            swept = swept or float(step)
+    return [slice(a, b) for a, b in pairwise([*cuts, len(columns["frequency_hz"])])]
+
+
+def _goes_on(way: Array, swept: float) -> bool:
+    """Whether the next step of the frequencies is one of the sweep at hand, whose way is 0 at its first row. One that
+    comes again in the midst of a sweep begins no other.
+
+    way : (n,) signs of this and the later steps.
+    """
+    if way[0]:
+        return not swept or bool(way[0] == swept)
+    return bool(swept) and len(way) > 1 and bool(way[1] == swept)
 
 
 def _spectrum(name: str, columns: dict[str, Array], rows: slice) -> Spectrum:

@@ -46,7 +46,14 @@ def _steady(data: Measurement, steps: BoolArray) -> bool:
 
 
 class Averages(Protocol):
-    """Which rows of a finer record one row stands for."""
+    """Which rows of a finer record one row stands for.
+
+    hold : how the current runs between those rows.
+    """
+
+    @property
+    def hold(self) -> Hold:
+        """Of the finer record."""
 
     def averages(self, column: Array) -> Array:
         """(m,) of a column (n,)."""

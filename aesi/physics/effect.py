@@ -23,7 +23,7 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 
 from aesi.errors import AesiError, NoNumberError, OwnEffectError, ParameterError
-from aesi.numerics.typing import Array
+from aesi.numerics.typing import Array, IntArray
 from aesi.over_time import stamp
 from aesi.parameters import Parameter, checked
 from aesi.physics.model import EspmModel
@@ -36,17 +36,90 @@ Refinement = Literal["discretisation", "reduction"]
 """Approximations between the declared porous electrode and what is solved."""
 
 
+SAME_INSTANT_S = 1e-6
+"""A reading this close to a row is of that row: t - lag is rounded, and a current that jumps there has two values."""
+SAME_LENGTH = 0.01
+"""Of a row: another that is as long but for this, as stamps jitter, moves the charge of this one under its current."""
+
+
 @dataclass(frozen=True, eq=False)
 class Record:
-    """What the cell saw: (n,) s, (n,) A discharge positive, (n,) K or None where the model finds it."""
+    """What the cell saw: (n,) s, (n,) A discharge positive, (n,) K or None where the model finds it.
+
+    read_s : (n,) s, when the voltage of each row was in truth at the terminals; None: with its current. Before the
+    first row the current is that of the first, behind the last that of the last.
+    """
 
     time_s: Array
     current_a: Array
     temperature_k: Array | None = None
+    read_s: Array | None = None
 
     def __post_init__(self) -> None:
         """What it holds becomes read-only views of what it is given."""
-        _lock(self, "time_s", "current_a", "temperature_k")
+        _lock(self, "time_s", "current_a", "temperature_k", "read_s")
+
+    def current_at(self, time_s: Array, backward: bool) -> Array:
+        """(m,) A at instants (m,) s.  backward : a row's current holds since the row before, else straight lines."""
+        if not backward:
+            return np.asarray(np.interp(time_s, self.time_s, self.current_a))
+        return np.asarray(self.current_a[self._row_of(time_s)])
+
+    def with_readings(self, backward: bool) -> tuple[Record, IntArray]:
+        """The same current with a row at each reading of the voltage too, and which rows (n,) these are.
+
+        Rows between readings are left out where the current just goes on.
+        """
+        read = self._snapped()
+        now, steps = self.current_a, np.diff(self.current_a) != 0.0
+        turns = np.append(steps, True)
+        if not backward:
+            turns[1:] |= steps
+        turns[0] = True
+        time = np.union1d(self.time_s[turns & (self.time_s < read.max())], read)
+        kelvin = None if self.temperature_k is None else np.interp(time, self.time_s, self.temperature_k)
+        now = self.current_at(time, backward)
+        return Record(time, now, kelvin), np.searchsorted(time, read)
+
+    def beside_voltage(self, backward: bool) -> Record:
+        """The record with one row a reading of the voltage, and the current that flowed there.
+
+        Of a current that is held, a row that is another than the one it is read in, as where a pulse begins after a
+        long row, has what moves its charge.
+        """
+        if self.read_s is None:
+            return self
+        read = self._snapped()
+        current = self.current_at(read, backward)
+        if backward and len(read) > 1:
+            within = self._row_of(read)[1:]
+            long_s = np.diff(self.time_s, prepend=-np.inf, append=np.inf)
+            long_s = np.where(read[1:] > self.time_s[-1], np.inf, long_s[within])
+            whole = np.abs(long_s - np.diff(read)) <= SAME_LENGTH * np.diff(read)
+            current[1:] = np.where(whole, current[1:], np.diff(self._charge(read)) / np.diff(read))
+        kelvin = self.temperature_k
+        return Record(read, current, None if kelvin is None else np.interp(read, self.time_s, kelvin))
+
+    def _snapped(self) -> Array:
+        """(n,) s, the readings, on a row where they are as good as there."""
+        assert self.read_s is not None
+        after = np.clip(np.searchsorted(self.time_s, self.read_s), 1, max(len(self.time_s) - 1, 1))
+        near = np.minimum(after, len(self.time_s) - 1)
+        before = after - 1
+        nearer = np.abs(self.time_s[before] - self.read_s) < np.abs(self.time_s[near] - self.read_s)
+        row = self.time_s[np.where(nearer, before, near)]
+        return np.where(np.abs(row - self.read_s) < SAME_INSTANT_S, row, self.read_s)
+
+    def _row_of(self, time_s: Array) -> IntArray:
+        """(m,) the row that is over at an instant or ends next."""
+        return np.minimum(np.searchsorted(self.time_s, time_s), len(self.time_s) - 1)
+
+    def _charge(self, time_s: Array) -> Array:
+        """(m,) A s that a held current has moved since the first row, up to instants (m,) s."""
+        since, now = self.time_s, self.current_a
+        moved = np.concatenate([[0.0], np.cumsum(now[1:] * np.diff(since))])
+        outside = now[0] * np.minimum(time_s - since[0], 0.0) + now[-1] * np.maximum(time_s - since[-1], 0.0)
+        return np.asarray(np.interp(time_s, since, moved) + outside)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +155,7 @@ class Contribution:
 class Effect:
     """One effect; `doc` is the docstring of its file: summary, equation, where it holds, source.
 
+    file, code : of a user's own, where it was read and what stood there.
     infers : the quantity that the effect supplies where it was not measured; with the measurement it has nothing to
     say and does not compete.
     refines : the approximation of the model itself that the effect takes back; it is settled before anything is sought
@@ -106,6 +180,7 @@ class Effect:
     on_voltage: Callable[..., Contribution] | None = None
     on_reading: Callable[..., Array] | None = None
     file: str | None = None
+    code: bytes | None = None
     infers: Measurable | None = None
     refines: Refinement | None = None
     of_design: bool = False
@@ -118,6 +193,11 @@ class Effect:
 
     def __repr__(self) -> str:
         return f"Effect({self.id!r}, {self.kind}, parameters {', '.join(self.parameters) or 'none'})"
+
+    @property
+    def kind_told(self) -> str:
+        """Its kind for a reader: what refines the discretisation alone is no fault of an instrument."""
+        return "numerics" if self.refines == "discretisation" else self.kind
 
     def activate(self, **values: float) -> ActiveEffect:
         """This effect with the given parameters, defaults elsewhere.
@@ -277,6 +357,7 @@ def _check_acted(effect: Effect, function: Callable[..., Any], given: Any, acted
         raise OwnEffectError(f"{effect.file}: {place} gives {what}, not {_article(wanted.__name__)}.")
     if isinstance(acted, Record):
         rows = {"time_s": acted.time_s, "current_a": acted.current_a, "temperature_k": acted.temperature_k}
+        rows["read_s"] = acted.read_s
         _check_rows(effect, place, {k: row for k, row in rows.items() if row is not None}, given.time_s)
     elif isinstance(acted, Contribution):
         states = {f"state {name!r}": state for name, state in acted.series.items()}

@@ -102,7 +102,7 @@ def initial_state(
         if soc0 is None:
             raise DataError(f"{record.name} has no voltage to start from; give --soc0.")
         return _given(record, soc0, None)
-    seen = _as_cell_saw(record, active)
+    seen = _as_cell_saw(record, active, hold)
     if unknown.any():
         seen = seen.take(slice(0, int(np.argmax(unknown))))
     start = _Start(cell, seen, hold, active, model, potentials_v, float(record.current_a[0]))
@@ -124,13 +124,15 @@ def initial_state(
     return start.read()
 
 
-def _as_cell_saw(record: Measurement, effects: tuple[ActiveEffect, ...]) -> Measurement:
+def _as_cell_saw(record: Measurement, effects: tuple[ActiveEffect, ...], hold: Hold) -> Measurement:
     """Each row's voltage beside what the cell saw there; the record itself where no effect acts on it."""
     if all(active.effect.on_record is None for active in effects):
         return record
     degc = record.temperature_degc
     kelvin = None if degc is None else degc + ZERO_CELSIUS_K
-    seen = as_cell_saw(Record(record.time_s, record.current_a, kelvin), effects)
+    seen = as_cell_saw(Record(record.time_s, record.current_a, kelvin), effects).beside_voltage(
+        hold == "backward"
+    )
     return replace(
         record,
         time_s=seen.time_s,
@@ -229,6 +231,8 @@ class _Start:
         if max(abs(settled_v - begins_v), settled_sd_v) > GOOD_READING_V:
             words += f", relaxing to {settled_v:.3f} +/- {settled_sd_v:.3f} V"
         words += f": state of charge {soc:.4f} +/- {sd:.4f}"
+        if self.open_circuit.potentials_v < READING_V:  # else it is taken for what a simulation starts from
+            words += " by potentials that are fitted with it"
         return f"{words}{'; give --soc0 if it is known' if sd > OTHER_STATE else ''}."
 
     def _rise_v(self, ocv_v: float, moved: float) -> float:

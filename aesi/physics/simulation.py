@@ -111,22 +111,30 @@ def simulate(
         soc0 = _soc_from_rest(changed, active, record.temperature_k, rest_voltage_v)
     else:
         soc0 = same_rest(cell, changed.cell, soc0)
-    if profiles or len(time) > MOST_ROWS:
-        rows, further, fault_at, fault = _solved(solve, changed, record, soc0, hold)
+    backward = hold == "backward"
+    solved, read = (record, None) if record.read_s is None else record.with_readings(backward)
+    if profiles or len(solved.time_s) > MOST_ROWS:
+        rows, further, fault_at, fault = _solved(solve, changed, solved, soc0, hold)
     else:
-        known = _remembered(model, changed, _KeyedRecord.of(record), soc0, hold)
+        known = _remembered(model, changed, _KeyedRecord.of(solved), soc0, hold)
         rows, further, fault_at, fault = _copied(known)
+    series = _series(changed.cell, rows) | further
+    written_at = fault_at if read is None or fault_at < 0 else int(np.searchsorted(read, fault_at))
     if fault_at >= 0 and on_depletion == "raise":
         kelvin = float(further["temperature_k"][fault_at])
+        own = slice(None) if read is None else read
         raise SimulationError(
-            depletion.sentence(changed, time, record.current_a, kelvin, rows, fault_at, fault)
+            depletion.sentence(changed, time, solved.current_a[own], kelvin, rows[:, own], written_at, fault)
         )
-    series = _series(changed.cell, rows) | further
     if on_depletion == "clip":
-        series["depleted"] = _depleted(fault_at, len(time))
-    voltage = _voltage_effects(changed, active, record, rows[0], series, hold)
+        series["depleted"] = _depleted(fault_at, len(solved.time_s))
+    voltage = _with_effects_in_series(changed, active, solved, rows[0], series, backward)
+    if read is not None:
+        voltage, series = voltage[read], {name: values[read] for name, values in series.items()}
+        across = across and {name: of[read] if of.ndim == 2 else of for name, of in across.items()}
+    voltage = _as_read(changed, active, record.beside_voltage(backward), voltage, series, backward)
     if fault_at >= 0:
-        _check_solved(time, voltage, fault_at)
+        _check_solved(time, voltage, written_at)
     return Run(time, current, voltage, series, across or {})
 
 
@@ -254,28 +262,40 @@ def _check_solved(time: Array, voltage: Array, fault_at: int) -> None:
     )
 
 
-def _voltage_effects(
+def _with_effects_in_series(
     model: EspmModel,
     effects: Sequence[ActiveEffect],
     record: Record,
     voltage: Array,
     series: dict[str, Array],
-    hold: Hold,
+    backward: bool,
 ) -> Array:
-    """(n,) V, what the instrument reads: the model's voltage, then all effects on it, then those on the reading.
+    """(n,) V at the terminals: the model's voltage, then all effects on it.
 
     series : is given the states that the effects bring.
     """
     for active in effects:
         if active.effect.on_voltage is not None:
-            trace = Trace(model, record.time_s, record.current_a, voltage, series, hold == "backward")
+            trace = Trace(model, record.time_s, record.current_a, voltage, series, backward)
             added = active.act(active.effect.on_voltage, trace)
             check_states(active.effect, added, trace)
             voltage = voltage + added.voltage_v
             series.update(added.series)
+    return voltage
+
+
+def _as_read(
+    model: EspmModel,
+    effects: Sequence[ActiveEffect],
+    record: Record,
+    voltage: Array,
+    series: dict[str, Array],
+    backward: bool,
+) -> Array:
+    """(n,) V, what the instrument writes of the voltage at the terminals.  record : one row a reading."""
     for active in effects:
         if active.effect.on_reading is not None:
-            trace = Trace(model, record.time_s, record.current_a, voltage, series, hold == "backward")
+            trace = Trace(model, record.time_s, record.current_a, voltage, series, backward)
             voltage = active.act(active.effect.on_reading, trace)
     return _own(voltage)
 

@@ -57,8 +57,8 @@ def temperature_sentence(cell: Cell, record: Measurement, effects: Sequence[Acti
     degc = cell.initial_temperature_k - ZERO_CELSIUS_K
     beside = f" and {inferred} {'change' if several else 'changes'} it" if inferred else ""
     return (
-        f"{record.name}: no temperature in it; taken at {degc:.4g} degC, as the cell's file declares{beside}; "
-        "a column temperature_degc says another."
+        f"{record.name}: no temperature column; taken at {degc:.4g} degC, as the cell's file declares{beside}; "
+        "for another one add a column temperature_degc, or give --column temperature_degc=40."
     )
 
 

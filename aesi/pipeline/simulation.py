@@ -102,6 +102,7 @@ def simulate_file(
     declared = declared_model(cell).with_soh(asked.soh)
     if declared.correction is not None:
         say(["the saved model's learnt correction is no part of a simulation; `aesi predict` has it."])
+        declared = replace(declared, finding="")  # it is of the model with its correction
     say([*of_another_model(declared, model), *of_day(declared.cell, asked.soh)])
     saved, lone = cell.is_dir(), profile.voltage_v is None
     assumed = declared.hold if saved else "linear" if lone else assumed_hold(profile.time_s)
@@ -271,8 +272,8 @@ def _with_effects(record: Measurement, model: HybridModel) -> list[str]:
     )
     beside = [id for id in (acting | held) if id in model.beside]
     said = [f"with {', '.join(told)}"] if told else []
-    said += [f"by a cell whose values hold {', '.join(inside)}"] if inside else []
-    said += [f"with what was fitted beside: {', '.join(beside)}"] if beside else []
+    said += [f"the saved model includes {', '.join(inside)}"] if inside else []
+    said += [f"and other parameters that were fitted together: {', '.join(beside)}"] if beside else []
     return [f"{record.name}: {'; '.join(said)}."] if said else []
 
 
@@ -318,7 +319,9 @@ def _beside_physics(record: Measurement, corrected_mv: float, alone_v: Array | N
     if alone_v is None:
         return ""
     alone, ours = f"{rms(MV_PER_V * (record.voltage_v - alone_v)):.2f}", f"{corrected_mv:.2f}"
-    better = ": without the correction this record is met better" if float(alone) < float(ours) else ""
+    better = (
+        ": without the correction the error on this record is lower" if float(alone) < float(ours) else ""
+    )
     return f"; the physics alone {alone} mV RMSE{better}"
 
 
@@ -354,7 +357,11 @@ def _of_first(record: Measurement, prediction: Prediction, model: HybridModel, m
         return []
     error_v = float(record.voltage_v[0] - prediction.physics_v[0])
     if np.isfinite(error_v):
-        return [f"{record.name}: begins with the error of its first voltage, {MV_PER_V * error_v:+.1f} mV."]
+        side = "below" if error_v < 0.0 else "above"
+        return [
+            f"{record.name}: its first voltage is {MV_PER_V * abs(error_v):.1f} mV {side} the model's; the prediction "
+            "starts with that error."
+        ]
     words = "begins with what the correction says of it, since no voltage is measured there"
     return [f"{record.name}: {words}; the band is that of a whole drive from its first row on."]
 

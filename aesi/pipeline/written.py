@@ -11,7 +11,7 @@ from typing import Literal
 
 MODEL = "model"
 """The folder of the model within a folder of results."""
-OF_MODEL = (".json", ".npz")
+OF_MODEL = (".json", ".npz", ".py")
 """Endings of the files in the model's folder."""
 HEAD, ARRAYS, EFFECTS = "model.json", "arrays.npz", "effects"
 """Files of a saved model: its head, its arrays, and the part (a JSON file of that name) that tells its effects."""

@@ -18,6 +18,7 @@ KINDS = {
     "physics": "Physics the model lacks",
     "parameter": "Parameters that may be declared wrongly",
     "instrument": "Instrument faults that imitate physics",
+    "numerics": "Numerics of the declared model",
 }
 
 BENCH = re.compile(r"<!-- generated: bench (?P<name>\w+) -->")
@@ -36,7 +37,7 @@ def catalogue() -> str:
     """Every effect of the catalogue, by kind: all in short, then each by itself."""
     from aesi.physics.effects import CATALOGUE
 
-    kinds = {title: [e for e in CATALOGUE.values() if e.kind == kind] for kind, title in KINDS.items()}
+    kinds = {title: [e for e in CATALOGUE.values() if e.kind_told == kind] for kind, title in KINDS.items()}
     parts = ["| effect | what it is |", "|---|---|"]
     for title, effects in kinds.items():
         parts += [f"| **{title}** | |", *(f"| [{e.id}](#{e.id}) | {e.summary} |" for e in effects)]

@@ -42,8 +42,7 @@ class Cache:
             write_whole(path, codec.dumps(result))
         except codec.Uncodable:  # a fitted object of another library would be unsafe to unpickle
             self._say(
-                f"{stage}: done, but no result that can be stored: where this run is stopped and resumed, it is "
-                "computed again"
+                f"{stage}: done (not stored: where this run is stopped and resumed, it is computed again)"
             )
         except OSError as error:
             self._say(f"cache: the result of {stage!r} could not be stored ({error.strerror or error}).")

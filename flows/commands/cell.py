@@ -33,8 +33,8 @@ def simulate(
         bool,
         typer.Option(
             "--run-on",
-            help="Go on where a particle's surface or the electrolyte runs empty or full: kinetics are held there, "
-            "open-circuit potentials go on at 10 V per unit of stoichiometry, as of no cell; from when is said.",
+            help="Continue past depletion of a particle's surface or of the electrolyte. The voltage is not physical "
+            "from then on; a message gives the time.",
         ),
     ] = False,
 ) -> None:
@@ -222,12 +222,13 @@ def discover(
         Path | None, typer.Option(help="Folder for discovery.json, report.html and model/.")
     ] = None,
     test: Annotated[
-        list[Path] | None, typer.Option("--test", help="Measurement that chooses nothing; may be repeated.")
+        list[Path] | None,
+        typer.Option("--test", help="Held-out measurement, for the error alone; may be repeated."),
     ] = None,
     good: Annotated[
         list[Path] | None,
         typer.Option(
-            "--good", help="Record of the cell that is known to be good: what do the others have beside it?"
+            "--good", help="Known-good record of the same cell; the answer is how --data differs from it."
         ),
     ] = None,
     soc0: options.Soc0 = None,
@@ -247,7 +248,7 @@ def discover(
     only: Annotated[
         list[str] | None,
         typer.Option(
-            "--only", help="Try this effect alone; may be repeated. What else it stands for is held."
+            "--only", help="Try only this effect; may be repeated. Parameters of all others stay as declared."
         ),
     ] = None,
     without: Annotated[
@@ -257,7 +258,8 @@ def discover(
         Literal["espm", "dfn"] | None,
         typer.Option(
             "--model",
-            help="Single particle or porous electrode; without it the porous electrode where the two differ notably.",
+            help="Single particle or porous electrode. Without it, where the two differ notably, both are searched, "
+            "and the one that explains the data with fewer or likelier names is taken.",
         ),
     ] = None,
     overrides: Annotated[

@@ -84,7 +84,7 @@ HoldOption = Annotated[
         "--hold",
         help="How the current runs between rows. linear: straight; backward: constant since the row before, as loggers "
         "write. Without it that of a saved model; elsewhere backward where rows come more than 5 s apart, but linear "
-        "for a profile without a voltage. What was taken is said.",
+        "for a profile without a voltage. A message states which was used.",
     ),
 ]
 
@@ -124,7 +124,7 @@ ModelOption = Annotated[
 ]
 
 MaxEffects = Annotated[int, typer.Option("--max-effects", min=0, max=10, help="Most effects that are added.")]
-Seed = Annotated[int, typer.Option("--seed", min=0, help="Of what is drawn at random.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Random seed.")]
 StoreUri = Annotated[str | None, typer.Option("--uri", help="Tracking store; the workspace's without it.")]
 
 PrefectOption = Annotated[

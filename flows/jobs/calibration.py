@@ -30,7 +30,7 @@ def calibrate(
 
     def stands(steps: int, left: float) -> None:
         console.count(
-            "steps of the fit", steps, started_s, f"{100.0 * left:.3g} % of the start's misfit left"
+            "steps of the fit", steps, started_s, f"at {100.0 * left:.3g} % of the starting point's cost"
         )
 
     content = calibrate_files(cell, measurements, out, request, stands)

@@ -1,6 +1,5 @@
 """An effect of the user's own, from its file, goes wherever an effect of the catalogue goes."""
 
-import json
 import pickle
 import re
 import subprocess
@@ -165,10 +164,30 @@ def test_two_files_with_one_id_are_refused(file, tmp_path):
         known_effects([file, other])
 
 
-def test_the_saved_model_names_the_file(file, cell, tmp_path):
-    aesi.HybridModel(cell, (load_effect(file).activate(),), soc0=SOC0).save(tmp_path / "model")
-    (saved,) = json.loads((tmp_path / "model" / "effects.json").read_text())
-    assert saved["file"] == str(file)
+def test_a_saved_model_followed_the_edits_of_its_effect_and_could_not_be_moved(cell, tmp_path):
+    own = tmp_path / "mine.py"
+    own.write_text(OWN)
+    aesi.HybridModel(cell, (load_effect(own).activate(lead_ohm=LEAD_OHM),), soc0=SOC0).save(
+        tmp_path / "model"
+    )
+    own.write_text(OWN.replace("-lead_ohm", "-2 * lead_ohm"))
+    (tmp_path / "model").rename(tmp_path / "moved")
+    time_s, current_a = np.arange(60.0), np.full(60, 30.0)
+    plain = aesi.simulate(cell, time_s, current_a, SOC0).voltage_v
+    for copied in ("moved", "again"):
+        model = aesi.HybridModel.load(tmp_path / copied)
+        assert model.predict(time_s, current_a).voltage_v == pytest.approx(
+            plain - LEAD_OHM * current_a, abs=1e-9
+        )
+        model.save(tmp_path / "again")
+        own.unlink(missing_ok=True)
+
+
+def test_an_effect_that_was_edited_in_a_saved_model_is_refused(file, cell, tmp_path):
+    folder = aesi.HybridModel(cell, (load_effect(file).activate(),), soc0=SOC0).save(tmp_path / "model")
+    (folder / "lead.py").write_text(OWN.replace("-lead_ohm", "-2 * lead_ohm"))
+    with pytest.raises(InputError, match=r"lead\.py was edited since the model was saved with it"):
+        aesi.HybridModel.load(folder)
 
 
 @pytest.mark.parametrize(

@@ -78,3 +78,49 @@ def test_how_often_a_measured_cell_by_itself_is_unknown(page):
     told = re.search(r"(\d+) (?:of \d+ )?(?:are |were )?found(?:,| and) (\d+) none", said)
     assert told
     assert [int(told[1]), int(told[2])] == [beside.count("found"), beside.count("none")]
+
+
+@pytest.mark.parametrize("page", PAGES[:3])
+def test_how_often_a_verdict_beside_a_known_good_record_is_right(page):
+    """They were told as how often each was given, which reads as how often it is right."""
+    rows = cases("aesi bench real") + cases("aesi bench real, archive")
+    beside = [row for row in rows if not row["declared, mV"]]
+    right = [
+        sum(row["verdict"].startswith(verdict) and row["right"] == "yes" for row in beside)
+        for verdict in ("found", "none")
+    ]
+    wrong = [row["about"] for row in beside if row["verdict"] == "none" and row["right"] == "no"]
+    said = text_of(page)
+    told = re.search(r"\b(\d+) (?:of 10|of these) found(?:,|\.| and) (\d+) (?:of 10|of these) none", said)
+    assert told
+    assert [int(told[1]), int(told[2])] == right
+    assert len(wrong) == 6
+    sizes = {"current gain": [], "voltage offset": [], "voltage lag": []}
+    for about in wrong:
+        kind, _, size = about.rpartition(" ")
+        sizes[kind].append(float(size))
+    gains, offsets, lags = sizes.values()
+    assert (
+        f"a current gain of {100 * (min(gains) - 1):.0f} to {100 * (max(gains) - 1):.0f} %, a voltage offset of "
+        f"{1e3 * min(offsets):.0f} to {1e3 * max(offsets):.0f} mV or a lag of {lags[0]:g} s" in said
+    )
+
+
+@pytest.mark.parametrize("page", PAGES[:3])
+def test_how_often_a_name_that_is_no_temperature_is_right(page):
+    rows = cases("aesi bench real") + cases("aesi bench real, archive")
+    named = [row for row in rows if row["declared, mV"] and ":" in row["verdict"]]
+    others = [row["right"] == "yes" for row in named if "ambient_temperature" not in row["verdict"]]
+    assert f"{sum(others)} of {len(others)}" in text_of(page)
+    assert all(row["right"] == "yes" for row in named if "ambient_temperature" in row["verdict"])
+    before = [row for row in cases("aesi bench real") if row["about"].startswith("temperature withheld")]
+    found = sum(row["right"] == "yes" for row in before)
+    assert f"{found} of {len(before)} records before" in text_of(page)
+
+
+@pytest.mark.parametrize("page", PAGES[1:])
+def test_how_often_several_unaltered_records_of_a_cell_get_a_name(page):
+    verdicts = [row["verdict"] for row in cases("aesi bench left_out")]
+    named = sum(":" in verdict for verdict in verdicts)
+    said = text_of(page)
+    assert f"together {named} of {len(verdicts)}" in said or f"In {named} of them an effect is named" in said

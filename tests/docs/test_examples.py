@@ -1,13 +1,15 @@
 """Every Python and console block of the README and the documentation, run in the order of its page.
 
 A page runs in one working folder and one namespace. Jobs that take minutes run as smaller ones of the same
-kind; nothing else about the text is changed.
+kind; nothing else about the text is changed. A block of text below a console block shows lines of its output, whose
+words are compared; figures may differ from machine to machine.
 """
 
 import contextlib
 import doctest
 import io
 import os
+import re
 import subprocess
 import sys
 from importlib.util import module_from_spec, spec_from_file_location
@@ -74,7 +76,12 @@ def test_all_examples_of_a_page_run(page, workspace, request):
 
 def _run_page(page, request, slow):
     namespace = {"__name__": "__main__"}
+    said = None
     for block in blocks(page):
+        if block.language == "text" and said is not None:
+            _require_words(block.body, said, f"{_name(page)}, line {block.line}")
+        if block.is_tested:
+            said = None
         if not block.is_tested or "skip" in block.directives or ("slow" in block.directives and not slow):
             continue
         if "needs" in block.directives:
@@ -87,7 +94,7 @@ def _run_page(page, request, slow):
         elif block.language == "python":
             _run_python(block.body, where, namespace)
         else:
-            _run_console(block.body, where)
+            said = _run_console(block.body, where)
 
 
 def _require_ignored(workspace):
@@ -122,9 +129,23 @@ def _run_python(body, where, namespace):
     namespace.update(test.globs)
 
 
+def _require_words(shown, said, where):
+    """Each line that a page shows is one of those that its commands wrote, whatever its figures."""
+    words = {_without_figures(line) for line in said.splitlines()}
+    missing = [line for line in shown.splitlines() if line != "..." and _without_figures(line) not in words]
+    assert not missing, f"{where} shows\n{missing}\nof\n{said}"
+
+
+def _without_figures(line):
+    return re.sub(r"[-+]?\d[\d.,]*", "#", line.strip())
+
+
 def _run_console(body, where):
+    """What the commands of a block wrote; None where one of them stood in for another."""
+    said, stands_in = "", False
     for command, shown in _session(body):
         for long, short in STAND_INS.items():
+            stands_in |= long in command
             command = command.replace(long, short)
         done = subprocess.run(command, shell=True, capture_output=True, text=True, timeout=SECONDS)
         assert done.returncode == 0, f"{where}: {command}\n{done.stdout[-2000:]}\n{done.stderr[-4000:]}"
@@ -133,6 +154,8 @@ def _run_console(body, where):
                 shown, done.stdout, doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
             )
             assert matches, f"{where}: {command}\nsays\n{done.stdout}\nnot\n{shown}"
+        said += done.stdout + done.stderr
+    return None if stands_in else said
 
 
 def _session(body):

@@ -31,7 +31,8 @@ def test_holds_within_bins_and_minutes(pieces, name: str) -> None:
         scores = scores_of(calibrated.intervals(residual, current), residual, 0.1, current, soc, dt_s=1.0)
         # 1,800 samples whose misses the adaptive step spaces out: the share scatters by less than a per cent.
         assert 0.88 <= scores.coverage <= 0.925
-        assert scores.worst_bin_coverage >= 0.85
+        # Some eight bins of little more than 200 samples, each of which scatters by 2 %: four of these below 90 %.
+        assert scores.worst_bin_coverage >= 0.82
         assert scores.low_minutes <= 0.01
 
 

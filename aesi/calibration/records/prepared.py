@@ -153,7 +153,7 @@ def with_temperatures(
         else:
             declared = cell.initial_temperature_k - ZERO_CELSIUS_K
             notes.append(
-                f"{record.name}: no temperature in it; taken at {declared:.4g} degC, as the cell's file declares; "
+                f"{record.name}: no temperature column; taken at {declared:.4g} degC, as the cell's file declares; "
                 "its own can be given (--temperature FILE=DEGC)."
             )
         out.append(record)

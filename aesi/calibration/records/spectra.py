@@ -26,6 +26,8 @@ degC, fitted beside its C/20, its pulses and a 1C discharge, are missed by 6 to 
 degC, which were not fitted, are missed by 13.4 % instead of 15.7, and five of its drives by between 1.0 mV less and
 0.4 mV more than without them."""
 
+MOST_SOC_SAID = 2.0
+"""A state of charge above it is in percent; one a little above 1 is of a cell that was overcharged. A convention."""
 MOST_CAPACITIES = 10.0
 """Most charge, in capacities of the cell, that may have been discharged where a spectrum was taken. A convention: a
 record scales a start file to a cell of another size, and a charge in mAh is a thousand times too large."""
@@ -89,6 +91,12 @@ def check_spectra(cell: Cell, spectra: Sequence[Spectrum]) -> None:
                 f"{spectrum.name}: {spectrum.discharged_ah:.4g} A.h were discharged of a cell of "
                 f"{cell.nominal_capacity_ah:.3g} A.h; discharged_ah is in A.h, so that 500 mA.h are 0.5."
             )
+    percent = [s for s in spectra if s.soc is not None and s.soc > MOST_SOC_SAID]
+    if percent:
+        raise DataError(
+            f"{percent[0].name}: its state of charge of {percent[0].soc:.4g} is not between 0 and 1 (50 % is 0.5): "
+            "it is in percent, and so are the others of its file."
+        )
     beyond = [s for s in spectra if s.soc is not None and not 0.0 <= s.soc <= 1.0]
     if spectra and len(beyond) == len(spectra):
         raise DataError(

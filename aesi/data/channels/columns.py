@@ -12,6 +12,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 
+import numpy as np
+
 from aesi.data import units
 from aesi.data.channels import headers
 from aesi.data.readers.formats.format import Sign
@@ -76,7 +78,7 @@ def map_columns(
     """Find the quantities among the names of a table's columns.
 
     columns : quantity or selector -> name, or None to leave it out; goes before the known names. For the temperature
-    also a number, degC in every row, where no column is called so.
+    also a number, of every row, in degC or the declared unit, where no column is called so.
     declared : quantity -> unit, as the user says; goes before what names and formats say, but may not contradict a
     name's unit that is not SI.
     required : what has to be there; the rest is found where it is.
@@ -133,8 +135,7 @@ class _Finder:
                 self.notes.append(f"{quantity} was left out as asked.")
                 return True
             if quantity == "temperature_degc" and NUMBER.fullmatch(name) and name not in self._table.header:
-                self._stated_degc = float(name)
-                self.notes.append(f"{quantity} is {name} in every row, as stated.")
+                self._state(float(name), name)
                 return True
             self.position[quantity] = self._named(name, quantity)
             if name != quantity:
@@ -147,6 +148,14 @@ class _Finder:
             self._set_unit(quantity, "")
             return True
         return self.of_maker(quantity) or self._of_bdf(quantity)
+
+    def _state(self, temperature: float, name: str) -> None:
+        """Take a temperature for all rows, in the unit that was declared."""
+        si = units.SI["temperature_degc"]
+        unit = self.unit["temperature_degc"] = self._declared.get("temperature_degc", si)
+        self._stated_degc = float(units.to_si("temperature_degc", np.array([temperature]), unit)[0])
+        converted = "" if unit == si else f" {unit}, {self._stated_degc:.5g} {si},"
+        self.notes.append(f"temperature_degc is {name}{converted} in every row, as stated.")
 
     def missing(self, quantities: list[str]) -> DataError:
         """The sentence that says what is not there, and the options that would map it."""
@@ -178,7 +187,7 @@ class _Finder:
                     f"{self._file}: column {self._table.header[place]!r} cannot be both {seen[place]} and {quantity}."
                 )
             seen[place] = quantity
-        for quantity in sorted(self._declared.keys() - self.position.keys()):
+        for quantity in sorted(self._declared.keys() - self.position.keys() - self.unit.keys()):
             if self.given.get(quantity, quantity) is not None:
                 self.notes.append(
                     f"A unit was declared for {quantity} ({self._declared[quantity]}), and there is no such column."
@@ -240,6 +249,15 @@ class _Finder:
         found = form.find(quantity, self._table.header) if form else None
         if found is None:
             return False
+        name = self._table.header[found[0]]
+        self._only([i for i, there in enumerate(self._table.header) if _plain(there) == _plain(name)])
+        other = form.to_subtract(quantity, found[0], self._table.header) if form else None
+        if other is not None:
+            raise DataError(
+                f"{self._file}: {name!r} and {other!r} are potentials against a reference, and {quantity} of the cell "
+                f"is their difference; export it as a column of its own, or, if {name!r} is the whole cell's, say so: "
+                f"{headers.of_column(quantity, name)}."
+            )
         self.position[quantity], unit = found
         self._set_unit(quantity, unit)
         if quantity in QUANTITIES:

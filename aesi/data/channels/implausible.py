@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
+from scipy.optimize import nnls
 
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.data import units
@@ -69,6 +70,11 @@ VOLTAGE_TREND_V = 0.05
 """A voltage that moves by less than this along the test has no trend."""
 TREND_POINTS = 200
 """Strides that a record is cut into, over which noise averages out."""
+EXPLAINED_SHARE, UNEXPLAINED_SHARE = 0.25, 0.1
+"""Of what the voltage moves between the means of these strides: explained as by the other sign of the current at least,
+and by the declared one at most. Of 296 measured and virtual records, and 440 simulated ones of smooth currents written
+to 0.1 to 10 mV, none has both; with the other sign 329 of the latter do, the rest are currents that only fall, and some
+that move the voltage by less than its noise."""
 
 
 def check_scale(columns: Columns, context: Context) -> None:
@@ -173,7 +179,7 @@ def check_signed(columns: Columns, context: Context, header: Sequence[str]) -> N
 
 
 def check_sign(columns: Columns, context: Context, advice: str) -> None:
-    """Discharge lowers the voltage: at steps of the current, or else along the test.
+    """Discharge lowers the voltage: at steps of the current, or else along the test, or over its strides.
 
     advice : what the user can do about it, from '; ' on.
     """
@@ -183,6 +189,9 @@ def check_sign(columns: Columns, context: Context, advice: str) -> None:
     else:
         trend = _trend(columns)
         contradicts, evidence = trend > CLEAR_CORRELATION, "along the test"
+        if abs(trend) <= CLEAR_CORRELATION:
+            right, other = _explained(columns, -1.0), _explained(columns, 1.0)
+            contradicts = other > EXPLAINED_SHARE and right < UNEXPLAINED_SHARE
     if contradicts:
         row = int(np.argmax(np.abs(np.diff(columns["current_a"])))) + 1
         raise DataError(
@@ -302,3 +311,22 @@ def _following(columns: Columns, rows: slice) -> float:
     if int(np.sum(held)) < ENOUGH_ROWS or abs(along) < VOLTAGE_TREND_V:
         return 0.0
     return along / float(np.sum(np.abs(moved)))
+
+
+def _explained(columns: Columns, sign: float) -> float:
+    """Share of what the voltage moves between the means of strides that a resistance and a capacity explain, neither
+    below nought, by which it follows a current of this sign (-1 as declared).
+
+    Of currents without steps: from row to row they move the voltage by less than its last digit.
+    """
+    time, current, voltage = columns["time_s"], columns["current_a"], columns["voltage_v"]
+    stride = max(1, len(time) // TREND_POINTS)
+    charge = np.concatenate([[0.0], np.cumsum(current[1:] * np.diff(time))])
+    whole = len(time) // stride * stride
+    moved = [np.diff(each[:whole].reshape(-1, stride).mean(axis=1)) for each in (current, charge, voltage)]
+    sizes = [float(np.linalg.norm(each)) for each in moved]
+    if len(moved[0]) < ENOUGH_ROWS or not all(sizes):
+        return 0.0
+    by_current, by_charge, answer = (each / size for each, size in zip(moved, sizes, strict=True))
+    _, left = nnls(sign * np.column_stack([by_current, by_charge]), answer)
+    return 1.0 - float(left) ** 2

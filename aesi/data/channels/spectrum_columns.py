@@ -1,4 +1,5 @@
-"""Which column of a file holds frequency and impedance: under this project's name, or under one that says its unit."""
+"""Which column of a file holds frequency, impedance and temperature: under this project's name, or under one that says
+its unit."""
 
 from __future__ import annotations
 
@@ -6,8 +7,10 @@ import re
 import unicodedata
 from collections.abc import Sequence
 
+from aesi.data import units
+from aesi.data.channels import headers
 from aesi.data.channels.headers import UNIT
-from aesi.data.readers.table import TableFile
+from aesi.data.readers.table import TableFile, names_listed
 from aesi.errors import DataError
 
 NEEDED = ("frequency_hz", "z_real_ohm", "z_imag_ohm")
@@ -37,6 +40,36 @@ def find_impedance(table: TableFile) -> dict[str, tuple[int, float]]:
 def find_frequency(table: TableFile) -> tuple[int, float] | None:
     """Position and factor to Hz of the frequency alone; raises as `find_impedance`."""
     return _with_factors(table, NEEDED[:1]).get("frequency_hz")
+
+
+def find_temperature(table: TableFile) -> tuple[int, str] | None:
+    """Position and unit of the cell's temperature; None where no column looks like one.
+
+    Raises DataError where it cannot be told which is the cell's, or in what unit it is: nothing else says at what
+    temperature a spectrum was taken, and a model at another is off by tens of per cent.
+    """
+    if "temperature_degc" in table.header:
+        own = [place for place, name in enumerate(table.header) if name == "temperature_degc"]
+        return _only(table, own), units.SI["temperature_degc"]
+    like = headers.temperatures(table.header)
+    if not like:
+        return None
+    name = headers.nearest("temperature_degc", like)
+    if name is None or len(like) > 1:
+        raise DataError(
+            f"{table.path.name}: {names_listed(like)} may be the cell's temperature; call the one that is "
+            "temperature_degc (in degC), or remove what is none."
+        )
+    place = table.header.index(name)
+    unit = headers.unit_of("temperature_degc", name) or units.spelt(
+        "temperature_degc", table.units[place] if table.units else ""
+    )
+    if unit is None:
+        raise DataError(
+            f"{table.path.name}: {name!r} says no known unit; write it behind the name, as in Temperature/degC "
+            "(also K, degF), or remove the column."
+        )
+    return place, unit
 
 
 def _with_factors(table: TableFile, quantities: Sequence[str]) -> dict[str, tuple[int, float]]:

@@ -100,6 +100,22 @@ def _is_number(cell: str) -> bool:
     return bool(NUMBER.fullmatch(cell.strip()) or WITH_COMMA.fullmatch(cell.strip()))
 
 
+def separator_of(line: str, below: Sequence[str]) -> str:
+    """What separates the cells of a line: of several, one between which it or a line below has two numbers, and commas
+    in numbers alone, which are decimal ones then; else the most frequent. Counted, decimal commas and those of names
+    (`Zeit, s`) outnumber the tabs between them.
+    """
+    for separator in SEPARATORS.replace(",", ""):
+        if separator in line and any(_is_row_of_numbers(split(each, separator)) for each in (line, *below)):
+            return separator
+    return max(SEPARATORS, key=line.count)
+
+
+def _is_row_of_numbers(cells: Sequence[str]) -> bool:
+    with_comma = [cell for cell in cells if "," in cell]
+    return sum(map(_is_number, cells)) >= 2 and all(map(_is_number, with_comma))
+
+
 def split(line: str, separator: str) -> list[str]:
     """The cells of a line; none where it cannot be split."""
     try:

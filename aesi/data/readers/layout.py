@@ -6,18 +6,18 @@ import codecs
 import csv
 import io
 import re
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
 from aesi.data.readers.formats.format import Format
 from aesi.data.readers.heading import (
     LINES_LOOKED_AT,
     NUMBER,
-    SEPARATORS,
     WITH_COMMA,
     find_heading,
     first_of_numbers,
     likely_heading,
+    separator_of,
     split,
 )
 from aesi.data.readers.table import SHOWN
@@ -44,6 +44,7 @@ LONE_NUL = re.compile(rb"^\x00(?=\r?$)", re.MULTILINE)
 class Layout:
     """How a text table is written: what a look at its head tells.
 
+    decimal : '' where the lines that were looked at hold whole numbers alone.
     layer : empty cells that a row of this table begins with, in a report that holds those of cycles and steps too.
     """
 
@@ -87,7 +88,7 @@ def layout_of(text: str, encoding: str, *, whole: bool, name: str, wanted: Colle
     if not whole:
         lines = lines[:-1]  # the last one may be cut by the size of the look
     notes: list[str] = []
-    rows = [_cells(line) for line in lines[:LINES_LOOKED_AT]]
+    rows = [_cells(lines, at) for at in range(min(len(lines), LINES_LOOKED_AT))]
     heading = find_heading(rows, wanted) or likely_heading(_rows_from(lines))
     nameless = first_of_numbers(_rows_from(lines)) if heading is None else None
     if heading is not None:
@@ -100,7 +101,7 @@ def layout_of(text: str, encoding: str, *, whole: bool, name: str, wanted: Colle
     else:
         start, header = _first_line(lines, name)
         first_row = start + 1
-    separator = max(SEPARATORS, key=lines[start].count)
+    separator = _separator_at(lines, start)
     if start:
         notes.append(
             f"{start} lines before the {'table' if nameless is not None else 'header'} were passed over."
@@ -112,22 +113,27 @@ def layout_of(text: str, encoding: str, *, whole: bool, name: str, wanted: Colle
     if whole and text and not text.endswith(("\n", "\r")):
         notes.append("The last line does not end: if the file was cut there, its last number is too short.")
     below = lines[first_row : first_row + LINES_BELOW]
-    decimal = _decimal(below, separator)
-    if decimal == ",":
-        notes.append("Numbers were read with a decimal comma.")
+    decimal = decimal_in((split(line, separator) for line in below), separator)
     header = _as_wide_as_the_rows(header, below, separator)
     form, units = (heading.format, heading.units) if heading else (None, ())
-    layer = _layer(header, below, separator) if form else 0
+    layer = _layer(lines[:start], header, below, separator) if form else 0
     if layer:
         notes.append("The rows of cycles and steps between the records were passed over.")
-    return Layout(encoding, separator, decimal, header, first_row, tuple(notes), form, units, layer)
+    layout = Layout(encoding, separator, "", header, first_row, tuple(notes), form, units, layer)
+    return layout if decimal is None else with_decimal(layout, decimal)
+
+
+def with_decimal(layout: Layout, decimal: str) -> Layout:
+    """The layout with a decimal sign, and a sentence on one that is a comma."""
+    told = ("Numbers were read with a decimal comma.",) if decimal == "," else ()
+    return replace(layout, decimal=decimal, notes=(*layout.notes, *told))
 
 
 def _rows_from(lines: Sequence[str]) -> Iterator[list[list[str]]]:
     """Of each line, its cells and those of the two below, all split as the line itself is: decimal commas may outnumber
     the separators below."""
     for start, line in enumerate(lines[:LINES_LOOKED_AT]):
-        separator = max(SEPARATORS, key=line.count)
+        separator = _separator_at(lines, start)
         below = lines[start + 1 : start + 3]
         yield [
             [] if line.startswith(COMMENT) else split(line, separator),
@@ -135,15 +141,33 @@ def _rows_from(lines: Sequence[str]) -> Iterator[list[list[str]]]:
         ]
 
 
-def _layer(header: tuple[str, ...], below: Sequence[str], separator: str) -> int:
-    """Columns without a name at the start of the header, where some rows, of other layers, have something there."""
-    nameless = next((i for i, name in enumerate(header) if name), 0)
-    others = any(any(cell.strip() for cell in split(line, separator)[:nameless]) for line in below)
-    return nameless if others else 0
+def _layer(above: Sequence[str], header: tuple[str, ...], below: Sequence[str], separator: str) -> int:
+    """Empty cells that a row of this table begins with, below the names of other layers; 0 of a table by itself.
+
+    Those names stand in the lines right above, each indented by one cell more, and the rows of such a layer have no
+    more cells than its names: a first column without a name, as of row numbers, is none of that.
+    """
+    layer = next((i for i, name in enumerate(header) if name), 0)
+    names = [_extent(line, separator) for line in above[-layer:]] if layer else []
+    if not layer or [first for first, _ in names] != list(range(layer)):
+        return 0
+    rows = [_extent(line, separator) for line in below if line.strip()]
+    others = [(first, last) for first, last in rows if first < layer]
+    return layer if others and all(last <= names[first][1] for first, last in others) else 0
 
 
-def _cells(line: str) -> list[str]:
-    return [] if line.startswith(COMMENT) else split(line, max(SEPARATORS, key=line.count))
+def _extent(line: str, separator: str) -> tuple[int, int]:
+    """Numbers of the first and of the last cell of a line that holds something."""
+    filled = [i for i, cell in enumerate(split(line, separator)) if cell.strip()]
+    return (filled[0], filled[-1]) if filled else (0, 0)
+
+
+def _cells(lines: Sequence[str], at: int) -> list[str]:
+    return [] if lines[at].startswith(COMMENT) else split(lines[at], _separator_at(lines, at))
+
+
+def _separator_at(lines: Sequence[str], at: int) -> str:
+    return separator_of(lines[at], lines[at + 1 : at + 3])
 
 
 def _first_line(lines: Sequence[str], name: str) -> tuple[int, tuple[str, ...]]:
@@ -151,7 +175,7 @@ def _first_line(lines: Sequence[str], name: str) -> tuple[int, tuple[str, ...]]:
     start = next((i for i, line in enumerate(lines) if line.strip() and not line.startswith(COMMENT)), None)
     if start is None:
         raise DataError(f"{name} has no header line; the first line should name the columns.")
-    separator = max(SEPARATORS, key=lines[start].count)
+    separator = _separator_at(lines, start)
     try:
         header = tuple(cell.strip() for cell in next(csv.reader([lines[start]], delimiter=separator)))
     except (csv.Error, StopIteration) as error:
@@ -194,15 +218,15 @@ def _as_wide_as_the_rows(header: tuple[str, ...], below: Sequence[str], separato
     return header
 
 
-def _decimal(lines: list[str], separator: str) -> str:
-    """A comma, where more of the first cells have a comma than a point.
+def decimal_in(rows: Iterable[Sequence[str]], separator: str) -> str | None:
+    """A comma, where more of the cells have a comma than a point; None where no cell has either.
 
     Between commas such cells are quoted, and a comma may be one between thousands, which has three digits behind it
     and none but 1 to 9 in front: where all are so, it is left to be refused.
     """
-    cells = [cell.strip() for line in lines for cell in split(line, separator)]
+    cells = [cell.strip() for row in rows for cell in row]
     with_comma = [cell for cell in cells if WITH_COMMA.fullmatch(cell)]
     points = sum("." in cell and bool(NUMBER.fullmatch(cell)) for cell in cells)
     if separator == "," and all(THOUSANDS.fullmatch(cell) for cell in with_comma):
         return "."
-    return "," if len(with_comma) > points else "."
+    return "," if len(with_comma) > points else "." if points else None

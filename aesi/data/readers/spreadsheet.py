@@ -22,6 +22,9 @@ from aesi.errors import DataError
 WORKBOOK = "[Content_Types].xml"
 """In every one of Office Open XML (ECMA-376, part 2)."""
 
+LAST_YEAR_OF_CLOCKS = 1900
+"""A time of a day and more, formatted as one of the day (h:mm:ss), is a date of it to Excel. No test is as old."""
+
 
 def open_sheet(path: Path, wanted: Collection[str] = ()) -> FrameTable:
     """The first sheet with a table of measurements.
@@ -116,6 +119,10 @@ def _word(cell: Any) -> str:
 
 def _plain(cell: Any) -> Any:
     """Clock times as h:m:s and dates as ISO 8601; all else as it is."""
+    if isinstance(cell, datetime.datetime) and cell.year <= LAST_YEAR_OF_CLOCKS:
+        from openpyxl.utils.datetime import to_excel  # type: ignore[import-untyped]
+
+        cell = datetime.timedelta(days=to_excel(cell))
     if isinstance(cell, datetime.timedelta):
         seconds = cell.total_seconds()
         hours, rest = divmod(seconds, SECONDS_PER_HOUR)

@@ -22,7 +22,7 @@ from typing import BinaryIO, cast
 import numpy as np
 
 from aesi.data.readers.heading import NUMBER
-from aesi.data.readers.layout import Layout, decoded, layout_of
+from aesi.data.readers.layout import Layout, decimal_in, decoded, layout_of, with_decimal
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 
@@ -42,6 +42,8 @@ class TextTable:
         self.path = path
         self._compressed = compressed
         self._layout = self._look(wanted)
+        if not self._layout.decimal:
+            self._layout = with_decimal(self._layout, self._first_decimal())
         self.header = self._layout.header
         self.notes = self._layout.notes
         self.format = self._layout.format
@@ -85,6 +87,15 @@ class TextTable:
         except (*DAMAGED, OSError, UnicodeError, csv.Error):
             pass
         return f"row {row + 1}"
+
+    def _first_decimal(self) -> str:
+        """The decimal sign of the first row that has one, in a table that begins with whole numbers, as a rest does."""
+        try:
+            with closing(self._rows()) as rows:
+                found = (decimal_in([cells], self._layout.separator) for _, cells in rows)
+                return next((sign for sign in found if sign), ".")
+        except (*DAMAGED, csv.Error, UnicodeError, OSError):
+            return "."  # whoever reads the table says what is wrong with it
 
     def _convert(self, positions: tuple[int, ...]) -> list[Array]:
         import pyarrow as pa

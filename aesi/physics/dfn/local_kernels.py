@@ -4,7 +4,7 @@ import math
 
 from numba import njit
 
-from aesi.physics.espm.interface_kernels import overpotential
+from aesi.physics.espm.interface_kernels import asymmetric, asymmetric_start
 from aesi.physics.espm.kernels import BEYOND_RANGE_V, FASTMATH, SMALLEST_OCCUPANCY
 
 SMALLEST_SLOPE = 1e-3
@@ -20,7 +20,9 @@ def kinetic_drop(y, exchange, alpha, thermal):  # type: ignore[no-untyped-def]
         x = 0.5 * y / exchange
         root = math.sqrt(1.0 + x * x)
         return 2.0 * thermal * math.copysign(math.log(abs(x) + root), x), thermal / (exchange * root)
-    return overpotential(y, exchange, 1.0, 1.0, 1.0, 1.0, 0.0, alpha, thermal)
+    x = y / exchange
+    eta, slope = asymmetric(x, alpha, asymmetric_start(x, alpha))
+    return thermal * eta, thermal * slope / exchange
 
 
 @njit(inline="always", fastmath=FASTMATH)

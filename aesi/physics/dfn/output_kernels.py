@@ -19,14 +19,25 @@ def smallest(values):  # type: ignore[no-untyped-def]
     return low
 
 
+@njit(inline="always", fastmath=FASTMATH)
+def mean_surfaces(p, theta, half):  # type: ignore[no-untyped-def]
+    """Mean surface stoichiometry of each electrode, negative and positive."""
+    theta_n, theta_p = 0.0, 0.0
+    for u in range(p.place.shape[0]):
+        if p.place[u] < half:
+            theta_n += p.share[u] * theta[u]
+        else:
+            theta_p += p.share[u] * theta[u]
+    return theta_n, theta_p
+
+
 @compiled
 def record(p, e, state, half, out, k):  # type: ignore[no-untyped-def]
     """Averages of the electrodes, salt at the collectors, plated lithium."""
-    for row in range(1, 7):
-        out[row, k] = 0.0
+    out[1, k], out[2, k] = mean_surfaces(p, state.theta, half)
+    out[5, k], out[6, k] = 0.0, 0.0
     for u in range(p.place.shape[0]):
         side = 0 if p.place[u] < half else 1
-        out[1 + side, k] += p.share[u] * state.theta[u]
         out[5 + side, k] += p.volume[u] * state.mean[u]
     out[3, k], out[4, k] = state.c[0], state.c[state.c.shape[0] - 1]
     out[8, k] = 0.0

@@ -6,17 +6,10 @@ from numba import njit
 
 from aesi.physics.dfn.diffusion_kernels import renew_particles, renew_salt, salt_forcing
 from aesi.physics.dfn.local_kernels import equilibrium, row_lookup
-from aesi.physics.dfn.output_kernels import left_range, record, record_profile
+from aesi.physics.dfn.output_kernels import left_range, mean_surfaces, record, record_profile
 from aesi.physics.dfn.stepping_kernels import advance, hold_layers, hold_metal, settle, take_back
 from aesi.physics.espm.kernels import FASTMATH, ROUND_OFF, compiled, lookup, parts_of, slot_of
-from aesi.physics.espm.transport_kernels import (
-    all_inside,
-    arrhenius,
-    heated,
-    mean_heat,
-    renew_factors,
-    solid_forcing,
-)
+from aesi.physics.espm.transport_kernels import arrhenius, heated, mean_heat, renew_factors, solid_forcing
 
 SHORTER, SHORTEST = 0.25, 0.25**6
 """Where no reaction is found at the end of a step, a quarter of it is tried, down to the shortest: at the edges of
@@ -108,7 +101,9 @@ def run_porous(  # type: ignore[no-untyped-def]
                 fault_at, fault = k, 4
             if e.heat[0] > 0.0:
                 power = 0.0
-                if steps > 0 and fault_at < 0 and all_inside(state.theta):
+                theta_n, theta_p = mean_surfaces(p, state.theta, half)
+                # Single units that are full or empty are no fault, and their potentials go on as those of the voltage.
+                if steps > 0 and fault_at < 0 and left_range(theta_n, theta_p, state.c, s.c0) == 0:
                     voltage = voltage_of(s, e, state, t, phi_n, phi_p, t.total[0])
                     power = heat_power(p, e, state, half, i1, voltage, t_k)
                 t_k = heated(start_k, mean_heat(watts, power, i0, i1), dt, e.heat, around_k)

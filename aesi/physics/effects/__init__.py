@@ -10,6 +10,7 @@ from aesi.physics.effects.by_name import (
     listing,
     load_effect,
     named_effect,
+    saved_effect,
     selected,
 )
 from aesi.physics.effects.catalogue import CATALOGUE
@@ -26,5 +27,6 @@ __all__ = [
     "listing",
     "load_effect",
     "named_effect",
+    "saved_effect",
     "selected",
 ]

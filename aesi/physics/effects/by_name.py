@@ -119,17 +119,17 @@ def _load(path: str, content: bytes) -> Effect:
     check_own(effect, path)
     if effect.id in CATALOGUE:
         raise InputError(f"{path}: the id {effect.id!r} is taken by the catalogue; choose another.")
-    return replace(effect, file=path)
+    return replace(effect, file=path, code=content)
 
 
 def listing(effects: Iterable[Effect]) -> str:
     """A line an effect: id, kind, what it is."""
-    return "\n".join(f"{e.id:36s} {e.kind:11s} {e.summary}" for e in effects)
+    return "\n".join(f"{e.id:36s} {e.kind_told:11s} {e.summary}" for e in effects)
 
 
 def describe(effect: Effect) -> str:
     """One effect as plain text: equation, validity, source, parameters."""
-    lines = [f"{effect.id} ({effect.kind})", effect.summary + ".", "", effect.equation, ""]
+    lines = [f"{effect.id} ({effect.kind_told})", effect.summary + ".", "", effect.equation, ""]
     lines += [effect.validity, f"Source: {effect.source}", "", "Parameters:"]
     for key, p in effect.parameters.items():
         scale = ", logarithmic" if p.log else ", fitted by its square" if p.even else ""
@@ -140,9 +140,32 @@ def describe(effect: Effect) -> str:
     return "\n".join(lines if effect.parameters else lines[:-1])
 
 
-def active_effect(content: Mapping[str, Any]) -> ActiveEffect:
-    """Inverse of `ActiveEffect.to_dict`.  Raises InputError for an unknown effect, ParameterError for its values."""
-    return find_effect(str(content["effect"]), content.get("file")).activate(**content["parameters"])
+def saved_effect(active: ActiveEffect) -> tuple[dict[str, Any], dict[str, bytes]]:
+    """An effect as JSON, and the files that have to lie in its folder: a copy of a user's own, which may be edited
+    where it was read, or not be there where the folder is copied to."""
+    content, code = active.to_dict(), active.effect.code
+    if code is None:
+        return content, {}
+    name = f"{active.id}.py"
+    return content | {"file": name, "sha256": sha256(code).hexdigest()}, {name: code}
+
+
+def active_effect(content: Mapping[str, Any], folder: Path | None = None) -> ActiveEffect:
+    """Inverse of `ActiveEffect.to_dict`, and of `saved_effect` in the folder that it was saved to.
+
+    Raises InputError for an unknown effect and for a file that was edited since, ParameterError for its values.
+    """
+    file = content.get("file")
+    if file is not None and folder is not None:
+        file = str(folder / file)  # one that was saved before copies were is an absolute path, which stays
+    effect = find_effect(str(content["effect"]), file)
+    said = content.get("sha256")
+    if said is not None and sha256(effect.code or b"").hexdigest() != said:
+        raise InputError(
+            f"{file} was edited since the model was saved with it, and what was fitted and calibrated beside it is no "
+            "longer of it; restore it, or run again with the effect as it is now."
+        )
+    return effect.activate(**content["parameters"])
 
 
 def _reduced(effect: Effect) -> tuple[Any, ...]:

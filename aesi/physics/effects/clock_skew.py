@@ -2,8 +2,9 @@
 
     t_true = t_first + (t_logged - t_first) / (1 + skew),   V_read(t) = V_true(t - lag)
 
-Leaves out jitter of single stamps. Holds for a lag that is short against the record; before the first sample
-the current is taken as constant.
+Leaves out jitter of single stamps. Holds for a lag that is short against the record; before the first sample and
+behind the last the current is taken as constant. The current stays what it is in its own rows, held or in straight
+lines, and moves the same charge; the voltage is that of instants between them.
 
 Source: definition; range from quartz oscillators (100 ppm) to two unsynchronised loggers.
 """
@@ -12,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from aesi.numerics.typing import Array
 from aesi.parameters import Parameter, Spread
 from aesi.physics.effect import Effect, Record
 
@@ -39,12 +41,17 @@ PARAMETERS = {
 
 
 def true_record(record: Record, *, skew: float, lag_s: float) -> Record:
-    """The record on the cell's own clock, the current as much later as the voltage is read: the same reading."""
+    """The record on the cell's own clock, with the instants at which its voltages were in truth there."""
     first = record.time_s[0]
-    time = first + (record.time_s - first) / (1.0 + skew)
-    if lag_s == 0.0:
-        return replace(record, time_s=time)
-    return replace(record, time_s=time, current_a=np.interp(time - lag_s, time, record.current_a))
+
+    def true_s(logged_s: Array) -> Array:
+        return np.asarray(first + (logged_s - first) / (1.0 + skew))
+
+    time = true_s(record.time_s)
+    read = None if record.read_s is None else true_s(record.read_s)
+    if lag_s != 0.0:
+        read = (time if read is None else read) - lag_s
+    return replace(record, time_s=time, read_s=read)
 
 
 EFFECT = Effect("clock_skew", "instrument", __doc__, PARAMETERS, on_record=true_record)

@@ -8,6 +8,11 @@ from aesi.physics.espm.kernels import FASTMATH, compiled, mean_asinh
 
 SMALLEST_EXPONENT, LARGEST_EXPONENT = -60.0, 60.0
 """Of what would leave the range of a number."""
+MOST_STEPS = 30
+LARGEST_CHANGE = 4.0
+SMALLEST_CHANGE = 1e-4
+"""Of an overpotential over R T / F, in one step. Each leaves a twelfth of the cube of what it changes at most: below
+the smallest it is right to round-off."""
 
 
 @njit(inline="always", fastmath=FASTMATH)
@@ -16,33 +21,58 @@ def bounded_exp(x):  # type: ignore[no-untyped-def]
     return math.exp(min(max(x, SMALLEST_EXPONENT), LARGEST_EXPONENT))
 
 
+@njit(inline="always", fastmath=FASTMATH)
+def asymmetric_start(x, alpha):  # type: ignore[no-untyped-def]
+    """Where `asymmetric` begins for x: right for alpha of one half, and for a large current."""
+    half = 0.5 * abs(x)
+    eta = 2.0 * math.copysign(math.log(half + math.sqrt(1.0 + half * half)), x)
+    if half > 1.0:
+        eta *= 0.5 / (alpha if x > 0.0 else 1.0 - alpha)
+    return eta
+
+
+@compiled
+def asymmetric(x, alpha, eta):  # type: ignore[no-untyped-def]
+    """Overpotential over R T / F of a current x over its exchange current, and its slope in x, for
+    x = exp(alpha eta) - exp(-(1 - alpha) eta).  eta : to begin with.
+    """
+    gradient = 1.0
+    for _ in range(MOST_STEPS):
+        forward = alpha * bounded_exp(alpha * eta)
+        back = (1.0 - alpha) * bounded_exp(-(1.0 - alpha) * eta)
+        gradient = forward + back
+        bend = alpha * forward - (1.0 - alpha) * back
+        change = (forward / alpha - back / (1.0 - alpha) - x) / gradient
+        change /= 1.0 - min(0.5 * change * bend / gradient, 0.5)
+        change = min(max(change, -LARGEST_CHANGE), LARGEST_CHANGE)
+        eta -= change
+        if abs(change) < SMALLEST_CHANGE:
+            gradient -= change * bend
+            break
+    return eta, 1.0 / gradient
+
+
 @compiled
 def overpotential(y, exchange, occupancy, g1, g2, g3, log_salt, alpha, thermal):  # type: ignore[no-untyped-def]
     """Overpotential (V) of a current y and its slope, for j = j0 (exp(alpha f eta) - exp(-(1 - alpha) f eta)).
 
     exchange : at unit salt and occupancy.  g1..g3 : salt at Gauss points.  log_salt : its mean logarithm.
     """
-    root = math.sqrt(occupancy)
-    mid = 2.0 * exchange * root * math.exp(0.5 * log_salt)
-    x = y / mid
-    slope = 2.0 * thermal / (mid * math.sqrt(1.0 + x * x))
+    alone = exchange * math.sqrt(occupancy)
     if alpha == 0.5:
-        s = abs(y) / (2.0 * exchange * root)
+        mid = 2.0 * alone * math.exp(0.5 * log_salt)
+        x = y / mid
+        slope = 2.0 * thermal / (mid * math.sqrt(1.0 + x * x))
+        s = abs(y) / (2.0 * alone)
         return 2.0 * thermal * math.copysign(mean_asinh(s, g1, g2, g3), y), slope
-    eta = thermal * math.copysign(math.log(abs(x) + math.sqrt(1.0 + x * x)), x) * 2.0
-    if x != 0.0:  # the dominant branch, where the current is large
-        eta *= 0.5 / (alpha if x > 0.0 else 1.0 - alpha) if abs(x) > 1.0 else 1.0
-    half = 0.5 * mid
-    for _ in range(30):
-        forward = half * bounded_exp(alpha * eta / thermal)
-        back = half * bounded_exp(-(1.0 - alpha) * eta / thermal)
-        gradient = (alpha * forward + (1.0 - alpha) * back) / thermal
-        change = (forward - back - y) / gradient
-        change = min(max(change, -4.0 * thermal), 4.0 * thermal)
-        eta -= change
-        if abs(change) < 1e-13:
-            break
-    return eta, 1.0 / gradient
+    here1, here2, here3 = alone * math.sqrt(g1), alone * math.sqrt(g2), alone * math.sqrt(g3)
+    x1, x2, x3 = y / here1, y / here2, y / here3
+    eta2, slope2 = asymmetric(x2, alpha, asymmetric_start(x2, alpha))
+    eta1, slope1 = asymmetric(x1, alpha, eta2 + slope2 * (x1 - x2))
+    eta3, slope3 = asymmetric(x3, alpha, eta2 + slope2 * (x3 - x2))
+    eta = (5.0 * (eta1 + eta3) + 8.0 * eta2) / 18.0
+    slope = (5.0 * (slope1 / here1 + slope3 / here3) + 8.0 * slope2 / here2) / 18.0
+    return thermal * eta, thermal * slope
 
 
 @njit(inline="always", fastmath=FASTMATH)

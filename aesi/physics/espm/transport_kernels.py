@@ -181,15 +181,6 @@ def mean_heat(start, end, i0, i1):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def all_inside(theta):  # type: ignore[no-untyped-def]
-    """Has every particle's surface lithium, and room for more? Past that nothing tells the heat of a cell."""
-    inside = 0
-    for u in range(theta.shape[0]):
-        inside += 0.0 <= theta[u] <= 1.0
-    return inside == theta.shape[0]
-
-
-@njit(inline="always", fastmath=FASTMATH)
 def heated(t_k, watts, dt, heat, around_k):  # type: ignore[no-untyped-def]
     """Temperature after a step of constant heating; heat : capacity J/K, conductance W/K.  around_k : surroundings."""
     if heat[1] * dt < 1e-9 * heat[0]:

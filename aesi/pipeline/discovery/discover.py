@@ -286,6 +286,7 @@ def _own_row(one: OwnParameter) -> dict[str, Any]:
         "value": one.value,
         "unit": one.unit,
         "deviations": round(one.deviations, 3),
+        "one_sd": one.one_sd,
         "at_limit": one.at_limit,
     }
 

@@ -8,9 +8,17 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    field_validator,
+    model_validator,
+)
 
-from aesi.data.reading import Reading
+from aesi.data.reading import Reading, column_name
 from aesi.physics import ModelName
 from aesi.physics.cell import Soh, checked_soh
 from aesi.records import Hold
@@ -96,7 +104,7 @@ class DataConfig(Section):
     hold : how the current runs between rows. A discovery takes it where it is given here, unless `discover.hold` says
     otherwise.
     columns : quantity, or `state`, `cycle`, `step`, and the file's name for it; `state` is the column that gives a
-    current its sign, and None leaves out the temperature.
+    current its sign, None leaves out the temperature, and a number states it.
     units : quantity and unit of the file's column (`mA`, `mV`, `h`, `K`, `h:m:s`, `date` or a pattern).
     sign : which direction of the file's current is positive; None takes that of a known export, else discharge.
     state_words : words of the state column that are not known, and what each means.
@@ -114,7 +122,7 @@ class DataConfig(Section):
     test: tuple[str, ...] = ()
     dt_s: Positive = 1.0
     hold: Hold = "backward"
-    columns: dict[str, str | None] = {}
+    columns: dict[str, Annotated[str | None, BeforeValidator(column_name)]] = {}
     units: dict[str, str] = {}
     sign: Literal["discharge-positive", "charge-positive"] | None = None
     state_words: dict[str, Literal["charge", "discharge", "rest"]] = {}

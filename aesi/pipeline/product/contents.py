@@ -11,7 +11,7 @@ from aesi.pipeline.written import EFFECTS
 
 def contents(paths: Iterable[Path]) -> list[bytes]:
     """What is in each file, and in each file of a folder, in order; of a saved model also the user's effects that it
-    names, whose code lies elsewhere and may be edited there. Nothing of what is not there."""
+    names elsewhere, as those did that were saved before a copy lay in the folder. Nothing of what is not there."""
     files = [file for path in paths for file in _files(path)]
     return [file.read_bytes() for file in files if file.is_file()]
 
@@ -26,12 +26,13 @@ def effect_files(folder: Path) -> list[Path]:
     named = (
         [each.get("file") for each in effects if isinstance(each, dict)] if isinstance(effects, list) else []
     )
-    return [Path(file) for file in named if isinstance(file, str)]
+    return [folder / file for file in named if isinstance(file, str)]
 
 
 def _files(path: Path) -> Iterator[Path]:
     if path.is_dir():
-        yield from sorted(path.iterdir())
-        yield from effect_files(path)
+        inside = sorted(path.iterdir())
+        yield from inside
+        yield from (file for file in effect_files(path) if file not in inside)
     else:
         yield path

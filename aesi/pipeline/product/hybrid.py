@@ -25,7 +25,7 @@ from aesi.physics.arguments import check_cell, check_choice, check_soc, checked_
 from aesi.physics.belongs import check_voltage
 from aesi.physics.cell import Soh
 from aesi.physics.depletion import RUN_ON
-from aesi.physics.effects import active_effect
+from aesi.physics.effects import active_effect, saved_effect
 from aesi.pipeline.product.deviations import PhysicsStart, slopes_v, start_v
 from aesi.pipeline.product.error_series import error_series
 from aesi.pipeline.product.model_folder import part_file, read_model, write_model
@@ -178,16 +178,18 @@ class HybridModel:
     def save(self, folder: str | Path) -> Path:
         """Write the model to a folder, made where it is missing; returns the folder."""
         folder = Path(folder)
+        saved = [saved_effect(effect) for effect in self.effects]
         parts: dict[str, Any] = {
             "cell.bpx": self.cell.to_bpx(),
-            EFFECTS: [effect.to_dict() for effect in self.effects],
+            EFFECTS: [content for content, _ in saved],
         }
         for name in ("correction", "intervals", "bands"):
             part = getattr(self, name)
             if part is not None:
                 parts[name] = part.to_dict()
         own = {name: getattr(self, name) for name in ("dt_s", "hold", "soc0", "model", "finding")}
-        write_model(folder, own | {"held": list(self.held), "beside": list(self.beside)}, parts)
+        files = {name: code for _, beside in saved for name, code in beside.items()}
+        write_model(folder, own | {"held": list(self.held), "beside": list(self.beside)}, parts, files)
         return folder
 
     @staticmethod
@@ -204,7 +206,7 @@ class HybridModel:
             with _as_saved(part_file(folder, name)):
                 read[name] = of_content(parts[name]) if parts.get(name) else None
         with _as_saved(part_file(folder, EFFECTS)):
-            read["effects"] = tuple(active_effect(content) for content in parts.get(EFFECTS, ()))
+            read["effects"] = tuple(active_effect(content, folder) for content in parts.get(EFFECTS, ()))
         with _as_saved(folder / HEAD):
             return HybridModel(
                 cell=Cell.from_bpx(part_file(folder, "cell.bpx"), fitted=True),

@@ -1,7 +1,8 @@
-"""A saved model as a folder of data: nothing in it is executed when it is read.
+"""A saved model as a folder of data: nothing in it is executed when it is read, but for effects of the user's own.
 
 model.json holds the schema, the names of the parts and the caller's own values; <part>.json one part each
-(cell.bpx, effects, correction, intervals, bands); arrays.npz the plain arrays that the JSON refers to by name.
+(cell.bpx, effects, correction, intervals, bands); arrays.npz the plain arrays that the JSON refers to by name; and
+<effect>.py a copy of each effect of the user's own.
 """
 
 from __future__ import annotations
@@ -24,9 +25,12 @@ ARRAY_KEY = "array:"
 """Prefix of a string that stands for an array of arrays.npz."""
 
 
-def write_model(folder: Path, head: Mapping[str, Any], parts: Mapping[str, Any]) -> None:
+def write_model(
+    folder: Path, head: Mapping[str, Any], parts: Mapping[str, Any], files: Mapping[str, bytes]
+) -> None:
     """Write the parts (JSON values and numpy arrays, nested) and the head to a folder, made where missing.
 
+    files : name -> content of those that parts name.
     Raises InputError where it is a file, or below one.
     """
     try:
@@ -40,6 +44,8 @@ def write_model(folder: Path, head: Mapping[str, Any], parts: Mapping[str, Any])
     arrays: dict[str, Array] = {}
     for name, content in parts.items():
         _write_json(part_file(folder, name), _without_arrays(content, name, arrays))
+    for name, code in files.items():
+        write_whole(folder / name, code)
     np.savez_compressed(folder / ARRAYS, allow_pickle=False, **arrays)
     _write_json(folder / HEAD, {"schema": SCHEMA, "parts": sorted(parts), **head})
 

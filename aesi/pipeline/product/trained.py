@@ -75,9 +75,10 @@ def trained_sentence(name: str, figures: Mapping[str, Any], *, one_step: bool = 
     if kept >= ALL_PCT:
         return f"{head}."
     if kept >= NONE_PCT:
-        return f"{head}; {where}it has faded to {_share(kept)} of itself in the mean, the rest is left to the physics."
+        applied = f"{_share(kept)} of the correction are applied on average"
+        return f"{head}; {where}{applied}, the rest is left to the physics."
     alone = "the physics model and its last measured error" if one_step else "the physics model"
-    return f"{head}; {where}it has faded to 0 % of itself: this is {alone}."
+    return f"{head}; {where}none of the correction is applied: this is {alone}."
 
 
 def _share(percent: float) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from aesi.calibration.result import NOTABLY
 from aesi.constants import MV_PER_V
 from aesi.pipeline.report import style
 from aesi.pipeline.report.nyquist import nyquist_figures
@@ -78,12 +79,13 @@ def finding(content: Mapping[str, Any]) -> str:
     worse = [
         row["name"]
         for row in files
-        if max(row["after_rmse_mv"], row["as_simulated_rmse_mv"]) > row["before_rmse_mv"]
+        if max(row["after_rmse_mv"], row["as_simulated_rmse_mv"]) > NOTABLY * row["before_rmse_mv"]
     ]
     against = f" On {', '.join(worse)} the start file errs by less." if worse else ""
     return (
         f"In free run the calibrated model errs by {after} mV RMSE on {on}, where the start file erred by {before} mV. "
-        f"Simulated without what a record has of its own, the file errs by {simulated} mV.{against}"
+        "With the file as it is written, without a record's own start, capacity and current offset, the error is "
+        f"{simulated} mV.{against}"
     )
 
 

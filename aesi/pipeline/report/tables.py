@@ -32,7 +32,10 @@ from aesi.pipeline.report.views import Row
 
 TableFormat = Literal["md", "tex", "csv"]
 OWN_METHOD = "as in Table 2"
-WORST_BIN = f"Worst bin: the lowest coverage in a (current, SOC) bin of more than {MIN_BIN_SAMPLES} samples."
+WORST_BIN = (
+    f"Worst bin: the lowest coverage in a (current, SOC) bin of more than {MIN_BIN_SAMPLES} samples; smaller bins are "
+    "joined to their neighbours."
+)
 
 
 def free_run_table(models: Sequence[Row]) -> Table:

@@ -14,7 +14,12 @@ from aesi.pipeline.report.page import write_page
 from aesi.pipeline.report.plots import hypotheses, maps, records
 from aesi.pipeline.report.views import DiscoveryTrace, DiscoveryView, Row, RunView
 from aesi.pipeline.report.words import discoveries, runs
-from aesi.pipeline.report.words.moved import moved_findings, moved_value, parameter_words
+from aesi.pipeline.report.words.moved import (
+    deviation_words,
+    moved_findings,
+    moved_value,
+    parameter_words,
+)
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -107,7 +112,9 @@ def _moved_rows(discovery: Mapping[str, Any]) -> list[Row]:
     for state in discoveries.states_of(discovery):
         for row in own.get(state, ()):
             where = f"{moved_value(row)}{', at its limit' if row['at_limit'] else ''}"
-            rows.setdefault(parameter_words(row), {})[state] = f"{where} ({row['deviations']:+.1f})"
+            rows.setdefault(parameter_words(row), {})[state] = (
+                f"{where} ({row['deviations']:+.1f} x {deviation_words(row)})"
+            )
     return [{"name": name, **where} for name, where in rows.items()]
 
 

@@ -33,7 +33,8 @@ def instruments_undone(
 @lru_cache(maxsize=64)
 def _seen_by_cell(data: Averaged, acting: tuple[ActiveEffect, ...]) -> Measurement:
     """The record behind the instruments; remembered, since few of the parameters that a fit moves are theirs."""
-    record = as_cell_saw(Record(data.finer.time_s, data.finer.current_a), acting)
+    written = Record(data.finer.time_s, data.finer.current_a)
+    record = as_cell_saw(written, acting).beside_voltage(data.window.hold == "backward")
     return data.with_record(record.time_s, record.current_a)
 
 

@@ -14,6 +14,7 @@ from aesi.tracer.likelihood.gaussian import Linearised, Posterior, block_sums
 from aesi.tracer.likelihood.growth import Explanation, Grown
 from aesi.tracer.likelihood.model_error import whitened
 from aesi.tracer.search.path import Path
+from aesi.tracer.search.plausible import plausibility
 
 SHARE = 0.9
 """Share of the posterior density of a parameter that its interval covers."""
@@ -62,7 +63,7 @@ def ranking(
             continue
         best = chosen if effect.id in chosen.hypothesis else max(held, key=lambda e: e.score.total)
         named = effect.id in verdict.effects
-        remark = "in the verdict" if named else _remark(path, best)
+        remark = "in the verdict" if named else refused(path, best)
         rows.append(
             CandidateEffect(
                 effect.id,
@@ -82,13 +83,29 @@ def best_first(rows: Sequence[CandidateEffect]) -> tuple[CandidateEffect, ...]:
     return tuple(sorted(rows, key=lambda row: -round(row.score, DIGITS)))
 
 
-def _remark(path: Path, one: Explanation) -> str:
+def refused(path: Path, one: Explanation) -> str:
+    """Why a hypothesis is not the one that was chosen."""
     rest = path.chosen.score.total
     if isinstance(one, FittedHypothesis) and one.at_bounds:
         return f"ends on a bound: {', '.join(one.at_bounds)}"
     gained = one.score.total - rest
     chosen = "what was chosen" if path.chosen.hypothesis else "the declared model"
-    return f"{abs(gained):.1f} nats {'better' if gained > 0.0 else 'worse'} on unseen data than {chosen}"
+    remark = f"{abs(gained):.1f} nats {'better' if gained > 0.0 else 'worse'} on unseen data than {chosen}"
+    return f"{remark}, {_why_not(path, one)}" if gained > 0.0 else remark
+
+
+def _why_not(path: Path, better: Explanation) -> str:
+    """By which rule a hypothesis that says more of unseen data is not the one that was chosen."""
+    if not isinstance(better, FittedHypothesis):
+        return "to first order: it was not among the best that were fitted with the whole model"
+    chosen, competing = path.chosen, len(path.problem.competing())
+    gained = better.score.total - chosen.score.total
+    if set(chosen.hypothesis) < set(better.hypothesis) and gained <= path.admission_nats:
+        return f"no more than the {path.admission_nats:.1f} that chance may give one more effect"
+    less = plausibility(chosen, competing) - plausibility(better, competing)
+    if less > 0.0:
+        return f"but {less:.1f} nats less plausible by its marginal likelihood, with a price for each name"
+    return "but not admitted, or not reached, by adding and exchanging one effect at a time"
 
 
 def estimates(path: Path, one: Explanation, effect: str) -> dict[str, Estimate]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from aesi.tracer.case.free_parameter import CAPACITY_SHARE, FreeParameter
 from aesi.tracer.likelihood.model_state import ModelState
 
@@ -18,7 +20,8 @@ class OwnParameter:
 
     owner : the effect that restates it, or one of OF_ONE_RECORD, whose `name` is then that of the record.
     declared, value : in `unit`; a factor is declared as 1.  deviations : from declared, in standard deviations of its
-    tolerance.  at_limit : whether it ended at the end of the range in which it may move.
+    prior in that fit.  one_sd : how far one of these is from declared, on the side where it went, in `unit`.
+    at_limit : whether it ended at the end of the range in which it may move.
     """
 
     owner: str
@@ -27,6 +30,7 @@ class OwnParameter:
     value: float
     unit: str
     deviations: float
+    one_sd: float
     at_limit: bool
 
 
@@ -65,4 +69,10 @@ def _name(state: ModelState, free: FreeParameter) -> str:
 def _own_parameter(free: FreeParameter, value: float, name: str) -> OwnParameter:
     x, (low, high) = free.coordinate(value), free.bounds
     near = LIMIT_SHARE * (high - low)
-    return OwnParameter(free.owner, name, free.centre, value, free.unit, x, not low + near < x < high - near)
+    at_limit = not low + near < x < high - near
+    return OwnParameter(free.owner, name, free.centre, value, free.unit, x, _one_sd(free, x), at_limit)
+
+
+def _one_sd(free: FreeParameter, x: float) -> float:
+    """How far one standard deviation is from declared on the side of `x`, in the parameter's unit."""
+    return free.centre * abs(np.expm1(np.copysign(free.sd, x))) if free.log else free.sd

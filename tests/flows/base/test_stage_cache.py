@@ -57,7 +57,7 @@ def test_what_is_no_data_is_not_kept_and_said(workspace, said):
     assert Cache(said.append).get("models", ("a",), lambda: fitted) is fitted
     assert not stored(workspace)
     (sentence,) = said
-    assert sentence.startswith("models: done, but no result that can be stored: where this run is stopped")
+    assert sentence.startswith("models: done (not stored: where this run is stopped")
 
 
 def test_a_full_disk_is_said_and_costs_nothing_else(workspace, said, monkeypatch):

@@ -568,6 +568,13 @@ def test_without_a_voltage_the_start_has_to_be_given(call, cell, current, tmp_pa
     assert "give --soc0" in err
 
 
+def test_the_discretisation_of_the_model_was_listed_as_a_fault_of_an_instrument(call):
+    _, out, _ = call("effects")
+    kinds = dict(line.split()[:2] for line in out.splitlines())
+    assert kinds["numerical_error"] == "numerics"
+    assert kinds["voltage_sensor_offset"] == "instrument"
+
+
 def test_effects_lists_and_shows(call):
     code, out, _ = call("effects")
     assert code == 0

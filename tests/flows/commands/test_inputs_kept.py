@@ -84,18 +84,18 @@ def test_the_cell_of_a_calibration_was_written_over_by_its_report(call, cell, ke
 @pytest.mark.parametrize(
     "words",
     [
-        "simulate --cell m --current current.csv --soc0 0.9 --out own.py",
-        "predict --model m --current current.csv --soc0 0.9 --out own.py",
-        "export --cell m --to pybamm --out own.py",
+        "simulate --cell m --current current.csv --soc0 0.9 --out m/lead.py",
+        "predict --model m --current current.csv --soc0 0.9 --out m/lead.py",
+        "export --cell m --to pybamm --out m/lead.py",
     ],
 )
-def test_the_effect_that_a_saved_model_names_was_written_over(call, saved, current, tmp_path, words):
-    saved("m", own="own.py")
-    before = (tmp_path / "own.py").read_text()
+def test_the_effect_that_a_saved_model_names_was_written_over(call, saved, current, words):
+    copied = saved("m", own="own.py") / "lead.py"
+    before = copied.read_text()
     code, _, err = call(*words.split())
     assert code == 2
-    assert "own.py is a file that is read, and would be lost" in err
-    assert (tmp_path / "own.py").read_text() == before
+    assert "lead.py is a file that is read, and would be lost" in err
+    assert copied.read_text() == before
 
 
 def test_a_new_file_in_the_folder_of_a_model_is_no_file_of_it(call, saved, current, tmp_path):

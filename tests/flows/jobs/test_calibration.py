@@ -16,4 +16,4 @@ def test_a_fit_tells_where_it_stands(monkeypatch, capsys):
     monkeypatch.setattr(calibration, "calibrate_files", fitted)
     with pytest.raises(DataError):
         calibration.calibrate(Path("cell.json"), [], Path("new.json"))
-    assert "steps of the fit: 7 in 0 s, 3.4 % of the start's misfit left" in capsys.readouterr().err
+    assert "steps of the fit: 7 in 0 s, at 3.4 % of the starting point's cost" in capsys.readouterr().err

@@ -303,7 +303,7 @@ def test_a_baseline_was_searched_again_by_every_run_that_went_on(run, monkeypatc
     models = 'models=["ESPM", "AESI I", "SINDy-C", "gradient boosting"]'
     first = run(models)
     said = capsys.readouterr().err
-    assert said.count("model gradient boosting: done, but no result that can be stored") == 1
+    assert said.count("model gradient boosting: done (not stored") == 1
     assert {"validation: done", "comparison: done"} <= set(re.findall(r"\w+: done", said))
     monkeypatch.setitem(BASELINES, "SINDy-C", lambda *_: pytest.fail("it was searched again"))
     again = run(models)

@@ -13,10 +13,11 @@ import pytest
 from aesi.calibration import calibrate
 from aesi.calibration.fit import problem
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
+from aesi.calibration.model import ERROR_V, REPEATS
 from aesi.calibration.parameters import Free, free_parameters
 from aesi.calibration.posterior import PosteriorSamples, sampled
 from aesi.calibration.records.conditions import Conditions, Prior
-from aesi.calibration.result import at_bounds, intervals
+from aesi.calibration.result import at_bounds, information_weights, intervals
 from aesi.calibration.start import size_assumed, sized, tell_the_size
 from aesi.errors import DataError, InputError
 from aesi.physics import simulate
@@ -304,6 +305,33 @@ def test_a_file_that_is_worse_than_the_start_file_as_it_is_simulated_was_not_war
         f"{first.name}: the file that is written errs by 40.00 mV there, the start file by 20.00"
     )
     assert replace(found, errors=(replace(worse, simulated_v=20e-3),)).warnings == ()
+
+
+def test_a_record_of_the_start_file_itself_was_warned_of_for_a_fiftieth_of_its_noise(found):
+    def warned(after_v):
+        errors = (replace(found.errors[0], before_v=1.02e-3, after_v=after_v, simulated_v=after_v),)
+        return replace(found, errors=errors).warnings
+
+    assert warned(1.04e-3) == ()
+    assert warned(1.20e-3)[0].startswith(
+        f"{found.errors[0].name}: the fit errs by 1.20 mV there, the start file by 1.02"
+    )
+
+
+@pytest.mark.parametrize(("noise_v", "counts_in_full"), [(1e-3, True), (30e-3, False)])
+def test_a_record_of_little_noise_counted_for_more_in_its_intervals_than_in_the_fit(noise_v, counts_in_full):
+    error = noise_v * np.random.default_rng(0).standard_normal(400)
+    model = SimpleNamespace(
+        records=[SimpleNamespace(trusted=np.ones(400, dtype=bool))],
+        errors=lambda x: [error],
+        weights=[np.full(400, 1.0 / (ERROR_V * REPEATS**0.5))],
+        spectra=SimpleNamespace(information_weights=lambda cell: np.zeros(0)),
+        cell_at=lambda x: None,
+        layout=SimpleNamespace(size=3),
+    )
+    weights = information_weights(model, np.zeros(3))
+    assert (weights[:400] == 1.0).all() == counts_in_full
+    assert (weights <= 1.0).all()
 
 
 def test_a_double_layer_that_no_cell_has_was_written_without_a_word(found):

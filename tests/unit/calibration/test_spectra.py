@@ -62,6 +62,13 @@ def test_more_frequencies_of_one_decade_say_no_more(start, truth, records):
     assert of_many @ of_many == pytest.approx(of_few @ of_few, rel=0.03)
 
 
+def test_of_spectra_in_percent_that_of_1_percent_was_taken_for_a_full_cell(start, truth, records):
+    good = spectrum_of(truth, 1.0, 25.0)
+    half = Spectrum("half", FREQUENCY_HZ, np.ones(13), soc=50.0)
+    with pytest.raises(DataError, match=r"half: its state of charge of 50 .* so are the others of its file"):
+        problem(start, records[:1], Conditions(spectra=(good, half)))
+
+
 def test_a_spectrum_that_cannot_be_fitted_is_told(start, truth, records):
     good, empty = spectrum_of(truth, 0.5, 25.0), Spectrum("low", FREQUENCY_HZ, np.ones(13), soc=-0.1)
     fast = spectrum_of(truth, 0.5, 25.0, np.array([200.0, 1000.0]))

@@ -306,6 +306,54 @@ def test_a_temperature_of_nought_everywhere_is_told_of(tmp_path):
     assert any("no sensor is connected" in note for note in read_measurement(path).notes)
 
 
+@pytest.mark.parametrize("form", ["h:mm:ss", "[h]:mm:ss"])
+@pytest.mark.parametrize("start_d", [0.995, 61.995])
+def test_a_time_of_the_day_in_a_sheet_ended_at_24_hours(tmp_path, form, start_d):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    book.active.append(["time_s", "current_a", "voltage_v"])
+    for row in zip(start_d + TIME / 86400.0, CURRENT.tolist(), VOLTAGE.tolist(), strict=True):
+        book.active.append([float(cell) for cell in row])
+        book.active.cell(book.active.max_row, 1).number_format = form
+    book.save(tmp_path / "long.xlsx")
+    record = read_measurement(tmp_path / "long.xlsx", units={"time_s": "h:m:s"})
+    np.testing.assert_allclose(record.time_s, 86400.0 * start_d + TIME, atol=1e-3)
+
+
+def test_of_three_electrodes_the_potential_of_one_was_taken_for_the_voltage_of_the_cell(tmp_path):
+    header = "time/s\tEwe/V\tEce/V\t<I>/mA"
+    lines = [header, *rows(TIME, VOLTAGE + 0.1, TIME * 0 + 0.1, -1e3 * CURRENT, separator="\t")]
+    path = tmp_path / "three.mpt"
+    path.write_text("\n".join([*lines, ""]))
+    with pytest.raises(
+        DataError, match=r"'Ewe/V' and 'Ece/V' are potentials .* --column voltage_v=\"Ewe/V\""
+    ):
+        read_measurement(path)
+    assert read_measurement(path, {"voltage_v": "Ewe/V"}).voltage_v == pytest.approx(VOLTAGE + 0.1)
+
+
+def test_of_two_columns_of_one_name_in_an_export_the_first_was_taken_without_a_word(tmp_path):
+    head, *body = arbin()[1].decode().splitlines()
+    lines = ["Voltage(V)," + head, *(f"3.6,{line}" for line in body)]
+    (tmp_path / "arbin.csv").write_text("\n".join([*lines, ""]))
+    with pytest.raises(
+        DataError, match=r"has 2 columns named 'Voltage\(V\)' \(numbers 1, 9\); rename all but one"
+    ):
+        read_measurement(tmp_path / "arbin.csv")
+
+
+@pytest.mark.parametrize("above", ["", "Serial,1234\n"], ids=["nothing above", "a line above"])
+@pytest.mark.parametrize("mark", [str, lambda k: "!" if k % 7 == 3 else ""], ids=["row numbers", "flags"])
+def test_a_first_column_without_a_name_made_layers_of_an_export(tmp_path, above, mark):
+    head, *body = arbin()[1].decode().splitlines()
+    lines = ["," + head, *(f"{mark(k)},{line}" for k, line in enumerate(body))]
+    (tmp_path / "arbin.csv").write_text(above + "\n".join([*lines, ""]))
+    record = read_measurement(tmp_path / "arbin.csv")
+    np.testing.assert_allclose(record.time_s, TIME)
+    np.testing.assert_allclose(record.current_a, CURRENT)
+    assert not any("cycles and steps" in note for note in record.notes)
+
+
 @pytest.mark.parametrize("export", EXPORTS, ids=lambda export: export.__name__)
 def test_every_export_gives_the_same_test(tmp_path, export):
     record = read_measurement(written(tmp_path, export))

@@ -150,3 +150,21 @@ def test_a_short_record_in_milliseconds_was_taken(tmp_path):
 def test_a_flat_potential_is_no_time_in_milliseconds(tmp_path):
     flat = 3.3 - 0.004 * np.cumsum(DRIVE) * 4.0 / 3600.0 - 0.02 * DRIVE
     read_measurement(written(tmp_path, TIME, DRIVE, flat))
+
+
+@pytest.mark.parametrize("cycles", [1, 4])
+def test_a_smooth_current_with_the_wrong_sign_was_read(tmp_path, cycles):
+    """From row to row it moves a flat voltage by far less than its last digit."""
+    time = np.arange(0.0, 4 * 3600.0, 2.0)
+    current = 2.0 * np.sin(2.0 * np.pi * cycles * time / time[-1])
+    charge = np.cumsum(current) * 2.0 / 3600.0
+    noise = 1e-3 * np.random.default_rng(5).standard_normal(len(time))
+    flat = np.round(3.3 - 0.012 * current - 0.005 * charge + noise, 3)
+    read_measurement(written(tmp_path, time, current, flat))
+    assert "the voltage rises with the current" in refusal(tmp_path, time, -current, flat)
+
+
+def test_a_charge_whose_current_only_falls_has_no_wrong_sign(tmp_path):
+    current = -3.0 * np.exp(-TIME / 3000.0)
+    resting = 3.4 + 0.02 * np.sin(TIME / 500.0)
+    read_measurement(written(tmp_path, TIME, current, np.round(resting - 0.02 * current, 3)))

@@ -222,6 +222,20 @@ def test_a_gap_is_refused_with_both_ways_out(tmp_path):
     assert len(read_measurement(written(tmp_path, content), start_s=149)) == N - 149
 
 
+def test_gaps_some_rows_apart_hid_one_another(tmp_path):
+    lines = text().split("\n")
+    message = refusal(tmp_path, "\n".join(lines[:60] + lines[100:108] + lines[150:]))
+    assert "gap of 41 s after 58 s" in message
+
+
+def test_the_intervals_of_a_logger_that_writes_slowly_in_a_rest_are_no_gaps():
+    after_pulse = np.array([*np.ones(20), 60.9, 52.4, *np.ones(20)])  # of an HPPC test at one row in a minute
+    at_changes = np.tile([1.0, 1.0, 2.0, 5.0, 12.0, 50.0, 600.0, 530.0], 5)
+    pairs_at_steps = np.tile([0.1, 60.0], 30)
+    for step in (after_pulse, at_changes, pairs_at_steps):
+        assert find_gaps({"time_s": np.cumsum(step)}) == []
+
+
 def test_the_time_of_a_step_was_proposed_beside_that_of_the_test(tmp_path):
     table = text(header="Time,I[A],U[V]").splitlines()
     total = [f"{row},{cell}" for row, cell in zip(table, ["Total Time (h)", *TIME / 3600], strict=True)]
@@ -366,6 +380,32 @@ def test_a_table_without_names_says_its_first_row_and_how_columns_are_called(tmp
     assert "#2 '0.0', #3 '3.6'" in said
 
 
+@pytest.mark.parametrize("separator", [";", "\t"])
+@pytest.mark.parametrize("decimal", [".", ","])
+@pytest.mark.parametrize(
+    "names", [(), ("Zeit, s", "Strom, A", "U1, U2, V")], ids=["no names", "names with commas"]
+)
+def test_a_table_was_cut_at_the_commas_of_its_numbers_or_names(tmp_path, separator, decimal, names):
+    columns = dict(zip(BY_NUMBER, names or BY_NUMBER.values(), strict=True))
+    rows = text(header="", separator=separator).replace(".", decimal).lstrip()
+    path = written(tmp_path, f"{separator.join(names)}\n{rows}".lstrip(), "drive.txt")
+    assert_same(read_measurement(path, columns))
+
+
+@pytest.mark.parametrize("decimal", [".", ","])
+def test_a_decimal_comma_was_not_seen_behind_a_rest_in_whole_numbers(tmp_path, decimal):
+    rest_s = 120
+    current = np.concatenate([np.zeros(rest_s), CURRENT])
+    voltage = np.concatenate([np.full(rest_s, 3700.0), 1e3 * VOLTAGE])
+    rows = (
+        f"{t};{i:g};{v:.6g}".replace(".", decimal)
+        for t, (i, v) in enumerate(zip(current, voltage, strict=True))
+    )
+    path = written(tmp_path, "\n".join(["time_s;current_a;voltage_v", *rows, ""]))
+    record = read_measurement(path, units={"voltage_v": "mV"})
+    np.testing.assert_allclose(record.voltage_v[rest_s:], VOLTAGE, atol=1e-3)
+
+
 def test_a_number_that_no_column_has_is_told(tmp_path):
     path = tmp_path / "drive.csv"
     path.write_text(NAMELESS)
@@ -399,7 +439,7 @@ def test_temperature_can_be_left_out(tmp_path):
     assert read_measurement(path, {"temperature_degc": None}).temperature_degc is None
 
 
-@pytest.mark.parametrize("stated", ["40", "-10.5", "0"])
+@pytest.mark.parametrize("stated", ["40", "-10.5", "0", 40, -10.5, 0])
 def test_a_temperature_that_is_known_needed_a_column(tmp_path, stated):
     path = tmp_path / "drive.csv"
     path.write_text(text())
@@ -408,6 +448,17 @@ def test_a_temperature_that_is_known_needed_a_column(tmp_path, stated):
     assert [note for note in record.notes if "temperature" in note] == [
         f"drive.csv: temperature_degc is {stated} in every row, as stated."
     ]
+
+
+@pytest.mark.parametrize(("stated", "unit"), [("77", "degF"), ("298.15", "K")])
+def test_the_unit_of_a_stated_temperature_was_dropped(tmp_path, stated, unit):
+    record = read_measurement(
+        written(tmp_path, text()), {"temperature_degc": stated}, units={"temperature_degc": unit}
+    )
+    np.testing.assert_allclose(record.temperature_degc, 25.0)
+    assert record.notes == (
+        f"drive.csv: temperature_degc is {stated} {unit}, 25 degC, in every row, as stated.",
+    )
 
 
 def test_a_stated_temperature_that_no_cell_has_is_refused(tmp_path):
@@ -703,5 +754,5 @@ def test_looking_for_gaps_in_a_slowly_sampled_record_took_longer_than_reading_it
     began = time.process_time()
     found = find_gaps({"time_s": np.concatenate([[0.0], np.cumsum(step)])})
     assert time.process_time() - began < 0.5  # it was 2.8 s, row by row
-    assert found == [0, 299_999]  # each of the two in the middle has the other beside it
+    assert found == [0, 5000, 5003, 299_999]
     assert find_gaps({"time_s": np.array([0.0, 1e6])}) == []

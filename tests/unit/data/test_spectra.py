@@ -33,6 +33,24 @@ def test_spectra_of_one_state_are_told_apart_by_their_names(tmp_path, names):
     assert len(cold.frequency_hz) == len(warm.frequency_hz) == 2
 
 
+@pytest.mark.parametrize("again", [(), ("10,0.011,-0.002",)], ids=["a sweep", "with a frequency twice"])
+def test_a_state_that_is_counted_cut_a_spectrum_into_one_a_row(tmp_path, again):
+    points = [*POINTS, *again, "1,0.012,-0.003", "0.1,0.013,-0.004"]
+    rows = [f"{p},{ah + 1e-6 * k}" for ah in (0.5, 0.7) for k, p in enumerate(points)]
+    high, low = read_spectra(written(tmp_path, f"{COLUMNS},discharged_ah", *rows))
+    assert (high.discharged_ah, low.discharged_ah) == (0.5, 0.7)
+    assert len(high.frequency_hz) == len(low.frequency_hz) == len(points)
+
+
+@pytest.mark.parametrize("state", ["soc", "discharged_ah"])
+def test_rows_of_several_spectra_that_alternate_are_refused(tmp_path, state):
+    rows = [f"{point},{at}" for point in POINTS for at in (0.5, 0.4)]
+    with pytest.raises(
+        DataError, match=rf"row 3 \(line 4\), column {state}: 0.5, .* began at 0.4; put the rows"
+    ):
+        read_spectra(written(tmp_path, f"{COLUMNS},{state}", *rows))
+
+
 def test_spectra_of_several_temperatures_were_taken_for_one_of_their_mean(tmp_path):
     rows = [f"{point},0.5,{degc}" for degc in (0, 25) for point in POINTS]
     with pytest.raises(
@@ -89,6 +107,33 @@ def test_instruments_names_are_taken_with_their_units(tmp_path, header, rows):
     assert one.z_ohm.tolist() == pytest.approx([0.01 - 0.001j, 0.011 - 0.002j])
 
 
+@pytest.mark.parametrize(
+    ("name", "cell"),
+    [("Temperature/°C", "0.5"), ("T1 (K)", "273.65"), ("Temp [degF]", "32.9"), ("Temperature_degC", "0.5")],
+)
+def test_a_temperature_under_an_instruments_name_was_passed_over_and_25_degc_taken(tmp_path, name, cell):
+    rows = [f"{point},0.5,{cell}" for point in POINTS]
+    (one,) = read_spectra(written(tmp_path, f"{COLUMNS},soc,{name}", *rows))
+    assert one.temperature_degc == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("names", "told"),
+    [
+        ("Temperature", "'Temperature' says no known unit; write it behind the name"),
+        (
+            "T1/°C,T2/°C",
+            "'T1/°C', 'T2/°C' may be the cell's temperature; call the one that is temperature_degc",
+        ),
+        ("T_chamber/°C", "'T_chamber/°C' may be the cell's temperature"),
+    ],
+)
+def test_a_temperature_of_a_spectrum_that_cannot_be_told_is_asked_about(tmp_path, names, told):
+    rows = [f"{point},0.5{',5' * len(names.split(','))}" for point in POINTS]
+    with pytest.raises(DataError, match=told):
+        read_spectra(written(tmp_path, f"{COLUMNS},soc,{names}", *rows))
+
+
 @pytest.mark.parametrize("name", ["Zreal1", "Zreal1/MOhm"])
 def test_an_impedance_without_a_unit_is_told_where_it_belongs(tmp_path, name):
     """As Digatron writes it, below a line of units that names the test."""
@@ -114,4 +159,12 @@ def test_of_a_column_that_is_there_twice_the_first_was_taken_without_a_word(tmp_
 def test_an_imaginary_part_as_nyquist_plots_have_it_was_drawn_the_wrong_way_up(tmp_path):
     rows = ("100,0.010,-0.001,0.5", "0.1,0.011,0.002,0.5", "0.01,0.012,0.004,0.5")
     with pytest.raises(DataError, match=r"row 2 \(line 3\), column z_imag_ohm: .* turn its sign"):
+        read_spectra(written(tmp_path, f"{COLUMNS},soc", *rows))
+
+
+def test_an_imaginary_part_with_the_wrong_sign_was_read_where_the_sweep_ends_at_1_hz(tmp_path):
+    rows = ("100,0.010,-0.001,0.5", "10,0.011,0.002,0.5", "1,0.012,0.004,0.5")
+    with pytest.raises(
+        DataError, match=r"row 2 \(line 3\), column z_imag_ohm: .* up to 10 Hz, .* turn its sign"
+    ):
         read_spectra(written(tmp_path, f"{COLUMNS},soc", *rows))

@@ -151,6 +151,15 @@ def test_a_record_of_a_cell_thirty_times_smaller_is_not_taken_for_one_in_minutes
         check_belongs(m50, [replace(record, current_a=record.current_a / 30.0)])
 
 
+def test_a_quarter_of_a_discharge_between_two_rests_was_taken_with_its_time_in_minutes(m50):
+    time_s = np.arange(0.0, 3601.0, 10.0)
+    current_a = np.where((time_s >= 600.0) & (time_s < 2400.0), 0.5 * m50.nominal_capacity_ah, 0.0)
+    volts = aesi.simulate(m50, time_s, current_a, 0.55).voltage_v
+    check_belongs(m50, [Measurement(time_s, current_a, volts, name="part")])
+    with pytest.raises(DataError, match="time is in minutes or hours"):
+        check_belongs(m50, [Measurement(time_s / 60.0, current_a, volts, name="part")])
+
+
 def test_a_short_record_in_ma_was_said_to_be_of_many_cells_in_parallel(m50, record):
     with pytest.raises(DataError, match=r"--unit current_a=mA.*or the cell file is another's"):
         check_belongs(m50, [replace(record, current_a=record.current_a * 60.0)])

@@ -610,7 +610,7 @@ def test_a_start_was_read_by_the_current_as_it_was_written_where_the_cell_is_kno
     time = np.arange(1200.0)
     written = np.where(time < rests_s, 0.3 if name == "current_sensor_offset" else 0.0, 5.0)
     run = simulate(LG_M50, time, written, 0.9, effects, hold="backward")
-    saw = as_cell_saw(Record(time, written), effects)
+    saw = as_cell_saw(Record(time, written), effects).beside_voltage(True)
     found = initial_state(LG_M50, record(time, written, run.voltage_v), effects=effects)
     seen = initial_state(LG_M50, record(saw.time_s, saw.current_a, run.voltage_v))
     assert replace(found, sentence=seen.sentence) == seen
@@ -647,13 +647,28 @@ def test_a_temperature_that_an_effect_sets_right_is_the_one_a_start_is_read_at()
     )
 
 
+@pytest.mark.parametrize("lag_s", [-2.0, -0.3, 0.4])
+def test_a_lag_made_charge_of_the_long_rows_before_a_load(lag_s):
+    """Rows of a minute at rest and of a second under load: a row that began to be loaded was loaded all along."""
+    lag = [CATALOGUE["clock_skew"].activate(skew=0.0, lag_s=lag_s)]
+    time = np.concatenate(
+        [60.0 * np.arange(10.0), 540.0 + np.arange(1.0, 61.0), 600.0 + 60.0 * np.arange(1.0, 5.0)]
+    )
+    current = np.where((time > 540.0) & (time <= 600.0), 5.0, 0.0)
+    seen = as_cell_saw(Record(time, current), lag).beside_voltage(True)
+    moved = record(seen.time_s, seen.current_a, np.full(len(time), 3.7)).discharged_ah("backward")
+    assert moved[-1] == pytest.approx(5.0 / 60.0)
+    dense = (time > 545.0) & (time < 595.0)
+    assert np.all(seen.current_a[dense] == 5.0)
+
+
 def test_a_voltage_lost_before_the_end_leaves_what_the_cell_saw_until_then():
     """A voltage that is read 5 s early has the current of 5 s later, also beside its last row."""
     early = [CATALOGUE["clock_skew"].activate(skew=0.0, lag_s=-5.0)]
     time = np.arange(100.0)
     current = np.where(time < 43.0, 0.0, 5.0)
     voltage = simulate(LG_M50, time, current, 0.6, early, hold="backward").voltage_v
-    saw = as_cell_saw(Record(time, current), early)
+    saw = as_cell_saw(Record(time, current), early).beside_voltage(True)
     found = initial_state(
         LG_M50, record(time, current, np.where(time < 40.0, voltage, np.nan)), effects=early
     )
@@ -675,3 +690,11 @@ def test_a_few_rows_of_rest_before_a_load_left_doubts_of_a_tenth_and_more(rows):
     assert abs(found.soc - truth) < min(2.0 * found.sd, 0.02)
     assert found.sd < 0.03
     assert "too short to tell by itself" in found.sentence
+
+
+def test_a_third_of_the_uncertainty_was_told_without_a_word_where_the_potentials_are_fitted():
+    """The user of a simulation took the smaller one for that of its start."""
+    at_rest = resting(float(LG_M50.rest_voltage_v(0.5)[0]))
+    told = {v: initial_state(LG_M50, at_rest, potentials_v=v).sentence for v in (READING_V, GOOD_READING_V)}
+    assert told[GOOD_READING_V].endswith(" by potentials that are fitted with it.")
+    assert "potentials" not in told[READING_V]

@@ -14,11 +14,11 @@ from aesi.physics import Cell, impedance, simulate
 from aesi.physics.cell.parts import NO_ENTROPY
 from aesi.physics.cell.relations import Constant, Expression, LookupTable, scaled
 from aesi.physics.effects import CATALOGUE
+from aesi.physics.effects.self_heating import of_file
 from aesi.physics.simulation import solver as _solver
 
-LG_M50 = Cell.from_bpx(
-    Path(__file__).resolve().parents[3] / "experiments" / "cells" / "lg_m50_chen2020.bpx.json"
-)
+CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
+LG_M50 = Cell.from_bpx(CELLS / "lg_m50_chen2020.bpx.json")
 
 
 def lithium_in_negative_ah(cell, run):
@@ -231,6 +231,18 @@ def test_a_winding_follows_a_constant_case_too_and_nothing_else_heats_it(nmc):
     assert warmed.voltage_v == pytest.approx(plain.voltage_v, abs=1e-12)
     without = simulate(cell, time, current, 0.9)
     assert without.series["temperature_k"] == pytest.approx(298.15)
+
+
+def test_one_full_particle_took_all_heat_from_a_porous_electrode():
+    """Of sizes, the smallest is full long before the electrode is."""
+    cell = Cell.from_bpx(CELLS / "panasonic_ncr18650pf.bpx.json")
+    sizes = CATALOGUE["particle_size_distribution"].activate(negative_sd=0.5, positive_sd=0.5)
+    time = np.arange(0.0, 1750.0, 5.0)
+    charge = np.full(len(time), -cell.nominal_capacity_ah)
+    effects = [of_file(cell), sizes]
+    run = simulate(cell, time, charge, 0.3, effects, model="dfn", on_depletion="clip", hold="backward")
+    assert not run.series["depleted"].any()
+    assert np.diff(run.series["temperature_k"])[-80:].min() > -1e-3
 
 
 def test_an_empty_cell_names_time_and_electrode(lg_m50):

@@ -134,7 +134,8 @@ def test_one_record_is_named_and_its_error_is_no_range(content):
     content["files"] = content["files"][:1]
     assert finding(content) == (
         "In free run the calibrated model errs by 2.0 mV RMSE on pulses, where the start file erred by 30.0 mV. "
-        "Simulated without what a record has of its own, the file errs by 4.0 mV."
+        "With the file as it is written, without a record's own start, capacity and current offset, the error is "
+        "4.0 mV."
     )
 
 

@@ -117,7 +117,8 @@ def test_what_was_not_tried_is_said_so_that_no_verdict_is_read_as_one_about_it(t
     (none, at) = case_of_files(BPX, [record], max_effects=0).notes
     assert none.startswith("no effect is tried")
     assert at.endswith(
-        "no temperature in it; taken at 25 degC, as the cell's file declares; a column temperature_degc says another."
+        "no temperature column; taken at 25 degC, as the cell's file declares; for another one add a column "
+        "temperature_degc, or give --column temperature_degc=40."
     )
 
 

@@ -240,6 +240,12 @@ def test_who_computes_and_where_it_is_tracked_is_no_part_of_the_identity():
     assert parse_experiment({**CONTENT, "seed": 1}).setting == one.setting
 
 
+def test_a_stated_temperature_needed_quotes():
+    data = {**CONTENT["data"], "columns": {"temperature_degc": 40}}
+    config = parse_experiment({**CONTENT, "data": data})
+    assert config.data.reading.columns == {"temperature_degc": "40"}
+
+
 def test_a_config_survives_json():
     config = parse_experiment(CONTENT)
     assert ExperimentConfig.model_validate_json(config.model_dump_json()).digest == config.digest

@@ -1,5 +1,7 @@
 """Keys of what rests on a saved model follow the effect of the user's own that it names."""
 
+import json
+
 import pytest
 from lead_effect import OWN
 from small_experiment import BPX, SOC0, experiment, write_record
@@ -20,9 +22,12 @@ def own(tmp_path):
 
 @pytest.fixture
 def model(tmp_path, own):
-    """The folder of a saved model that names the effect."""
-    effects = (load_effect(own).activate(lead_ohm=1e-3),)
-    return HybridModel(Cell.from_bpx(BPX), effects).save(tmp_path / "found")
+    """The folder of a saved model that names the effect elsewhere, as before a copy lay in it."""
+    (effect,) = effects = (load_effect(own).activate(lead_ohm=1e-3),)
+    folder = HybridModel(Cell.from_bpx(BPX), effects).save(tmp_path / "found")
+    (folder / "lead.py").unlink()
+    (folder / "effects.json").write_text(json.dumps([effect.to_dict()]))
+    return folder
 
 
 def edit(file):
@@ -60,3 +65,9 @@ def test_an_effect_file_that_is_gone_is_no_content(model, own):
     of_both = contents([model])
     own.unlink()
     assert contents([model]) == of_both[:-1]
+
+
+def test_the_copy_of_an_effect_in_a_saved_model_is_content_once(tmp_path, own):
+    folder = HybridModel(Cell.from_bpx(BPX), (load_effect(own).activate(),)).save(tmp_path / "copied")
+    assert effect_files(folder) == [folder / "lead.py"]
+    assert contents([folder]).count(own.read_bytes()) == 1

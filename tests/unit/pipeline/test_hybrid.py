@@ -320,7 +320,7 @@ def test_a_cold_record_had_no_correction_and_nothing_said_so(fading, data, tmp_p
     table, said = predicted(0.0)
     assert "100 % of the rows lie outside the range the correction was trained on" in said
     assert (
-        "at 0.0 degC, 24 K below what it was trained at, it has faded to 0 % of itself: this is the physics"
+        "at 0.0 degC, 24 K below what it was trained at, none of the correction is applied: this is the physics"
         in said
     )
     assert table["outside"].all()
@@ -328,21 +328,24 @@ def test_a_cold_record_had_no_correction_and_nothing_said_so(fading, data, tmp_p
     np.testing.assert_allclose(
         table["voltage_v"][1:], table["physics_v"][1:], atol=1e-4
     )  # the first is measured
-    assert "0 % of itself: this is the physics model and its last measured error." in predicted(0.0, True)[1]
+    assert (
+        "none of the correction is applied: this is the physics model and its last measured error."
+        in predicted(0.0, True)[1]
+    )
 
     table, said = predicted(18.0)
     assert table["outside"].all()
     assert 0.2 < table["weight"].mean() < 0.7
     share = f"{100 * table['weight'].mean():.2g} %"
     assert (
-        f"at 18.0 degC, 6 K below what it was trained at, it has faded to {share} of itself in the mean"
+        f"at 18.0 degC, 6 K below what it was trained at, {share} of the correction are applied on average"
         in said
     )
 
     table, said = predicted(24.0)
     assert table["outside"].mean() < 0.05  # simulated a kelvin colder than it was trained
     assert table["weight"].mean() > 0.995
-    assert "faded" not in said
+    assert "of the correction" not in said
 
 
 def test_a_model_that_does_not_fade_keeps_all_and_one_without_a_correction_has_none_to_keep(model, data):
@@ -555,7 +558,7 @@ def test_the_temperature_that_a_prediction_is_made_at_is_said(model, data, tmp_p
         words = (
             "at 11 degC in every row, as its column states"
             if columns
-            else "no temperature in it; taken at 25 degC"
+            else "no temperature column; taken at 25 degC"
         )
         assert any(note.startswith(f"{name}: {words}") for note in said)
 
@@ -616,7 +619,7 @@ def test_what_a_discovery_had_written_into_the_cell_was_simulated_without_a_word
     found = HybridModel(inside.cell, inside.left, held=tuple(map(repr, inside.held)))
     said: list[str] = []
     simulate_file(found.save(tmp_path / "found"), record, tmp_path / "o.csv", say_notes=said.extend)
-    words = ": by a cell whose values hold series_resistance(resistance_ohm=0.002)."
+    words = ": the saved model includes series_resistance(resistance_ohm=0.002)."
     assert any(note.endswith(words) for note in said)
     assert "changed by series_resistance(resistance_ohm=0.002)" in repr(HybridModel.load(tmp_path / "found"))
 
@@ -631,8 +634,8 @@ def test_what_was_fitted_beside_a_finding_was_told_with_its_values_as_if_found(m
     simulate_file(found.save(tmp_path / "found"), record, tmp_path / "o.csv", say_notes=said.extend)
     assert any(
         note.endswith(
-            ": by a cell whose values hold series_resistance(resistance_ohm=0.008); with what was fitted beside: "
-            "voltage_sensor_offset, solid_diffusivity."
+            ": the saved model includes series_resistance(resistance_ohm=0.008); and other parameters that were fitted "
+            "together: voltage_sensor_offset, solid_diffusivity."
         )
         for note in said
     )
@@ -649,7 +652,18 @@ def test_what_a_model_was_found_to_be_worth_was_told_by_its_report_alone(model, 
     for use in (predict_file, simulate_file):
         said: list[str] = []
         use(found.save(tmp_path / "model"), record, tmp_path / "o.csv", say_notes=said.extend)
-        assert "when this model was made: it does not help; use the ESPM alone." in said
+        assert ("when this model was made: it does not help; use the ESPM alone." in said) == (
+            use is predict_file
+        )
+
+
+def test_what_a_model_without_a_correction_was_found_to_be_worth_is_told_of_its_simulation(
+    model, record, tmp_path
+):
+    found = replace(model, correction=None, finding="use it.")
+    said: list[str] = []
+    simulate_file(found.save(tmp_path / "model"), record, tmp_path / "o.csv", say_notes=said.extend)
+    assert "when this model was made: use it." in said
 
 
 def test_round_off_at_a_full_charge_was_told_as_rows_beyond_it(model, data):
@@ -667,7 +681,7 @@ def test_a_correction_that_harms_a_record_was_told_by_its_csv_alone(model, data)
         (
             far,
             near,
-            "at most 3.0 mV; the physics alone 2.00 mV RMSE: without the correction this record is met better.",
+            "at most 3.0 mV; the physics alone 2.00 mV RMSE: without the correction the error on this record is lower.",
         ),
         (near, near, "at most 2.0 mV; the physics alone 2.00 mV RMSE."),
         (near, None, "at most 2.0 mV."),

@@ -64,9 +64,9 @@ def test_spectra_in_milliohm_were_held_against_a_cell_in_ohm(cell):
 
 def test_a_calibration_went_on_to_its_end_where_no_spectrum_could_be_used(cell):
     check_spectra(cell, [])
-    check_spectra(cell, [spectrum(cell, soc=50.0), spectrum(cell, soc=0.5)])
-    with pytest.raises(DataError, match=r"s: its state of charge of 50 is not .* there is no other"):
-        check_spectra(cell, [spectrum(cell, soc=50.0)])
+    check_spectra(cell, [spectrum(cell, soc=1.05), spectrum(cell, soc=0.5)])
+    with pytest.raises(DataError, match=r"s: its state of charge of 1.05 is not .* there is no other"):
+        check_spectra(cell, [spectrum(cell, soc=1.05)])
 
 
 def test_an_assumed_temperature_is_said_and_a_state_is_not_assumed(cell):

@@ -15,6 +15,7 @@ def row(parameter, value, deviations, at_limit=False, effect="solid_diffusivity"
         "value": value,
         "unit": "dimensionless",
         "deviations": deviations,
+        "one_sd": 0.35,
         "at_limit": at_limit,
     }
 
@@ -30,9 +31,9 @@ def test_what_moved_is_named_with_how_far_and_what_ended_on_its_limit_is_said_so
         REFIT | {"effects": [], "own_parameters": {"recalibrated": [FAR, STAYED], "after": [FAR]}}
     )
     assert text == (
-        "Recalibrating moves solid diffusivity (negative) to 0.18 times declared (4.0 standard deviations of its "
-        "tolerance). Solid diffusivity (negative) stopped at its limit, so that its value is the limit's, not the "
-        "data's."
+        "Recalibrating moves solid diffusivity (negative) to 0.18 times declared (4.0 standard deviations, one of "
+        "which is 35 % in this fit). Solid diffusivity (negative) stopped at its limit, so that its value is the "
+        "limit's, not the data's."
     )
 
 
@@ -43,13 +44,17 @@ def test_a_factor_that_moved_by_a_little_is_not_called_once_what_was_declared():
 
 def test_what_was_put_on_top_of_the_file_was_told_as_all_of_it():
     """`series resistance to 4.1 mohm` was of a file that declares contacts of its own."""
-    added = row("resistance_ohm", 4.1e-3, 1.2, True, "series_resistance") | {"declared": 0.0, "unit": "ohm"}
-    lower = row("a2_v", -5.6e-3, -1.3, True, "ocp_shape") | {"declared": 0.0, "unit": "V"}
+    added = row("resistance_ohm", 4.1e-3, 1.2, True, "series_resistance") | {
+        "declared": 0.0,
+        "unit": "ohm",
+        "one_sd": 3.4e-3,
+    }
+    lower = row("a2_v", -5.6e-3, -1.3, True, "ocp_shape") | {"declared": 0.0, "unit": "V", "one_sd": 4.3e-3}
     (text,) = moved_findings(REFIT | {"effects": [], "own_parameters": {"recalibrated": [lower, added]}})
     assert text == (
-        "Recalibrating moves ocp shape (a2) by -5.6 mV (1.3 standard deviations of its tolerance); series resistance "
-        "by +4.1 mohm (1.2 standard deviations of its tolerance). Ocp shape (a2) and series resistance stopped at "
-        "their limits, so that their values are the limits', not the data's."
+        "Recalibrating moves ocp shape (a2) by -5.6 mV (1.3 standard deviations, one of which is 4.3 mV in this fit); "
+        "series resistance by +4.1 mohm (1.2 standard deviations, one of which is 3.4 mohm in this fit). Ocp shape "
+        "(a2) and series resistance stopped at their limits, so that their values are the limits', not the data's."
     )
 
 
@@ -57,22 +62,24 @@ def test_with_a_finding_the_fit_beside_it_is_told_too():
     texts = moved_findings(
         OTHER | {"effects": ["self_heating"], "own_parameters": {"recalibrated": [FAR], "after": [STAYED]}}
     )
-    assert texts[1] == "Beside the finding the fit moves no declared parameter by more than its tolerance."
+    assert texts[1] == (
+        "Beside the finding the fit moves no declared parameter by more than a standard deviation of what it allows it."
+    )
 
 
 def test_where_nothing_was_fitted_nothing_is_told():
     assert moved_findings(REFIT | {"effects": [], "own_parameters": {"recalibrated": [], "after": []}}) == []
 
 
-def test_a_state_of_charge_is_told_with_what_was_declared():
+def test_a_state_of_charge_that_was_read_was_told_as_declared():
     moved = row("drive", 0.973, -2.7, effect="soc0") | {"unit": "1"}
     text = moved_summary([moved, STAYED])
-    assert text == "the initial state of charge of drive 0.973 (declared 1)"
+    assert text == "the initial state of charge of drive 0.973 (from 1)"
 
 
 def test_a_state_that_moved_a_little_was_told_to_have_moved_to_where_it_was():
     moved = row("drive", 0.99951, -2.9, effect="soc0") | {"unit": "1"}
-    assert moved_summary([moved]) == "the initial state of charge of drive 0.9995 (declared 1)"
+    assert moved_summary([moved]) == "the initial state of charge of drive 0.9995 (from 1)"
 
 
 def test_a_refit_that_moved_only_what_was_found_is_the_same_explanation():

@@ -215,7 +215,7 @@ def test_one_hypothesis_was_told_as_all_1_hypotheses(views, tmp_path):
     view = views.discovery_view(200)
     rows = view.discovery["candidates"][:1]
     moved = {"effect": "solid_diffusivity", "parameter": "negative_factor", "declared": 1.0, "value": 0.2}
-    moved |= {"unit": "dimensionless", "deviations": -4.0, "at_limit": False}
+    moved |= {"unit": "dimensionless", "deviations": -4.0, "one_sd": 0.3, "at_limit": False}
     one = {**view.discovery, "candidates": rows, "own_parameters": {"recalibrated": [moved]}}
     text = write_discovery_report(tmp_path / "r.html", replace(view, discovery=one)).read_text()
     assert "<summary>The hypothesis with its parameters</summary>" in text

@@ -13,8 +13,8 @@ from aesi.pipeline.report.words.sizes import finding_line
 
 def test_a_gain_is_told_with_both_errors_and_the_regime(views):
     text = runs.run_finding(views.run_view(200))
-    assert "13.2 mV to 4.1 mV" in text
-    assert "without any measured voltage" in text
+    assert "is 4.1 mV with ESPM + AESI I and 13.2 mV with the ESPM alone" in text
+    assert "in free run" in text
 
 
 def test_a_harmful_correction_is_called_harmful(views):
@@ -48,9 +48,8 @@ def test_a_correction_that_does_not_beat_the_physics_it_was_learned_on_is_told_s
     row = {"name": "ESPM recalibrated", "free_run": {"test_rmse_mv": 3.9}}
     learned = replace(view, models=(*view.models, row), corrected="ESPM recalibrated")
     assert runs.run_finding(learned) == (
-        "On test records that chose nothing, run without any measured voltage, the ESPM recalibrated takes the voltage "
-        "error from 13.2 mV of the ESPM to 3.9 mV RMSE; the correction learnt on top of it does not help: "
-        f"{view.chosen} leaves 4.1 mV."
+        "On held-out test records, in free run, the RMSE is 3.9 mV with the ESPM recalibrated and 13.2 mV with the "
+        f"ESPM as declared. The correction learnt on top of it does not help: {view.chosen} leaves 4.1 mV."
     )
     assert runs.refit_finding(learned) == ""
     better = replace(learned, models=(*view.models, {**row, "free_run": {"test_rmse_mv": 9.0}}))
@@ -115,8 +114,8 @@ def test_a_band_of_92_mv_about_an_error_of_3_was_told_without_the_start_that_mak
         row | {"free_run_intervals": row["free_run_intervals"] | {"start_v": 0.0123}}
     )
     assert told.endswith(
-        "24.0 mV wide. It holds that the state of charge at the start is read from a voltage, a standard deviation of "
-        "which is worth 12.3 mV; cell.soc0 gives one that is known."
+        "24.0 mV wide. It includes the uncertainty of the initial state of charge, which is read from a voltage: one "
+        "standard deviation is 12.3 mV. Give cell.soc0 if it is known."
     )
 
 
@@ -126,7 +125,8 @@ def test_errors_that_are_told_apart_late_have_more_digits(views):
     figures = {"test_rmse_mv": 4.12, "test_mser_pct": 90.3}
     models = (view.models[0], {**view.models[1], "free_run": figures}, row)
     said = runs.run_finding(replace(view, models=models, corrected="ESPM recalibrated"))
-    assert "4.13 mV of the ESPM recalibrated to 4.12 mV RMSE: 0.5 % less mean squared error" in said
+    assert "4.12 mV with ESPM + AESI I, 4.13 mV with the ESPM recalibrated alone" in said
+    assert "removes 0.5 % of the mean squared error" in said
 
 
 def test_the_correction_was_credited_with_what_the_recalibration_does(views, tmp_path):
@@ -135,9 +135,9 @@ def test_the_correction_was_credited_with_what_the_recalibration_does(views, tmp
     row = {"name": "ESPM recalibrated", "free_run": {"test_rmse_mv": 8.2}}
     learned = replace(view, models=(*view.models, row), corrected="ESPM recalibrated")
     assert runs.run_finding(learned) == (
-        "On test records that chose nothing, run without any measured voltage, ESPM + AESI I takes the voltage error "
-        "from 13.2 mV of the ESPM and 8.2 mV of the ESPM recalibrated to 4.1 mV RMSE: 75.0 % less mean squared error "
-        "than the ESPM recalibrated, on which it was learnt (90.3 % less than the ESPM as declared)."
+        "On held-out test records, in free run, the RMSE is 4.1 mV with ESPM + AESI I, 8.2 mV with the ESPM "
+        "recalibrated alone and 13.2 mV with the ESPM as declared. The correction removes 75.0 % of the mean squared "
+        "error that the ESPM recalibrated leaves (90.3 % of that of the ESPM as declared)."
     )
     assert runs.own_share(learned) == pytest.approx(75.0)
     assert runs.own_share(replace(learned, chosen="ESPM recalibrated")) is None
@@ -154,11 +154,12 @@ def test_other_corrections_that_do_better_are_told(views):
     rows = [{"name": name, "free_run": {"test_rmse_mv": error}} for name, error in names.items()]
     physics = [{"name": "ESPM recalibrated", "free_run": {"test_rmse_mv": 1.0}}]
     assert runs.others_finding(replace(view, models=(view.models[0], *rows, *physics))) == (
-        "2 of 3 other corrections learnt on the same records err less there, ESPM + constant least: 3.2 mV."
+        "2 of 3 other corrections learnt on the same records have a lower RMSE there; the lowest is that of ESPM + "
+        "constant, 3.2 mV."
     )
     assert runs.others_finding(replace(view, models=(view.models[0], rows[0], rows[3]))) == ""
     assert runs.others_finding(replace(view, models=(view.models[0], rows[0], rows[1]))) == (
-        "The other correction learnt on the same records, ESPM + ridge, errs less there: 3.9 mV."
+        "The other correction learnt on the same records, ESPM + ridge, has a lower RMSE there: 3.9 mV."
     )
 
 
@@ -184,9 +185,9 @@ def test_a_correction_that_had_faded_to_nothing_was_told_as_held_at_the_edge():
     model = {"free_run": {"outside_pct": 47.0}, "test_records": {"cold": cold, "near": near, "same": same}}
     assert runs.outside_finding(model) == (
         "cold: 100 % of the rows lie outside the range the correction was trained on; at -0.2 degC, 24 K below what it "
-        "was trained at, it has faded to 0 % of itself: this is the physics model. near: 41 % of the rows lie outside "
-        "the range the correction was trained on; it has faded to 93 % of itself in the mean, the rest is left to the "
-        "physics."
+        "was trained at, none of the correction is applied: this is the physics model. near: 41 % of the rows lie "
+        "outside the range the correction was trained on; 93 % of the correction are applied on average, the rest is "
+        "left to the physics."
     )
 
 
@@ -266,7 +267,7 @@ def test_a_written_model_that_leaves_more_of_what_it_was_fitted_to_than_a_refit_
     view = views.discovery_view(200, verdict="unknown")
     states = {name: {"fit": {"rmse_mv": left}} for name, left in (("recalibrated", 5.05), ("after", 28.46))}
     text = discoveries.short_finding(view.discovery | states)
-    assert text.endswith("; a refit alone errs less on what was fitted")
+    assert text.endswith("; a refit alone has the lower error on what was fitted")
     as_good = states | {"after": {"fit": {"rmse_mv": 5.2}}}
     assert "what was fitted" not in discoveries.short_finding(view.discovery | as_good)
 
@@ -520,7 +521,7 @@ def test_an_unknown_says_what_came_nearest_and_what_to_do_next(views):
     assert named.startswith("Next: ")
     assert named.endswith("aesi run learns what is left.")
     assert discoveries.next_finding(views.discovery_view(200).discovery) == ""
-    assert "models like this one miss it by some 9 mV" in discoveries.reason_finding(view.discovery)
+    assert "models of measured cells have an error of some 9 mV" in discoveries.reason_finding(view.discovery)
 
 
 def test_the_closest_rival_of_a_finding_is_named_with_its_distance(views):

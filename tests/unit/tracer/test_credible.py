@@ -1,5 +1,8 @@
 """Intervals of parameters inside their bounds and on them, against densities worked out by quadrature."""
 
+from types import SimpleNamespace
+from unittest.mock import Mock
+
 import numpy as np
 import pytest
 
@@ -8,8 +11,9 @@ from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import prepare_all
 from aesi.tracer.decide.verdict import Thresholds, judged
 from aesi.tracer.likelihood.credible import reaches
+from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.gaussian import BlockSums, Posterior
-from aesi.tracer.report.candidate_effects import CandidateEffect, best_first, estimates, ranking
+from aesi.tracer.report.candidate_effects import CandidateEffect, best_first, estimates, ranking, refused
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.forward import searched
 
@@ -66,6 +70,32 @@ def test_a_parameter_that_ended_at_nought_has_an_interval_with_a_width_and_a_uni
     resistance = next(row for row in rows if row.effect == "series_resistance").parameters["resistance_ohm"]
     assert resistance.value == resistance.low == 0.0
     assert 1e-6 < resistance.high < 1e-2
+
+
+def fitted(hypothesis, total, evidence):
+    one = Mock(spec=FittedHypothesis)
+    one.hypothesis, one.at_bounds = hypothesis, ()
+    one.score = SimpleNamespace(total=total, evidence=evidence)
+    return one
+
+
+def test_what_said_more_of_unseen_data_and_was_not_taken_had_no_reason():
+    chosen = fitted(("series_resistance",), 100.0, 90.0)
+    path = SimpleNamespace(
+        chosen=chosen, admission_nats=5.0, problem=SimpleNamespace(competing=lambda: range(20))
+    )
+    more = fitted(("series_resistance", "porosity"), 103.9, 91.0)
+    assert refused(path, more) == (
+        "3.9 nats better on unseen data than what was chosen, no more than the 5.0 that chance may give one more effect"
+    )
+    other = fitted(("porosity", "electrolyte_transport"), 100.7, 88.0)
+    assert refused(path, other) == (
+        "0.7 nats better on unseen data than what was chosen, but 5.0 nats less plausible by its marginal likelihood, "
+        "with a price for each name"
+    )
+    assert refused(path, fitted(("porosity",), 99.0, 95.0)) == (
+        "1.0 nats worse on unseen data than what was chosen"
+    )
 
 
 def test_what_a_growth_left_on_a_bound_of_its_parent_has_an_interval_too(cell, make):

@@ -1,7 +1,9 @@
 """Scalars that fits move: their coordinates, bounds and starts, and what acts on a record beside good ones."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -22,6 +24,7 @@ from aesi.tracer.case.free_parameter import (
     values_of,
 )
 from aesi.tracer.case.trust import own_sd
+from aesi.tracer.report.own_parameters import own_parameters
 
 FACTOR = Parameter(2.0, "1", bounds=(0.1, 10.0), source="test", log=True, neutral=1.0)
 OHM = Parameter(1e-3, "ohm", bounds=(0.0, 0.1), source="test", neutral=0.0)
@@ -139,3 +142,23 @@ def test_a_file_of_a_measured_cell_is_believed_where_its_instruments_are_not():
 def test_a_parameter_that_vanishes_outside_its_bounds_is_refused():
     with pytest.raises(ParameterError, match=r"neutral = 0 1 is outside \[0.5, 2\]"):
         Parameter(1.0, "1", bounds=(0.5, 2.0), source="test", neutral=0.0)
+
+
+def test_how_far_a_parameter_went_was_told_in_deviations_whose_size_nobody_said():
+    """A tenth of the tolerance counted as one deviation in one fit, all of it in another."""
+    diffusivity = CATALOGUE["solid_diffusivity"].parameters["negative_factor"]
+    offset = CATALOGUE["voltage_sensor_offset"].parameters["offset_v"]
+    open_ones = [
+        own("solid_diffusivity", "negative_factor", diffusivity, 0.3),
+        own("voltage_sensor_offset", "offset_v", offset, 3e-4),
+    ]
+    values = {
+        "solid_diffusivity": {"negative_factor": float(np.exp(-0.6))},
+        "voltage_sensor_offset": {"offset_v": 3e-4},
+    }
+    state = SimpleNamespace(
+        values=values, hypothesis=(), problem=SimpleNamespace(free=lambda hypothesis: open_ones)
+    )
+    factor, shift = own_parameters(state)
+    assert (factor.deviations, factor.one_sd) == (pytest.approx(-2.0), pytest.approx(1.0 - np.exp(-0.3)))
+    assert (shift.deviations, shift.one_sd) == (pytest.approx(1.0), pytest.approx(3e-4))

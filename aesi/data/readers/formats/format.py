@@ -23,10 +23,12 @@ class Name:
 
     pattern : of the whole name as `plain` writes it; a group `unit` takes the unit that stands in the name.
     unit : where the name does not say it.
+    less : pattern of a column that has to be subtracted where it is there, both being against a reference.
     """
 
     pattern: str
     unit: str = ""
+    less: str = ""
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,14 @@ class Format:
                 if quantity not in units.SI or unit:
                     return position, unit
         return None
+
+    def to_subtract(self, quantity: str, position: int, header: Sequence[str]) -> str | None:
+        """The column that the one at `position`, which is not the quantity by itself, has to be taken less by."""
+        names = [plain(name) for name in header]
+        less = [c.less for c in self.columns[quantity] if c.less and re.fullmatch(c.pattern, names[position])]
+        return next(
+            (header[i] for i, name in enumerate(names) for one in less if re.fullmatch(one, name)), None
+        )
 
 
 def plain(name: str) -> str:

@@ -59,7 +59,8 @@ def _files(content: Mapping[str, Any]) -> list[str]:
         *rows,
         "",
         "Errors are RMSE on the data that were fitted: after, each record with what it has of its own (its capacity "
-        "over the file's, its start, its cycler's zero); as simulated, the file as it is on the current as measured.",
+        "over the file's, its start, its current sensor's offset); as simulated, the file as it is on the current as "
+        "measured.",
     ]
 
 

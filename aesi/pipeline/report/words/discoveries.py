@@ -61,7 +61,7 @@ def _worse_on_fit(discovery: Mapping[str, Any]) -> str:
     if not left.keys() >= {"recalibrated", "after"} or _written_as(discovery) == "before":
         return ""
     worse = left["after"] > AS_GOOD * left["recalibrated"]
-    return f"{ALONE['recalibrated']} errs less on what was fitted" if worse else ""
+    return f"{ALONE['recalibrated']} has the lower error on what was fitted" if worse else ""
 
 
 ALONE = {"before": "the declared model", "recalibrated": "a refit alone"}
@@ -197,8 +197,8 @@ def reason_finding(discovery: Mapping[str, Any]) -> str:
 
 
 OF_MEASURED = (
-    "Expect an unknown of a measured cell by itself: models like this one miss it by some "
-    f"{MV_PER_V * MEASURED_V:.0f} mV; a name beside it is the part that stands out."
+    "Expect an unknown of a measured cell by itself: models of measured cells have an error of some "
+    f"{MV_PER_V * MEASURED_V:.0f} mV, and a name beside it explains what exceeds that."
 )
 """Sentence on a verdict of `unknown`, which measured cells nearly always have."""
 
@@ -214,8 +214,8 @@ def next_finding(discovery: Mapping[str, Any], titles: Mapping[str, str] | None 
     nearest += f" ({remark})" if remark else ""
     return (
         f"{nearest}{'. ' if nearest else ''}Next: data of another kind (a slow discharge, pulses with rests, another "
-        "temperature) would narrow it down, and beside a record of the cell that is known to be good (--good) the "
-        "answer can be found or none; aesi run learns what is left"
+        "temperature) would narrow it down, and with a known-good record of the cell (--good) the verdict can be "
+        "'found' or 'none'; aesi run learns what is left"
         f"{'' if discovery['effects'] else ', best from the declared file'}."
     )
 

@@ -7,14 +7,15 @@ from typing import Any
 
 from aesi.pipeline.report.views import Row
 from aesi.pipeline.report.words.discoveries import WITH_FINDING, listed, raised, states_of
-from aesi.pipeline.report.words.sizes import TELLING, name_words, resized, rounded
+from aesi.pipeline.report.words.sizes import PERCENT, TELLING, name_words, resized, rounded
 
 MOST_NAMED = 3
 """Parameters that one sentence names."""
 MOST_DIGITS = 6
 """Most digits: a state of charge is known to a ten-thousandth at best."""
+STATE_OF_CHARGE = "soc0"
 OF_A_RECORD = {
-    "soc0": "the initial state of charge of {}",
+    STATE_OF_CHARGE: "the initial state of charge of {}",
     "capacity_share": "the share of its capacity that the cell had in {}",
 }
 """Owner of a parameter that belongs to a record -> words in place of an effect."""
@@ -49,7 +50,7 @@ def resized_finding(discovery: Mapping[str, Any]) -> str:
 def _sentence(words: str, rows: Sequence[Row]) -> str:
     furthest = [row for row in rows if abs(row["deviations"]) > TELLING]
     if not furthest:
-        return f"{words} moves no declared parameter by more than its tolerance."
+        return f"{words} moves no declared parameter by more than a standard deviation of what it allows it."
     named = "; ".join(_moved(row) for row in furthest[:MOST_NAMED])
     rest = len(furthest) - MOST_NAMED
     more = f"; and {rest} more" if rest > 0 else ""
@@ -64,8 +65,15 @@ def _sentence(words: str, rows: Sequence[Row]) -> str:
 
 
 def _moved(row: Row) -> str:
-    times = f"{abs(row['deviations']):.1f} standard deviations of its tolerance"
+    times = f"{abs(row['deviations']):.1f} standard deviations, one of which is {deviation_words(row)} in this fit"
     return f"{parameter_words(row)} {'by' if _is_change(row) else 'to'} {moved_value(row)} ({times})"
+
+
+def deviation_words(row: Row) -> str:
+    """Words for one standard deviation of what a fit allows a parameter: '0.30 mV', '26 %' of a factor."""
+    if row["unit"] == "dimensionless" and row["declared"] == 1.0:
+        return f"{PERCENT * row['one_sd']:.2g} %"
+    return f"{row['one_sd']:.2g}" if row["unit"] in PURE else rounded(row["one_sd"], row["unit"])
 
 
 def _is_change(row: Row) -> bool:
@@ -74,12 +82,14 @@ def _is_change(row: Row) -> bool:
 
 
 def moved_value(row: Row) -> str:
-    """Words for where a parameter went, or by how much: '0.42 times declared', '0.97 (declared 1)', '+3.1 mohm'."""
+    """Words for where a parameter went, or by how much: '0.42 times declared', '0.97 (declared 1)', '+3.1 mohm'.
+
+    A state of charge is not declared: it was read from a voltage, or given."""
     if row["unit"] == "dimensionless" and row["declared"] == 1.0:
         return f"{_apart(row['value'], 1.0, least=2)[0]} times declared"
     if row["unit"] in PURE:
         there, declared = _apart(row["value"], row["declared"])
-        return f"{there} (declared {declared})"
+        return f"{there} ({'from' if row['effect'] == STATE_OF_CHARGE else 'declared'} {declared})"
     sign = "+" if _is_change(row) and row["value"] > 0.0 else ""
     return sign + rounded(row["value"], row["unit"])
 
@@ -103,6 +113,6 @@ def parameter_words(row: Row) -> str:
 
 
 def moved_summary(rows: Iterable[Row]) -> str:
-    """All that moved by more than its tolerance on one line, for a tag of a tracked run."""
+    """All that moved by more than a standard deviation on one line, for a tag of a tracked run."""
     told = [row for row in rows if abs(row["deviations"]) > TELLING]
     return "; ".join(f"{parameter_words(r)} {moved_value(r)}" for r in told)

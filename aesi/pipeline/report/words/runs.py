@@ -15,6 +15,8 @@ HUNDREDTHS = 2
 """Decimals of a mV to which an error has to be less to be called less."""
 MOST_DIGITS = 3
 """Most decimals of an error in mV."""
+ON_TEST = "On held-out test records, in free run, the RMSE"
+"""Beginning of the headline."""
 
 
 def run_finding(view: RunView) -> str:
@@ -87,9 +89,8 @@ def _bought(view: RunView) -> str:
     if corrected is not None and view.corrected != view.chosen and corrected < min(before, after):
         between, last = _told(corrected, after)
         return (
-            f"On test records that chose nothing, run without any measured voltage, the {view.corrected} takes the "
-            f"voltage error from {before:.1f} mV of the {view.physics} to {between} mV RMSE; the correction learnt on "
-            f"top of it does not help: {view.chosen} leaves {last} mV."
+            f"{ON_TEST} is {between} mV with the {view.corrected} and {before:.1f} mV with the {view.physics} as "
+            f"declared. The correction learnt on top of it does not help: {view.chosen} leaves {last} mV."
         )
     first, last = _told(before, after)
     if reduction <= 0:
@@ -99,20 +100,16 @@ def _bought(view: RunView) -> str:
         )
     share = own_share(view)
     if share is None or corrected is None or view.corrected == view.physics:
-        start, less = (
-            f"{first} mV",
-            f"{reduction:.1f} % less mean squared error than the {view.physics} alone",
+        return (
+            f"{ON_TEST} is {last} mV with {view.chosen} and {first} mV with the {view.physics} alone. The correction "
+            f"removes {reduction:.1f} % of its mean squared error."
         )
-    else:  # else the correction would be credited with what the recalibration does
-        between, last = _told(corrected, after)
-        start = f"{before:.1f} mV of the {view.physics} and {between} mV of the {view.corrected}"
-        less = (
-            f"{share:.1f} % less mean squared error than the {view.corrected}, on which it was learnt ({reduction:.1f} "
-            f"% less than the {view.physics} as declared)"
-        )
+    between, last = _told(corrected, after)
+    # Else the correction would be credited with what the recalibration does.
     return (
-        f"On test records that chose nothing, run without any measured voltage, {view.chosen} takes the "
-        f"voltage error from {start} to {last} mV RMSE: {less}."
+        f"{ON_TEST} is {last} mV with {view.chosen}, {between} mV with the {view.corrected} alone and {before:.1f} mV "
+        f"with the {view.physics} as declared. The correction removes {share:.1f} % of the mean squared error that the "
+        f"{view.corrected} leaves ({reduction:.1f} % of that of the {view.physics} as declared)."
     )
 
 
@@ -202,11 +199,11 @@ def others_finding(view: RunView) -> str:
     best = min(better, key=lambda name: better[name])
     least = _told(better[best], ours)[0]
     if len(left) == 1:
-        return f"The other correction learnt on the same records, {best}, errs less there: {least} mV."
-    verb = "errs" if len(better) == 1 else "err"
+        return f"The other correction learnt on the same records, {best}, has a lower RMSE there: {least} mV."
+    has = "has a lower RMSE" if len(better) == 1 else "have a lower RMSE"
     return (
-        f"{len(better)} of {len(left)} other corrections learnt on the same records {verb} less there, "
-        f"{best} least: {least} mV."
+        f"{len(better)} of {len(left)} other corrections learnt on the same records {has} there; the lowest is that of "
+        f"{best}, {least} mV."
     )
 
 
@@ -263,8 +260,8 @@ def interval_finding(model: Row) -> str:
     if start is None:
         return f"{text}."
     return (
-        f"{text}. It holds that the state of charge at the start is read from a voltage, a standard deviation of which "
-        f"is worth {1e3 * start:.1f} mV; cell.soc0 gives one that is known."
+        f"{text}. It includes the uncertainty of the initial state of charge, which is read from a voltage: one "
+        f"standard deviation is {1e3 * start:.1f} mV. Give cell.soc0 if it is known."
     )
 
 

@@ -13,7 +13,8 @@ from aesi.physics.effects import CATALOGUE
 SAME_SHARE = 0.98
 """A finding that leaves more than this share of the error of a refit is no better than the refit."""
 TELLING = 1.0
-"""Standard deviations of its tolerance that a refit has to move a parameter by; moved by less it counts as declared."""
+"""Standard deviations of what a refit allows a parameter that it has to move it by; moved by less it counts as
+declared."""
 MOST_PARAMETERS = 3
 """Most parameters of an effect in one sentence."""
 PREFIXES = {"ohm": ("mohm", 1e3), "V": ("mV", 1e3), "A": ("mA", 1e3), "m": ("um", 1e6)}

@@ -106,6 +106,55 @@ def test_a_fast_clock_stretches_the_record_and_a_lag_shifts_the_voltage():
     assert late[3:] == pytest.approx(run(None, rested).voltage_v[:-3])
 
 
+PULSE_ROWS = np.concatenate(
+    [[0.0, 60.0, 120.0], 120.0 + np.arange(1.0, 31.0), 150.0 + 60.0 * np.arange(1.0, 6.0)]
+)
+"""A row a second under load, one a minute at rest."""
+
+
+@pytest.mark.parametrize("hold", ["backward", "linear"])
+@pytest.mark.parametrize("lag_s", [-2.0, -0.3, 0.2, 5.0])
+def test_a_lag_made_charge_of_a_pulse_and_bent_its_edges(hold, lag_s):
+    """The voltage a little sooner or later is that of the same current in rows of 0.05 s."""
+    pulse = np.where((PULSE_ROWS > 120.0) & (PULSE_ROWS <= 150.0), 60.0, 0.0)
+    lag = CATALOGUE["clock_skew"].activate(skew=0.0, lag_s=lag_s)
+    late = simulate(CELL, PULSE_ROWS, pulse, SOC0, [lag], hold=hold)
+    fine = np.round(np.arange(-5.0, PULSE_ROWS[-1] + 3.0, 0.05), 2)
+    row = np.searchsorted(PULSE_ROWS, fine).clip(max=len(pulse) - 1)
+    true_a = pulse[row] if hold == "backward" else np.interp(fine, PULSE_ROWS, pulse)
+    truth = simulate(CELL, fine, true_a, SOC0, hold=hold)
+    at = np.searchsorted(fine, PULSE_ROWS - lag_s - 1e-6)
+    assert late.voltage_v == pytest.approx(truth.voltage_v[at], abs=1e-4)  # of steps of a second
+    assert late.series["soc"][-1] == pytest.approx(truth.series["soc"][-1], abs=1e-9)
+    assert np.array_equal(late.current_a, pulse)
+
+
+def test_a_lag_reads_the_profiles_of_the_porous_electrode_with_the_voltage():
+    pulse = np.where((PULSE_ROWS > 120.0) & (PULSE_ROWS <= 150.0), 60.0, 0.0)
+    lag = CATALOGUE["clock_skew"].activate(skew=0.0, lag_s=1.0)
+    late, plain = (
+        simulate(CELL, PULSE_ROWS, pulse, SOC0, effects, hold="backward", model="dfn", profiles=True)
+        for effects in ([lag], [])
+    )
+    assert late.profiles["x_m"].shape == plain.profiles["x_m"].shape
+    for name in ("reaction_a_m2", "electrolyte_mol_m3"):
+        assert late.profiles[name][4:33] == pytest.approx(plain.profiles[name][3:32], rel=1e-3, abs=1e-9)
+
+
+def test_a_clock_slow_by_a_ten_millionth_took_each_second_in_two_steps():
+    current = np.repeat([0.0, 30.0, -60.0, 60.0], 100)
+    slow = run("clock_skew", current, skew=-1e-7, lag_s=0.0).voltage_v
+    assert slow == pytest.approx(run(None, current).voltage_v, abs=1e-6)
+
+
+@pytest.mark.parametrize("side", ["negative", "positive"])
+def test_kinetics_that_are_hardly_asymmetric_were_of_another_salt(side):
+    """The salt differs within an electrode, and so does the overpotential that a mean is taken of."""
+    current = np.full(len(TIME), 90.0)
+    alpha = {"negative_alpha": 0.5, "positive_alpha": 0.5, f"{side}_alpha": 0.5 + 1e-9}
+    assert np.abs(shift("asymmetric_kinetics", current, **alpha)).max() < 1e-7
+
+
 def test_ten_kelvin_colder_slows_everything_by_arrhenius():
     cold = model_with(CELL, [CATALOGUE["ambient_temperature"].activate(shift_k=-10.0)]).cell
     assert cold.initial_temperature_k == pytest.approx(288.15)
