@@ -9,6 +9,7 @@ decide, search, likelihood, case):
     decide/model_choice    single particle or porous electrode: with each that is tried
     decide/evidence        searches at several trusts, judged, and the model written    -> Evidence
       (decide/beside         the same beside records that are known to be good)
+      (decide/shared         what these have too, which is no difference)
     search/forward         one search: effects grown, fitted, admitted, one by one      -> Path
     search/grown           which effects are grown on which hypotheses
     likelihood/growth      one effect more on a hypothesis, the rest to first order     -> Grown

@@ -19,7 +19,7 @@ from aesi.physics.effects import CATALOGUE
 from aesi.physics.initial_state import REST_C_RATE
 from aesi.physics.simulation import ModelName
 from aesi.physics.start.temperature import OtherTemperature
-from aesi.records import Hold, Measurement, Run
+from aesi.records import Hold, Measurement
 from aesi.tracer.case.checks import check_compared, check_record, check_same_cell
 from aesi.tracer.case.energies import ACTIVATION_ENERGIES
 from aesi.tracer.case.free_parameter import OF_ONE_RECORD, by_owner
@@ -261,10 +261,11 @@ def _discovery_of(
     others = left_by_fit(fitted, other_temperatures(problem))
     at_other = {records[k].name: other for k, other in others.items()} | of_unseen(fitted, tested)
     evidence = _without_fault(evidence, others)
-    states: States = {"before": declared, "recalibrated": evidence.recalibrated, "after": evidence.after}
+    fits: States = {"before": declared, "recalibrated": evidence.recalibrated, "after": evidence.after}
+    states = {name: state.of_one_age() for name, state in fits.items()}  # errors are told of what is written
     files = outcomes(records, states, tested, rng)
     inside, soc0 = evidence.after.settled()
-    left = _structure_of(records, evidence.after)
+    left = _structure_of(records, states["after"])
     return Discovery(
         cell=inside.cell,
         verdict=verdict,
@@ -289,7 +290,7 @@ def _discovery_of(
         ),
         other_temperature=tuple(at_other),
         written={name: (evidence.after.values or {})[name] for name in evidence.after.hypothesis},
-        own={state: own_parameters(states[state]) for state in ("recalibrated", "after")},
+        own={state: own_parameters(fits[state]) for state in ("recalibrated", "after")},
         tried=problem.competing(),
         seconds=seconds,
         simulations=simulations,
@@ -315,9 +316,10 @@ def _test_error_v(
 ) -> float | None:
     """RMSE on data that no fit has seen, V; None where the model cannot be simulated there."""
     try:
-        return test_rmse_v(ModelState.of(problem, one), problem.records, tested)
+        error_v = test_rmse_v(ModelState.of(problem, one).of_one_age(), problem.records, tested)
     except AesiError:  # it was simulated on the fit part alone
         return None
+    return error_v if np.isfinite(error_v) else None
 
 
 def _notes(evidence: Evidence, tested: Sequence[PreparedRecord], left: ResidualStructure) -> tuple[str, ...]:
@@ -344,9 +346,7 @@ def _notes(evidence: Evidence, tested: Sequence[PreparedRecord], left: ResidualS
 def _structure_of(records: Sequence[PreparedRecord], state: ModelState) -> ResidualStructure:
     runs, residuals = [], []
     for index, record in enumerate(records):
-        run = state.simulated(record, index, thin=True)
-        keep = slice(0, record.n_fit)
-        series = {name: column[keep] for name, column in run.series.items()}
-        runs.append(Run(run.time_s[keep], run.current_a[keep], run.voltage_v[keep], series))
-        residuals.append((record.thin.voltage_v - run.voltage_v)[keep])
+        seen = record.thin.take(slice(0, record.n_fit))
+        runs.append(state.simulated(replace(record, thin=seen), index, thin=True))
+        residuals.append(seen.voltage_v - runs[-1].voltage_v)
     return ResidualStructure(explain(runs, residuals), measure(runs, residuals))

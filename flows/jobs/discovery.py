@@ -255,9 +255,9 @@ def _say(console: Console, content: dict[str, Any], notes: Sequence[str], out: P
 
 
 def _errors_of(content: dict[str, Any], part: str) -> str:
-    """The errors of one part; that of `after` only where it is more than a refit."""
+    """The errors of one part; that of `after` only where it is more than a refit, and none of a model that cannot be
+    simulated there."""
     from aesi.pipeline.report.words.discoveries import states_of
 
-    return ", ".join(
-        f"{content[state][part]['rmse_mv']:.2f} mV {words}" for state, words in states_of(content).items()
-    )
+    told = ((content[state].get(part), words) for state, words in states_of(content).items())
+    return ", ".join(f"{row['rmse_mv']:.2f} mV {words}" for row, words in told if row)

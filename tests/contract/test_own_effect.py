@@ -12,7 +12,8 @@ from lead_effect import OWN
 
 import aesi
 from aesi.errors import ConfigError, InputError, NoNumberError, OwnEffectError, ParameterError
-from aesi.physics import Effect
+from aesi.parameters import Parameter
+from aesi.physics import Contribution, Effect
 from aesi.physics.effects import CATALOGUE, activated, known_effects, load_effect
 from aesi.pipeline.discovery.discover import Case, write_discovery
 from aesi.pipeline.experiment.config import parse_experiment
@@ -73,6 +74,31 @@ def test_it_is_simulated_from_a_file_on_the_command_line(file, measured, bare, c
     )
     assert run.voltage_v == pytest.approx(bare - LEAD_OHM * current, abs=1e-9)
     assert "lead_v" in (tmp_path / "out.csv").read_text().splitlines()[0]
+
+
+def test_a_finding_was_lost_where_it_cannot_be_simulated_on_the_test_part(cell, current, tmp_path):
+    limit_a = 120.0
+
+    def drop(trace, *, resistance_ohm):
+        return Contribution(-resistance_ohm * np.where(trace.current_a < limit_a, trace.current_a, np.nan))
+
+    pulsed = np.where(np.abs(TIME - 1704.0) < 5.0, 1.2 * limit_a, current)
+    noise = 1e-3 * np.random.default_rng(1).normal(size=len(TIME))
+    voltage = aesi.simulate(cell, TIME, pulsed, SOC0).voltage_v - LEAD_OHM * pulsed + noise
+    record = Measurement(TIME, pulsed, voltage, name="pulsed")
+
+    p = Parameter(1e-3, "ohm", bounds=(0.0, 0.05), neutral=0.0, source="test")
+    short = Effect("short", "physics", "A drop.", {"resistance_ohm": p}, on_voltage=drop)
+    found = discover(cell, [record], soc0=SOC0, effects={"short": short})
+    assert (found.verdict.word, found.verdict.effects) == ("found", ("short",))
+    (warning,) = (w for w in found.warnings if "the written model has no figure on the test part" in w)
+    assert "no number at 1700 s" in warning
+    content = write_discovery(tmp_path, Case(CELL, (record,)), found)
+    assert content["after"]["test"] == {}
+    assert content["after"]["fit"]["rmse_mv"] < content["before"]["fit"]["rmse_mv"]
+    assert content["candidates"][0]["test_rmse_mv"] is None
+    assert [row["after_mv"] is None for row in content["files"]] == [False, True]
+    assert "the written model has no figure on the test part" in (tmp_path / "report.html").read_text()
 
 
 def test_it_is_found_reported_saved_simulated_and_predicted(file, cell, measured, bare, current, tmp_path):

@@ -250,10 +250,11 @@ def _model(found: Discovery) -> dict[str, Any]:
 
 
 def _errors(found: Discovery, state: State, part: Part) -> dict[str, float]:
-    residuals = [f.residual_v(state) for f in found.files if f.part == part]
-    if not residuals:
+    """Errors of a state over all files; none where it cannot be simulated on one of them."""
+    files = [f for f in found.files if f.part == part]
+    if not files or any(state in f.unsimulated for f in files):
         return {}
-    errors = Errors.of(np.concatenate(residuals))
+    errors = Errors.of(np.concatenate([f.residual_v(state) for f in files]))
     return {
         "rmse_mv": MV_PER_V * errors.rmse_v,
         "mae_mv": MV_PER_V * errors.mae_v,
@@ -293,8 +294,9 @@ def _own_row(one: OwnParameter) -> dict[str, Any]:
 def _file_rows(found: Discovery) -> list[dict[str, Any]]:
     rows = []
     for f in found.files:
-        gain, low, high = (MV_PER_V * v for v in f.gain_v)
-        rmse = {f"{s}_mv": MV_PER_V * f.errors(s).rmse_v for s in STATES}
+        gain, low, high = (MV_PER_V * v if np.isfinite(v) else None for v in f.gain_v)
+        errors = {state: f.errors(state) for state in STATES}
+        rmse = {f"{s}_mv": None if told is None else MV_PER_V * told.rmse_v for s, told in errors.items()}
         gains = {"gain_mv": gain, "gain_low_mv": low, "gain_high_mv": high}
         rows.append({"name": f.name, "part": f.part, **rmse, **gains})
     return rows

@@ -140,12 +140,15 @@ def discovery_figures(view: DiscoveryView) -> dict[str, Figure]:
 
 
 def _over_the_range(traces: Sequence[DiscoveryTrace], states: Mapping[str, str]) -> dict[str, Figure]:
-    """Residual against current and SOC, and maps over both, at each of the states."""
+    """Residual against current and SOC, and maps over both, at each of the states that can be simulated there."""
     current = np.concatenate([t.current_a for t in traces])
     soc = np.concatenate([t.soc for t in traces])
     errors = {
         state: np.concatenate([t.measured_v - getattr(t, f"{state}_v") for t in traces]) for state in states
     }
+    errors = {state: error for state, error in errors.items() if np.isfinite(error).any()}
+    if not errors:
+        return {}
     limit = maps.shared_limit(current, soc, list(errors.values()), False)
     return {
         "against_current": maps.dependence_figure(current, errors, states, "current, A (discharge > 0)"),
@@ -153,4 +156,5 @@ def _over_the_range(traces: Sequence[DiscoveryTrace], states: Mapping[str, str])
     } | {
         f"map_{state}": maps.map_figure(current, soc, errors[state], f"Mean error, {words}", False, limit)
         for state, words in states.items()
+        if state in errors
     }

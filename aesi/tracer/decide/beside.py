@@ -19,6 +19,7 @@ from aesi.numerics.typing import BoolArray
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.decide.carry_over import ORDINARY_C, range_fault
 from aesi.tracer.decide.evidence import MEASURED_EFFECTS, Answer, Evidence, with_confidence
+from aesi.tracer.decide.shared import searched_unshared
 from aesi.tracer.decide.verdict import Thresholds, Verdict, best_gain, beyond, look_alikes, tolerance_v
 from aesi.tracer.decide.written import limits_of
 from aesi.tracer.likelihood.fit import FittedHypothesis, held_out_residual
@@ -26,7 +27,6 @@ from aesi.tracer.likelihood.growth import Explanation, Parent
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import fitted_hypothesis
-from aesi.tracer.search.forward import searched
 from aesi.tracer.search.grown import grown_with
 from aesi.tracer.search.path import Path, Report
 from aesi.tracer.search.plausible import alike, lag, sds_behind
@@ -41,14 +41,18 @@ def gathered_beside(
     Raises DataError where the model cannot be simulated on the records.
     """
     beside = replace(problem, trust="beside")
-    path = searched(beside, min(max_effects, MEASURED_EFFECTS), archive, report)
-    usual = Usual.of(path, thresholds)
-    verdict = judged_beside(path, thresholds, usual)
+    found = searched_unshared(beside, min(max_effects, MEASURED_EFFECTS), archive, report)
+    path = replace(found.path, notes=(*found.path.notes, *found.shared))
+    verdict = judged_beside(path, thresholds)
     if verdict.word != "none":
+        believed = path.chosen if verdict.effects else path.base
+        usual = Usual.of(path, believed, thresholds)
         aged = [
-            one for one in _of_another_age(path, archive) if usual.said_nats(path, one) > path.admission_nats
+            one
+            for one in _of_another_age(path, found.archive)
+            if usual.said_nats(path, one) > path.admission_nats
         ]
-        verdict = of_one_age(verdict, path.chosen if verdict.effects else path.base, aged)
+        verdict = of_one_age(verdict, believed, aged)
     return Answer(path, verdict, {"beside": path}, partial(_settled, path))
 
 
@@ -121,10 +125,10 @@ class Usual:
     allowed_v: float
 
     @classmethod
-    def of(cls, path: Path, thresholds: Thresholds) -> Usual:
-        """The usual error in a search, by the hypothesis that it chose."""
+    def of(cls, path: Path, believed: FittedHypothesis, thresholds: Thresholds) -> Usual:
+        """The usual error in a search, by the hypothesis that is believed."""
         problem, good = path.problem, path.problem.good_rows
-        good_v = left_v(path, path.chosen, good & problem.compared)
+        good_v = left_v(path, believed, good & problem.compared)
         usual_v = float(np.hypot(good_v, tolerance_v(problem, thresholds)))
         return cls(good_v, usual_v, usual_v * (1.0 + NINETY * _relative_sd(problem, good)))
 
@@ -135,17 +139,20 @@ class Usual:
         return path.gain(one) * (1.0 if left <= self.allowed_v else (self.usual_v / left) ** 2)
 
 
-def judged_beside(path: Path, thresholds: Thresholds, usual: Usual) -> Verdict:
+def judged_beside(path: Path, thresholds: Thresholds) -> Verdict:
     """The verdict on a search beside good records; its confidence is still to be read off the margin."""
-    problem, allowed = path.problem, usual.allowed_v
+    problem, usual = path.problem, Usual.of(path, path.chosen, thresholds)
     before, left = (left_v(path, one, ~problem.good_rows) for one in (path.base, path.chosen))
     named = path.chosen.hypothesis
-    if left > allowed and usual.said_nats(path, path.chosen) < path.admission_nats:
-        named = ()  # of the error that these records show by themselves it does not say enough
+    if left > usual.allowed_v and usual.said_nats(path, path.chosen) < path.admission_nats:
+        # Of the error that these records show by themselves it does not say enough: what is told is of the rest.
+        named, left, usual = (), before, Usual.of(path, path.base, thresholds)
+    allowed = usual.allowed_v
     groups, margin = look_alikes(path, thresholds, max(allowed, left)) if named else ((), -best_gain(path))
     others = ", ".join(r.name for r in problem.records if not r.good)
+    after = f" before, {1e3 * left:.1f} mV after" if named else ""
     reason = (
-        f"{1e3 * before:.1f} mV beyond the noise on unseen data of {others} before, {1e3 * left:.1f} mV after; "
+        f"{1e3 * before:.1f} mV beyond the noise on unseen data of {others}{after}; "
         f"{1e3 * usual.good_v:.1f} mV on the good records"
     )
     if left > allowed:

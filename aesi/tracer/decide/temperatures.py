@@ -79,9 +79,9 @@ def _explains(fitted: ModelState, record: PreparedRecord, index: int | None, oth
 
 def _left_by_v(fitted: ModelState, record: PreparedRecord, index: int | None) -> float:
     """RMS, V, of what fits see of a record, or of all of one that they do not.  index : among the fitted ones."""
-    rows = slice(0, record.n_fit)
-    voltage_v = fitted.simulated(record, index, thin=True).voltage_v[rows]
-    return rms(np.asarray(record.thin.voltage_v[rows] - voltage_v))
+    seen = record.thin.take(slice(0, record.n_fit))
+    run = fitted.simulated(replace(record, thin=seen), index, thin=True)
+    return rms(np.asarray(seen.voltage_v - run.voltage_v))
 
 
 def fitted_at_fault(written: ModelState, others: Mapping[int, OtherTemperature]) -> str | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from aesi.errors import AesiError
 from aesi.numerics.typing import Array
@@ -10,7 +10,7 @@ from aesi.physics.balance import same_rest
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.folded import Folded, folded
 from aesi.records import Run
-from aesi.tracer.case.free_parameter import STATE_OF_CHARGE
+from aesi.tracer.case.free_parameter import CAPACITY_SHARE, STATE_OF_CHARGE
 from aesi.tracer.case.problem import InverseProblem, ValuesByOwner, share_of
 from aesi.tracer.case.records import PreparedRecord
 from aesi.tracer.likelihood.growth import Explanation
@@ -31,6 +31,12 @@ class ModelState:
     def of(cls, problem: InverseProblem, one: Explanation) -> ModelState:
         """The model where a fit ended."""
         return cls(problem, one.values, one.hypothesis)
+
+    def of_one_age(self) -> ModelState:
+        """The model as it is written: with the file's capacity in every record, whatever a fit gave it in each."""
+        if self.values is None or CAPACITY_SHARE not in self.values:
+            return self
+        return replace(self, values={o: v for o, v in self.values.items() if o != CAPACITY_SHARE})
 
     def effects(self, good: bool = False) -> tuple[ActiveEffect, ...]:
         """The effects that are simulated on top of the declared cell.  good : of a record that is known to be good."""

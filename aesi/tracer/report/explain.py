@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,7 +17,7 @@ MEMORIES_S = (10.0, 60.0, 300.0, 1800.0)
 TURNS_S = (120.0, 900.0)
 """Low-passes of the sign of the current that stand for hysteresis."""
 REST_SHARE = 0.02
-"""Share of the current's RMS below which a current has no sign."""
+"""Share of the RMS of all records' current below which a current has no sign."""
 FOLDS = 5
 """Sets of blocks, each left out in turn."""
 BLOCKS = 25
@@ -24,16 +25,37 @@ BLOCKS = 25
 RIDGES = (1e-4, 1e-2, 1.0, 1e2, 1e4)
 """The one that predicts left-out blocks best is taken."""
 SATURATION = 0.5
-"""Share of the current's RMS at which the saturating feature bends."""
+"""Share of the RMS of all records' current at which the saturating feature bends."""
 
 
-def features(run: Run) -> dict[str, Array]:
-    """Family -> (n, k) columns of one record: what a residual may depend on."""
+@dataclass(frozen=True)
+class Scales:
+    """What currents and states of charge are scaled by, alike in all records: one column stands for one quantity.
+
+    current_a : RMS of the current, A.  least_soc, most_soc : of the states of charge.
+    """
+
+    current_a: float
+    least_soc: float
+    most_soc: float
+
+    @classmethod
+    def of(cls, runs: Sequence[Run]) -> Scales:
+        """Of all rows of some records."""
+        soc = np.concatenate([run.series["soc"] for run in runs])
+        current_a = rms(np.concatenate([run.current_a for run in runs])) + 1e-12
+        return cls(current_a, float(soc.min()), float(soc.max()))
+
+    def soc(self, soc: Array) -> Array:
+        """(n,) from -1 to 1 over the states of charge of all records."""
+        return np.asarray(2.0 * (soc - self.least_soc) / max(self.most_soc - self.least_soc, 1e-6) - 1.0)
+
+
+def features(run: Run, scales: Scales) -> dict[str, Array]:
+    """Family -> (n, k) columns of one record: what a residual may depend on.  scales : of all records."""
     t, current = run.time_s, run.current_a
-    scale = rms(current) + 1e-12
-    i = current / scale
-    soc = run.series["soc"]
-    z = 2.0 * (soc - soc.min()) / max(np.ptp(soc), 1e-6) - 1.0
+    i = current / scales.current_a
+    z = scales.soc(run.series["soc"])
     slow = [_filtered(t, i, tau) for tau in MEMORIES_S]
     heat = _filtered(t, i**2, MEMORIES_S[-1])
     sign = np.sign(i) * (np.abs(i) > REST_SHARE)
@@ -51,7 +73,7 @@ def features(run: Run) -> dict[str, Array]:
         "history": np.column_stack([*slow[2:], *turn]),
         "heat": np.column_stack([heat, heat * i]),
         "throughput": np.column_stack([throughput, throughput * i]),
-        "time": np.column_stack([(t - t[0]) / max(t[-1] - t[0], 1.0)]),
+        "time": np.column_stack([t - t[0]]),
     }
 
 
@@ -71,7 +93,8 @@ def explain(runs: Sequence[Run], residuals: Sequence[Array]) -> dict[str, float]
     By ridge regression, judged on blocks that it was not fitted on.
     runs, residuals : one a record, (n,) V measured - model.
     """
-    families = [features(r) for r in runs]
+    scales = Scales.of(runs)
+    families = [features(r, scales) for r in runs]
     target = np.concatenate(residuals)
     folds = np.concatenate([dealt_folds(len(e), BLOCKS, FOLDS) for e in residuals])
     variance = float(np.mean((target - target.mean()) ** 2)) + 1e-30

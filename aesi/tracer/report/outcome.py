@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -10,7 +11,8 @@ import numpy as np
 
 from aesi.errors import AesiError
 from aesi.numerics.metrics import rms
-from aesi.numerics.typing import Array
+from aesi.numerics.typing import Array, BoolArray
+from aesi.over_time import stamp
 from aesi.physics.depletion import ran_out
 from aesi.records import Run
 from aesi.tracer.case.records import PreparedRecord
@@ -50,8 +52,10 @@ class Errors:
 class FileOutcome:
     """One part of one file.
 
-    voltages : state -> (n,) V.  noise_v : of the measured voltage.  gain_v : RMSE recalibrated minus after, with its
-    95 % block-bootstrap interval.  emptied_s : state -> s, where its simulation ran out of charge or salt, if it did.
+    voltages : state -> (n,) V, NaN where that model cannot be simulated on this part.  unsimulated : state -> why it
+    cannot.  noise_v : of the measured voltage.  gain_v : RMSE recalibrated minus after, with its 95 % block-bootstrap
+    interval; NaN where one of them has no voltage.  emptied_s : state -> s, where its simulation ran out of charge or
+    salt, if it did.
     start_slope_v : (n,) V of `after`, what one standard deviation of an initial state that was not fitted is worth.
     """
 
@@ -66,6 +70,7 @@ class FileOutcome:
     gain_v: tuple[float, float, float]
     emptied_s: Mapping[State, float] = field(default_factory=dict)
     start_slope_v: Array | None = None
+    unsimulated: Mapping[State, str] = field(default_factory=dict)
 
     def residual_v(self, state: State) -> Array:
         """(n,) V, measured - model."""
@@ -79,9 +84,9 @@ class FileOutcome:
         known = float(self.start_slope_v @ self.start_slope_v) + self.noise_v**2
         return np.asarray(left - self.start_slope_v * float(self.start_slope_v @ left) / known)
 
-    def errors(self, state: State) -> Errors:
-        """Errors of a state."""
-        return Errors.of(self.residual_v(state))
+    def errors(self, state: State) -> Errors | None:
+        """Errors of a state; None where it cannot be simulated."""
+        return None if state in self.unsimulated else Errors.of(self.residual_v(state))
 
 
 def outcomes(
@@ -93,13 +98,13 @@ def outcomes(
     """Every file, cut into the part that fits have seen and the part that chose nothing."""
     out = []
     for index, record in enumerate(records):
-        runs = {name: state.simulated(record, index, thin=False) for name, state in states.items()}
+        runs = {name: _followed(state, record, index) for name, state in states.items()}
         cut = record.n_fit_whole
         out.append(_outcome(record, "fit", slice(0, cut), runs, rng))
         if cut < len(record.data):
             out.append(_outcome(record, "test", slice(cut, len(record.data)), runs, rng))
     for record in tests:
-        runs = {name: state.simulated(record, None, thin=False) for name, state in states.items()}
+        runs = {name: _followed(state, record, None) for name, state in states.items()}
         rows = slice(record.lead_rows, len(record.data))
         found = _outcome(record, "test", rows, runs, rng)
         try:
@@ -110,31 +115,75 @@ def outcomes(
     return tuple(out)
 
 
+@dataclass(frozen=True, eq=False)
+class _Followed:
+    """A model over the rows of a record: voltage, V, state of charge, and whether it ran out, each (n,), NaN or False
+    from the row on from which it cannot be simulated.  why : the sentence that says so; '' where there is no such row.
+    """
+
+    voltage_v: Array
+    soc: Array
+    empty: BoolArray
+    why: str
+
+
+def _followed(state: ModelState, record: PreparedRecord, index: int | None) -> _Followed:
+    """A model over a record, or over the part of it that was fitted where it cannot be simulated further."""
+    n = len(record.data)
+    try:
+        run = state.simulated(record, index, thin=False)
+        unknown = ~np.isfinite(run.voltage_v)
+        why = f"its voltage is no number at {stamp(float(run.time_s[np.argmax(unknown)]))} s."
+        return _padded(run, n, why if unknown.any() else "")
+    except AesiError as error:
+        why = str(error)
+    fitted = 0 if index is None else record.n_fit_whole
+    if 0 < fitted < n:
+        seen = replace(record, data=record.data.take(slice(0, fitted)))
+        with suppress(AesiError):
+            return _padded(state.simulated(seen, index, thin=False), n, why)
+    return _Followed(np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=bool), why)
+
+
+def _padded(run: Run, n: int, why: str) -> _Followed:
+    rest = n - len(run)
+    voltage_v, soc = (np.append(v, np.full(rest, np.nan)) for v in (run.voltage_v, run.series["soc"]))
+    return _Followed(voltage_v, soc, np.append(run.series["depleted"] > 0.0, np.zeros(rest, dtype=bool)), why)
+
+
 def _outcome(
-    record: PreparedRecord, part: Part, rows: slice, runs: Mapping[State, Run], rng: np.random.Generator
+    record: PreparedRecord,
+    part: Part,
+    rows: slice,
+    runs: Mapping[State, _Followed],
+    rng: np.random.Generator,
 ) -> FileOutcome:
     data = record.data.take(rows)
     voltages = {s: run.voltage_v[rows] for s, run in runs.items()}
-    gain = rmse_difference(
-        data.voltage_v - voltages["recalibrated"], data.voltage_v - voltages["after"], data.time_s, rng
-    )
-    soc = runs["after"].series["soc"][rows]
+    unsimulated = {s: runs[s].why for s, voltage_v in voltages.items() if not np.isfinite(voltage_v).all()}
+    gain = (np.nan, np.nan, np.nan)
+    if unsimulated.keys().isdisjoint(("recalibrated", "after")):
+        gain = rmse_difference(
+            data.voltage_v - voltages["recalibrated"], data.voltage_v - voltages["after"], data.time_s, rng
+        )
     emptied_s = {
         state: float(data.time_s[np.argmax(empty)])
         for state, run in runs.items()
-        if np.any(empty := run.series["depleted"][rows] > 0.0)
+        if np.any(empty := run.empty[rows])
     }
+    told: State = "before" if "after" in unsimulated else "after"
     return FileOutcome(
         record.name,
         part,
         data.time_s,
         data.current_a,
-        soc,
+        runs[told].soc[rows],
         data.voltage_v,
         record.noise_full_v,
         voltages,
         gain,
         emptied_s,
+        unsimulated=unsimulated,
     )
 
 

@@ -57,7 +57,7 @@ def ages_told(states: Sequence[ModelState]) -> str:
             told = ", ".join(f"{shares[str(i)]:.3f} in {record.name}" for i, record in enumerate(records))
             return (
                 f"the records say more where they may be of several ages: fitted, the cell had {told} of the file's "
-                "capacity; the model that is written has the file's."
+                "capacity; the model that is written has the file's, and errors are told of that."
             )
     return ""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -19,7 +19,7 @@ def contradicted_by_v(files: Sequence[FileOutcome], verdict: Verdict) -> float |
     """V beyond the noise that an explanation of the data leaves of the test part, where that is more than a right one
     may leave; else None.  The initial state of a test record is as uncertain as it is read: what it explains is no
     contradiction."""
-    tests = _tests(files)
+    tests = [f for f in _tests(files) if "after" not in f.unsimulated]
     if verdict.word == "unknown" or not tests:
         return None
     noise_v = np.repeat([f.noise_v for f in tests], [len(f.time_s) for f in tests])
@@ -30,17 +30,31 @@ def contradicted_by_v(files: Sequence[FileOutcome], verdict: Verdict) -> float |
 
 def warnings(files: Sequence[FileOutcome], verdict: Verdict, rest_a: float = 0.0) -> tuple[str, ...]:
     """Sentences on where the test part contradicts a verdict that explains the data, where the written model does worse
-    than another one there or on what was fitted, and where the test part has no load.
+    than another one there or on what was fitted, or cannot be simulated, and where the test part has no load.
 
     rest_a : A, below which the cell rests.
     """
+    told = [f for f in files if not f.unsimulated]
     said = (
+        *_of_unsimulated(files),
         _of_contradiction(files, verdict),
-        _of_worse_on_tests(_tests(files), bool(verdict.effects)),
-        _of_worse_on_fitted([f for f in files if f.part == "fit"]),
+        _of_worse_on_tests(_tests(told), bool(verdict.effects)),
+        _of_worse_on_fitted([f for f in told if f.part == "fit"]),
         _of_rest(_tests(files), rest_a),
     )
     return tuple(sentence for sentence in said if sentence is not None)
+
+
+def _of_unsimulated(files: Sequence[FileOutcome]) -> Iterator[str]:
+    """A sentence for each part of a file, and each reason why models cannot be simulated on it."""
+    for f in files:
+        models: dict[str, list[str]] = {}
+        for state, why in f.unsimulated.items():
+            models.setdefault(why, []).append(NAMES[state])
+        for why, names in models.items():
+            part = "the test part" if f.part == "test" else "what was fitted"
+            have = "has no figure" if len(names) == 1 else "have no figures"
+            yield f"{' and '.join(names)} {have} on {part} of {f.name}, where it cannot be simulated: {why}"
 
 
 def _of_contradiction(files: Sequence[FileOutcome], verdict: Verdict) -> str | None:

@@ -1,7 +1,9 @@
 """Where fits ended, kept in a file, so that an interrupted search goes on where it was.
 
 The file is keyed on all that a fit depends on: cell, data, own parameters, what each effect *is* (its code, its
-parameters, its bounds) and the program itself, so that an edited effect, or another version, is fitted again.
+parameters, its bounds) and the program itself, so that an edited effect, or another version, is fitted again. The code
+of an effect of the user's own may read what is in no file that can be seen here, a helper module or a table: such an
+effect is known by the voltages that it makes of the records, too.
 """
 
 from __future__ import annotations
@@ -20,10 +22,15 @@ from types import CodeType
 import numpy as np
 
 from aesi.numerics.files.source_digest import source_digest
+from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
 from aesi.physics.effect import Effect
-from aesi.tracer.case.problem import InverseProblem
+from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, starts, values_of
+from aesi.tracer.case.problem import InverseProblem, ValuesByOwner
 from aesi.tracer.likelihood.fit import FittedHypothesis
+
+PROGRAM = __name__.partition(".")[0]
+"""The package whose digest tells of its own effects."""
 
 
 class Archive:
@@ -85,8 +92,11 @@ def context_of(problem: InverseProblem) -> str:
         _told(problem.cell),
         problem.model,
         *(identity(e) for e in problem.effects.values()),
+        *(f"{e.id} {_answers(problem, e)}" for e in problem.effects.values() if _users_own(e)),
     ]
     text += [f"fixed {active.values} {identity(active.effect)}" for active in problem.fixed]
+    if any(_users_own(active.effect) for active in problem.fixed):
+        text.append(f"fixed {_answer(problem, {})}")
     text += [
         f"{r.data.digest} {r.thin.digest} {r.thin_hold} {r.n_fit} {r.soc0} {r.soc0_sd} {r.noise_v}"
         for r in problem.records
@@ -98,8 +108,38 @@ def context_of(problem: InverseProblem) -> str:
 def identity(effect: Effect) -> str:
     """All that makes an effect what it is: id, parameters with bounds and spreads, and the code of the file that
     defines it, with the values that its functions are bound to."""
-    places = (effect.on_model, effect.on_record, effect.on_voltage, effect.on_reading)
-    return f"{effect.id} {_parameters(effect.parameters)} {[_told(place) for place in places]}"
+    return f"{effect.id} {_parameters(effect.parameters)} {[_told(place) for place in _places(effect)]}"
+
+
+def _places(effect: Effect) -> tuple[Callable[..., object] | None, ...]:
+    return effect.on_model, effect.on_record, effect.on_voltage, effect.on_reading
+
+
+def _users_own(effect: Effect) -> bool:
+    """Whether an effect acts by a function that is not of this program, whose digest tells nothing of it."""
+    return any(not _module(place).startswith(f"{PROGRAM}.") for place in _places(effect) if place is not None)
+
+
+def _module(function: Callable[..., object]) -> str:
+    return _module(function.func) if isinstance(function, partial) else str(function.__module__)
+
+
+def _answers(problem: InverseProblem, effect: Effect) -> list[str]:
+    """What an effect leaves of the records where fits of it begin, where it is typically seen and at the ends of its
+    bounds."""
+    free = problem.parameters_of(effect.id)
+    ends = np.array([(*one.bounds, one.coordinate(one.typical)) for one in free]).reshape(-1, 3)
+    return [
+        _answer(problem, {effect.id: {}, **values_of(free, x, (effect.id,))})
+        for x in (*starts(free), *ends.T)
+    ]
+
+
+def _answer(problem: InverseProblem, values: ValuesByOwner) -> str:
+    """RMS, V, that is left of what fits see, to the digits that round-off does not reach."""
+    begins = {str(i): record.soc0 for i, record in enumerate(problem.records)}
+    predicted = problem.predict({STATE_OF_CHARGE: begins, **values})
+    return "cannot be simulated" if predicted is None else f"{rms(problem.measured - predicted):.8g}"
 
 
 def _parameters(parameters: Mapping[str, object]) -> str:

@@ -236,6 +236,15 @@ def test_a_kind_nobody_foresaw_is_still_shown():
     assert [dots.name for dots in fig.data] == ["numerical", "declared"]
 
 
+def test_a_hypothesis_without_a_figure_on_the_test_part_has_none_in_the_ranking():
+    rows = [
+        {"effect": "a", "kind": "physics", "score": 3.0, "test_rmse_mv": 1.25},
+        {"effect": "b", "kind": "physics", "score": 2.0, "test_rmse_mv": None},
+    ]
+    dots = hypotheses.ranking_figure(rows, {}, ["a"]).data[0]
+    assert [told for _, told in dots.customdata] == [", test RMSE 1.25 mV", ""]
+
+
 def test_violin_medians_are_those_of_the_squared_residual():
     residual = np.random.default_rng(0).standard_normal(20_001) * 1e-3
     fig = maps.violin_figure({"m": residual}, {"m": "#0072B2"})

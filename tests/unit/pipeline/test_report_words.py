@@ -408,11 +408,23 @@ def test_no_verdict_is_called_certain():
     assert discoveries.name_confidence({"verdict": "unknown", "effects": [], "confidence": 0.99}) == ""
 
 
-def test_the_confidence_in_a_look_alike_was_told_as_that_in_the_name():
-    """The cases that it was counted on take a look-alike for right."""
-    found = {"verdict": "found", "effects": ["series_resistance"], "confidence": 0.83}
-    alike = found | {"indistinguishable": [["series_resistance", "electrolyte_transport"]]}
-    assert discoveries.name_confidence(alike) == " (83 % confidence in this name or look-alikes)"
+def test_the_confidence_in_a_group_of_look_alikes_was_told_of_one_of_its_names():
+    row = {"kind": "instrument", "parameters": {}, "hypothesis": []}
+    found = {
+        "verdict": "found",
+        "effects": ["current_sensor_offset"],
+        "confidence": 0.86,
+        "indistinguishable": [["current_sensor_offset", "leakage_current"]],
+        "candidates": [{**row, "effect": name} for name in ("current_sensor_offset", "leakage_current")],
+    }
+    said = "86 % confidence that it is one of: current sensor offset, leakage current"
+    assert discoveries.name_confidence(found) == f" ({said})"
+    assert said in discoveries.short_finding(found, sure=True)
+    assert "(not told apart: current sensor offset or leakage current)" in discoveries.short_finding(found)
+    two = {**found, "effects": ["current_sensor_offset", "series_resistance"]}
+    assert discoveries.name_confidence(two).endswith(
+        "in these names, or in look-alikes of them: current sensor offset or leakage current)"
+    )
 
 
 def test_the_range_that_the_data_cover_is_told(views):

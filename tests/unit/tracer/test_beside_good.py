@@ -1,6 +1,6 @@
 """Records beside others of the same cell that are known to be good: what is different about the first?"""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +11,8 @@ from aesi.physics.effects import CATALOGUE
 from aesi.tracer import discover
 from aesi.tracer.case.free_parameter import acting_on, of_all_records
 from aesi.tracer.case.problem import BESIDE_TIMES
-from aesi.tracer.decide.beside import Usual, judged_beside, left_v, of_one_age
+from aesi.tracer.decide.beside import judged_beside, left_v, of_one_age
+from aesi.tracer.decide.shared import in_all_records
 from aesi.tracer.decide.verdict import Thresholds, Verdict
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.search.archive import context_of
@@ -61,6 +62,41 @@ def test_nothing_is_found_without_a_fault(cell, tried, erring):
     found = discover(cell, [erring("other", 2)], soc0=0.9, effects=tried, good=[erring("good", 1)])
     assert found.verdict.word == "none"
     assert found.verdict.effects == ()
+
+
+CONTACT = CATALOGUE["series_resistance"]
+
+
+def test_a_contact_that_good_records_have_too_was_found_as_a_difference(cell, tried, erring):
+    in_both = [CONTACT.activate(resistance_ohm=5e-4)]
+    good, other = erring("good", 1, effects=in_both), erring("other", 2, effects=in_both)
+    found = discover(cell, [other], soc0=0.9, effects=tried, good=[good])
+    assert (found.verdict.word, found.verdict.effects) == ("none", ())
+    (note,) = (note for note in found.notes if "taken as what all share" in note)
+    assert note.startswith("series_resistance in all records says")
+
+
+def test_a_contact_beyond_that_of_the_good_records_has_the_size_of_the_difference(cell, tried, erring):
+    good, other = (
+        erring(name, seed, effects=[CONTACT.activate(resistance_ohm=ohm)])
+        for name, seed, ohm in (("good", 1, 5e-4), ("other", 2, 10e-4))
+    )
+    found = discover(cell, [other], soc0=0.9, effects=tried, good=[good])
+    assert (found.verdict.word, found.verdict.effects) == ("found", ("series_resistance",))
+    size = next(c for c in found.candidates if c.effect == "series_resistance").parameters["resistance_ohm"]
+    assert size.low <= 5e-4 <= size.high
+
+
+def test_what_is_open_in_all_records_may_go_as_far_as_where_it_is_tried(cell, make):
+    """Also of an instrument, of what cells have another spread of, and on a logarithmic scale."""
+    problem = replace(inverse_problem(cell, [make()], 0.9, good=[make(seed=3)]), trust="beside")
+    for name in ("clock_skew", "series_resistance", "current_sensor_gain", "solid_diffusivity"):
+        opened = in_all_records(problem, name)
+        tried = np.array([(f.sd, f.centre) for f in problem.parameters_of(name)])
+        again = [(f.sd, f.centre) for f in opened.parameters_of(name)]
+        shared = [(f.sd, f.centre) for f in opened.free(()) if f.owner == of_all_records(name)]
+        assert np.array(again) == pytest.approx(tried)
+        assert np.array(shared) == pytest.approx(tried)
 
 
 def test_a_good_record_only_has_what_all_records_share():
@@ -165,9 +201,17 @@ def test_the_noise_of_one_kind_of_record_was_taken_off_the_error_of_the_other(mo
     assert [left_v(path, None, kind) for kind in (rows, ~rows)] == pytest.approx([4e-3, 12e-3])
 
 
+@dataclass(frozen=True)
+class Named:
+    """A hypothesis of which only the names are asked for."""
+
+    hypothesis: tuple[str, ...]
+
+
 @pytest.mark.parametrize(("gain", "named"), [(30.0, ()), (50.0, ("a",))])
 def test_what_leaves_more_than_the_good_records_has_to_say_it_at_that_error(monkeypatch, gain, named):
-    """Twice the error is a quarter of the nats: of 30 are left 7.5, where 10 were asked for."""
+    """Twice the error is a quarter of the nats: of 30 are left 7.5, where 10 were asked for. What is left then, 16 mV,
+    is that of the model without the name; it was that of the refused one."""
     good = np.array([True, False])
     problem = SimpleNamespace(
         good_rows=good,
@@ -176,18 +220,23 @@ def test_what_leaves_more_than_the_good_records_has_to_say_it_at_that_error(monk
         noise_v=1e-3,
         records=[SimpleNamespace(name="other", good=False)],
     )
-    base, chosen = SimpleNamespace(hypothesis=()), SimpleNamespace(hypothesis=("a",))
+    base, chosen = Named(()), Named(("a",))
     path = SimpleNamespace(
         problem=problem, base=base, chosen=chosen, steps=(), admission_nats=10.0, gain=lambda one: gain
     )
-    monkeypatch.setattr("aesi.tracer.decide.beside.left_v", lambda path, one, rows: 4e-3 if rows[0] else 8e-3)
+    left = {base: 16e-3, chosen: 8e-3}
+    monkeypatch.setattr(
+        "aesi.tracer.decide.beside.left_v", lambda path, one, rows: 4e-3 if rows[0] else left[one]
+    )
     monkeypatch.setattr("aesi.tracer.decide.beside.look_alikes", lambda *given: ((), 1.0))
-    verdict = judged_beside(path, Thresholds(), Usual.of(path, Thresholds()))
+    verdict = judged_beside(path, Thresholds())
     assert (verdict.word, verdict.effects) == ("unknown", named)
-    # Without a name the confidence of `unknown` is read off the logarithm of what is left over what may be, 8 over 4 mV
-    # with 0.6 that right hypotheses leave anyway, and what two records of a million rows each differ by.
+    assert verdict.structured_v == (8e-3 if named else 16e-3)
+    assert ("8.0 mV after" in verdict.reason) == bool(named)
+    # Without a name the confidence of `unknown` is read off the logarithm of what is left over what may be, 16 over
+    # 4 mV with 0.6 that right hypotheses leave anyway, and what two records of a million rows each differ by.
     may_be = np.hypot(4.0, np.hypot(0.45, 0.4))
-    assert verdict.margin == (1.0 if named else pytest.approx(np.log(8.0 / may_be), abs=2e-3))
+    assert verdict.margin == (1.0 if named else pytest.approx(np.log(16.0 / may_be), abs=2e-3))
 
 
 def said(name, total, scatter=1.0):

@@ -13,6 +13,7 @@ import pytest
 
 from aesi.physics import Cell, simulate
 from aesi.physics.cell.relations import scaled
+from aesi.physics.effect import Contribution
 from aesi.physics.effects import CATALOGUE
 from aesi.records import Measurement
 from aesi.tracer.case.blocks import blocks_of
@@ -661,3 +662,19 @@ def test_what_the_other_model_names_in_the_same_place_is_a_look_alike():
 def test_another_model_adds_no_look_alike_where_it_does_not_explain_the_rest_in_the_same_way(other):
     full = finding("series_resistance", "ocp_shape", sets=(("ocp_shape", "electrode_thickness"),))
     assert across_models(full, other) == full
+
+
+def test_an_effect_whose_table_or_helper_changed_was_taken_for_what_it_was(path):
+    table = SimpleNamespace(scale=1.0)  # stands for what the code of an effect reads elsewhere
+
+    def drop(trace, *, resistance_ohm):
+        return Contribution(-table.scale * resistance_ohm * trace.current_a)
+
+    contact = CATALOGUE["series_resistance"]
+    own = replace(contact, id="own", on_model=None, on_voltage=drop)
+    tried = replace(path.problem, effects={**path.problem.effects, "own": own})
+    given = replace(path.problem, fixed=(own.activate(),))
+    before = [context_of(problem) for problem in (tried, given)]
+    assert [context_of(replace(problem)) for problem in (tried, given)] == before
+    table.scale = 4.0
+    assert all(context_of(replace(p)) != one for p, one in zip((tried, given), before, strict=True))

@@ -7,6 +7,7 @@ import pytest
 
 from aesi.physics import simulate
 from aesi.records import Measurement
+from aesi.tracer import discover
 from aesi.tracer.case.blocks import blocks_of
 from aesi.tracer.case.free_parameter import CAPACITY_SHARE
 from aesi.tracer.case.problem import SHARE_SD, InverseProblem, share_of
@@ -76,6 +77,23 @@ def test_what_continues_a_record_goes_on_in_its_state(cell, few, discharge):
         return np.sqrt(np.mean((run.voltage_v - record.data.voltage_v)[rest.lead_rows : -20] ** 2))
 
     assert left_v(rest) < 0.5 * left_v(replace(rest, continues=None))
+
+
+def test_errors_were_told_of_a_model_of_several_ages_that_nobody_can_write(cell, few, discharge):
+    records = [discharge(0.9, name="later"), discharge(name="first")]
+    own = {name: few[name] for name in ("voltage_sensor_offset", "solid_diffusivity")}
+    found = discover(cell, records, soc0=1.0, holdout=0.0, effects=own, model="espm", max_effects=0)
+    assert any("later" in note and "the model that is written has the file's" in note for note in found.notes)
+    values = {(one.owner, one.name): one.value for one in found.own["recalibrated"]}
+    assert values[CAPACITY_SHARE, "later"] == pytest.approx(0.9, abs=0.03)
+    effects = [
+        effect.activate_only(**{name: values[effect.id, name] for name in effect.parameters})
+        for effect in own.values()
+    ]
+    for told, record in zip(found.files, records, strict=True):
+        soc0 = values["soc0", record.name]
+        run = simulate(cell, record.time_s, record.current_a, soc0, effects, hold=found.hold)
+        assert told.voltages["recalibrated"] == pytest.approx(run.voltage_v, abs=1e-6)
 
 
 def test_of_one_record_alone_what_the_cell_has_lost_is_left_to_effects(cell, few, discharge):

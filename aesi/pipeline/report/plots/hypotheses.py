@@ -38,8 +38,7 @@ def ranking_figure(candidates: Sequence[Row], titles: Mapping[str, str], chosen:
         shown = [row for row in rows if row["kind"] == kind]
         if shown:
             labels = [_label(row, titles, chosen) for row in shown]
-            tests = [row.get("test_rmse_mv", float("nan")) for row in shown]
-            _add_dots(fig, kind, labels, behind, [f", test RMSE {test:.2f} mV" for test in tests])
+            _add_dots(fig, kind, labels, behind, [_test_told(row) for row in shown])
     _add_dots(fig, "declared", [DECLARED], behind, [""])
     order = sorted(behind, key=lambda label: -behind[label])
     fig.update_yaxes(categoryorder="array", categoryarray=order)
@@ -52,6 +51,12 @@ def ranking_figure(candidates: Sequence[Row], titles: Mapping[str, str], chosen:
         dtick=1,
     )
     return fig
+
+
+def _test_told(row: Row) -> str:
+    """The error on the test part; '' where the hypothesis cannot be simulated there."""
+    error_mv = row.get("test_rmse_mv")
+    return "" if error_mv is None else f", test RMSE {error_mv:.2f} mV"
 
 
 DECLARED = "nothing: as declared"

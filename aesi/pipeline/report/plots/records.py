@@ -126,7 +126,7 @@ def residual_figure(traces: Sequence[DiscoveryTrace], labels: Mapping[str, str])
         f"current, positive on discharge; residual (measured minus model), on {part}."
     )
     drawn = [getattr(t, f"{state}_v") for t in traces for state in first_and_last]
-    if any(np.nanmin(v) < low or np.nanmax(v) > high for v in drawn):
+    if any(np.nanmin(v) < low or np.nanmax(v) > high for v in drawn if np.isfinite(v).any()):
         fig.update_yaxes(range=(low, high), row=1)
         caption += " The axis of the voltage spans what was measured: a double click shows the rest."
     return style.framed(

@@ -34,8 +34,14 @@ def short_finding(discovery: Mapping[str, Any], sure: bool = False) -> str:
 
     sure : whether the confidence in the names stands behind them.
     """
-    said = finding_line(discovery) + (name_confidence(discovery) if sure else "")
-    return "; ".join([said, *_against(discovery)])
+    behind = (name_confidence(discovery) if sure else "") or _or_look_alikes(discovery)
+    return "; ".join([finding_line(discovery) + behind, *_against(discovery)])
+
+
+def _or_look_alikes(discovery: Mapping[str, Any]) -> str:
+    """Clause that names what the data do not tell from the names; '' where there is nothing."""
+    groups = look_alikes_told(discovery, {})
+    return f" (not told apart: {'; '.join(' or '.join(group) for group in groups)})" if groups else ""
 
 
 def _against(discovery: Mapping[str, Any]) -> list[str]:
@@ -95,7 +101,7 @@ def _verdict(view: DiscoveryView) -> str:
             return f'The declared model of "{view.cell}" misses something real{rest}.'
         names = [with_size(effect, view.discovery, _title(view.titles, effect)) for effect in effects]
         return f"Named in part: {listed(names)}. Something real is left{rest}."
-    sure = name_confidence(view.discovery)
+    sure = name_confidence(view.discovery, view.titles)
     if refit_does_as_well(view.discovery):
         return (
             f"One of two explanations: {_lowered(_named(view, effects))}{sure}; or the model's own parameters are off, "
@@ -109,16 +115,24 @@ def _tried(discovery: Mapping[str, Any]) -> bool:
     return bool(discovery.get("tried", True))
 
 
-def name_confidence(discovery: Mapping[str, Any]) -> str:
-    """The confidence in the names of a finding, never as certainty; '' where there is no finding. The cases behind it
-    count a look-alike as right."""
+def name_confidence(discovery: Mapping[str, Any], titles: Mapping[str, str] | None = None) -> str:
+    """The confidence in the names of a finding, never as certainty; '' where there is no finding.
+
+    It was measured with look-alikes counted as right: of a group of them it is told of the group.
+    """
     if discovery["verdict"] != "found":
         return ""
     value = discovery["confidence"]
     share = f"over {100 * CERTAIN:.0f} %" if value > CERTAIN else f"{100 * value:.0f} %"
-    names = "this name" if len(discovery["effects"]) == 1 else "these names"
-    or_alike = " or look-alikes" if discovery.get("indistinguishable") else ""
-    return f" ({share} confidence in {names}{or_alike})"
+    one = len(discovery["effects"]) == 1
+    groups = look_alikes_told(discovery, titles or {})
+    if groups and one:
+        return f" ({share} confidence that it is one of: {', '.join(groups[0])})"
+    names = "this name" if one else "these names"
+    alike = (
+        f", or in look-alikes of them: {'; '.join(' or '.join(group) for group in groups)}" if groups else ""
+    )
+    return f" ({share} confidence in {names}{alike})"
 
 
 WITH_FINDING = "with the finding added"
@@ -294,7 +308,7 @@ def look_alike_finding(discovery: Mapping[str, Any], titles: Mapping[str, str] |
 
 def look_alikes_told(discovery: Mapping[str, Any], titles: Mapping[str, str]) -> list[list[str]]:
     """The names of each group that the data cannot tell apart; what fits as well only beside others, with these."""
-    beside = {row["effect"]: row.get("hypothesis", ()) for row in discovery["candidates"]}
+    beside = {row["effect"]: row.get("hypothesis", ()) for row in discovery.get("candidates", ())}
     named = set(discovery["effects"])
 
     def told(effect: str) -> str:
