@@ -14,6 +14,7 @@ from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, BoolArray
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Effect
+from aesi.physics.initial_state import REST_C_RATE
 from aesi.physics.simulation import ModelName
 from aesi.records import Hold, Measurement, Run
 from aesi.tracer.case.energies import ACTIVATION_ENERGIES, energies_of, far_from_file
@@ -242,6 +243,11 @@ class InverseProblem:
         return np.concatenate([r.white_v[: r.n_fit] for r in self.records])
 
     @cached_property
+    def as_white_v(self) -> Array:
+        """(n,) V, see `PreparedRecord.as_white_v`."""
+        return np.concatenate([r.as_white_v[: r.n_fit] for r in self.records])
+
+    @cached_property
     def noise_v(self) -> float:
         """Root mean square of the white noise of the fitted rows, V."""
         return rms(self.white_v)
@@ -288,18 +294,33 @@ class InverseProblem:
 
     @cached_property
     def independent(self) -> Array:
-        """(n,) share of an independent sample of the model error that each row stands for."""
+        """(n,) share of an independent sample of the model error that each row stands for.
+
+        They are dealt out by time. While no charge moves the error stays what it was, so that a rest, however long, or
+        a pause of the logger in it counts as the time that one sample lasts."""
         out = []
         for data, rows in zip(self.seen, self.slices, strict=True):
             lasts = self.lasts_s[rows]
             moved_ah = float(np.abs(data.current_a) @ lasts) / SECONDS_PER_HOUR
             by_charge = moved_ah / self.cell.nominal_capacity_ah / INDEPENDENT_CHARGE
+            lasts = self._without_long_rests(data, lasts)
             many = min(float(lasts.sum()) / INDEPENDENT_S, by_charge)
             if self.trust == "beside":
                 many *= BESIDE_TIMES
             out.append(lasts / lasts.sum() * max(many, 1.0))
         joined = np.concatenate(out)
         return joined * self.compared if self.trust == "beside" else joined
+
+    def _without_long_rests(self, data: Measurement, lasts_s: Array) -> Array:
+        """(n,) s that each row stands for, those of a rest together no more than the samples last that its charge is,
+        or one."""
+        capacity_ah = self.cell.nominal_capacity_ah
+        rests = np.abs(data.current_a) <= REST_C_RATE * capacity_ah
+        number = np.cumsum(np.diff(rests, prepend=False))
+        together_s = np.bincount(number, lasts_s)[number]
+        moved_ah = np.bincount(number, np.abs(data.current_a) * lasts_s)[number] / SECONDS_PER_HOUR
+        most_s = INDEPENDENT_S * np.maximum(moved_ah / capacity_ah / INDEPENDENT_CHARGE, 1.0)
+        return np.where(rests, lasts_s * np.minimum(most_s / together_s, 1.0), lasts_s)
 
     @cached_property
     def lasts_s(self) -> Array:

@@ -9,11 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
+from scipy.special import ndtri
 
+from aesi.data.thinning import STEP_C_RATE
 from aesi.numerics.metrics import rms
-from aesi.numerics.typing import Array
+from aesi.numerics.typing import Array, BoolArray
 from aesi.over_time import stamp
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect
@@ -33,6 +37,32 @@ HOLD_OPTION = "--hold {0} (in an experiment discover.hold: {0})"
 HALF_FULL = 0.5
 """Above this state of charge a smaller one is safer to simulate, below it a larger one: the middle, whatever the
 cell."""
+FEWEST_ROWS = 8
+"""Fewest rows that tell a noise."""
+CALM_SHARE = 0.3
+"""Share of the rows, those at which the current changes least, that tell the noise. A convention."""
+LARGEST_SDS = 3.5
+"""A difference that is larger by so many standard deviations is a step of the voltage and no noise. A convention."""
+HELD_SHARE = 0.75
+"""Share of the differences in a steady stretch that tell how large noise may be: where a channel holds its values for
+several rows, up to half of the differences are nought."""
+HARMONICS = 200
+"""Harmonics of the error of rounding that are summed: 0.1 % of it is in the others."""
+SETTLED_S = 5.0
+"""How long a current has been steady where noise is told from rows further apart, s: what relaxes faster is over."""
+LONGEST_SMOOTH_S = 8.0
+"""Longest lag, s, at which noise is looked for that a filter has made smooth, or a slow instrument holds: a convention,
+between the seconds that such channels take and the minutes that the voltage relaxes over."""
+SMOOTH_LAGS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
+"""Lags, rows, that are tried."""
+FEWEST_SPANS = 50
+"""Spans of one lag after the other that tell the noise at a lag, to a tenth of it."""
+EVEN_TIMES = 1.5
+"""Factor on the typical time of so many rows by which a span may be longer: no third difference reaches over a gap."""
+SMOOTH_TIMES = 1.25
+"""Factor by which noise has to be larger at a longer lag for the channel to be taken for one that is filtered or holds
+its values: two and a half of the standard deviations that `FEWEST_SPANS` leave. White noise stays as it is told from
+neighbouring rows."""
 SMALLEST_NOISE_V = 5e-5
 """Least noise that is assumed, V: no cycler writes less, and in a virtual record without noise each microvolt would
 count."""
@@ -45,7 +75,8 @@ class PreparedRecord:
     data : as measured.  thin : what fits run on, fit and held-out part.  n_fit : rows of `thin` that fits may see.
     fit_until_s : the time where the fit part of `data` ends (inf for all).  start : the state at the first row.
     hold, thin_hold : how the current runs between the samples of either.  white_v : (n_thin,) V, standard deviation of
-    the white noise in each row of `thin`.  noise_full_v : of that in the fit part of `data`.
+    the noise in each row of `thin`.  as_white_v : (n_thin,) V, that of white noise which would leave as much to tell:
+    larger where rows share one value of the noise.  noise_full_v : of that in the fit part of `data`.
     lead_rows : rows of `data` at the start that only lead to what is judged.
     good : known to be good: nothing is looked for in it, and what others have beside it is what is different there.
     continues : number of the record that fits have seen and that this one begins with, where it does.
@@ -59,6 +90,7 @@ class PreparedRecord:
     hold: Hold
     thin_hold: Hold
     white_v: Array
+    as_white_v: Array
     noise_full_v: float
     lead_rows: int = 0
     notes: tuple[str, ...] = ()
@@ -105,24 +137,132 @@ class PreparedRecord:
         return int(np.searchsorted(self.data.time_s, self.fit_until_s))
 
 
+class Noise(NamedTuple):
+    """Noise of a record's rows.
+
+    sd_v : standard deviation, V.  resolution_v : the part of it that no mean of rows gets rid of, V: what the voltage
+    was rounded by where noise does not scatter it over more than one step.
+    rows : how many rows that follow each other share one value of the rest: one where it is white.
+    """
+
+    sd_v: float
+    resolution_v: float
+    rows: int
+
+    def of_means_v(self, rows: Array) -> Array:
+        """(m,) V: standard deviation of means over as many rows each as `rows` (m,) says."""
+        values = np.maximum(rows / self.rows, 1.0)
+        return np.sqrt((self.sd_v**2 - self.resolution_v**2) / values + self.resolution_v**2)
+
+
+def noise_of(data: Measurement, capacity_ah: float) -> Noise:
+    """The noise of a record.
+
+    capacity_ah : of the cell, which tells where the current is steady.
+    """
+    if len(data) < FEWEST_ROWS:
+        return Noise(SMALLEST_NOISE_V, 0.0, 1)
+    sd_v, rows = noise_floor_v(data.voltage_v, data.current_a), 1
+    smooth = _smooth_noise_v(data, capacity_ah)
+    most_v = max(smooth.values(), default=0.0)
+    if most_v > SMOOTH_TIMES * sd_v:
+        sd_v, rows = most_v, next(lag for lag, v in smooth.items() if SMOOTH_TIMES * v > most_v)
+    scattered_v = max(_from_row_to_row_v(data.voltage_v, data.current_a), most_v)
+    return Noise(sd_v, min(_rounded_by_v(_quantum_v(data.voltage_v), scattered_v), sd_v), rows)
+
+
 def noise_floor_v(voltage_v: Array, current_a: Array) -> float:
     """Standard deviation of the white noise, V, from second differences where the current is steady.
 
     voltage_v, current_a : (n,).  The scale is robust to the steps that remain; the smallest
     voltage step over the root of twelve is the least it can be.
     """
-    if len(voltage_v) < 8:
+    if len(voltage_v) < FEWEST_ROWS:
         return SMALLEST_NOISE_V
+    rounding = _quantum_v(voltage_v) / np.sqrt(12.0)
+    return max(_from_row_to_row_v(voltage_v, current_a), float(rounding), SMALLEST_NOISE_V)
+
+
+def _from_row_to_row_v(voltage_v: Array, current_a: Array) -> float:
+    """As `noise_floor_v`, but for the least that it can be."""
     second = voltage_v[2:] - 2.0 * voltage_v[1:-1] + voltage_v[:-2]
     change = np.abs(np.diff(current_a))
     change = np.maximum(change[1:], change[:-1])
-    calm = change <= np.quantile(change, 0.3)
-    kept = second[calm]
-    limit = 3.5 * max(np.median(np.abs(kept)) / 0.6745, 1e-9)
-    kept = kept[np.abs(kept) <= limit] if np.count_nonzero(np.abs(kept) <= limit) > 5 else kept
+    return _scale(second[change <= np.quantile(change, CALM_SHARE)]) / float(np.sqrt(6.0))
+
+
+def _scale(differences: Array, share: float = 0.5) -> float:
+    """Root mean square of differences, without those that are too large to be noise.
+
+    share : of the differences, the smallest ones, that tell how large noise may be.
+    """
+    size = np.abs(differences)
+    usual = float(np.quantile(size, share)) / float(ndtri(0.5 * (1.0 + share)))
+    kept = differences[size <= LARGEST_SDS * max(usual, 1e-9)]
+    return rms(kept if len(kept) > 5 else differences)
+
+
+def _quantum_v(voltage_v: Array) -> float:
+    """The smallest step of a voltage, V; nought where there is one value alone."""
     steps = np.diff(np.unique(np.round(voltage_v, 6)))
-    quantum = float(steps.min()) if len(steps) else 0.0
-    return max(float(np.sqrt(np.mean(kept**2) / 6.0)), quantum / np.sqrt(12.0), SMALLEST_NOISE_V)
+    return float(steps.min()) if len(steps) else 0.0
+
+
+def _rounded_by_v(quantum_v: float, scattered_v: float) -> float:
+    """Root mean square, V, of what the mean of a constant voltage with white noise is off by since each of its rows
+    was rounded to a multiple of a quantum: quantum / sqrt(12) without noise, a 200th of that with noise of half a
+    quantum, which scatters it over its neighbours.
+
+    scattered_v : of the noise, what rounding adds to it included.
+    Widrow & Kollar, Quantization Noise (2008), chapter 4: the k-th harmonic of the error is q / (pi k) sin(2 pi k v/q),
+    and is multiplied by exp(-2 (pi k s / q)**2) in the mean over noise of standard deviation s.
+    """
+    if not quantum_v:
+        return 0.0
+    noise_v2 = max(scattered_v**2 - quantum_v**2 / 12.0, 0.0)
+    k = np.arange(1, HARMONICS + 1)
+    of_each_v2 = (
+        0.5 * (quantum_v / (np.pi * k)) ** 2 * np.exp(-4.0 * np.pi**2 * k**2 * noise_v2 / quantum_v**2)
+    )
+    return float(np.sqrt(of_each_v2.sum()))
+
+
+def _smooth_noise_v(data: Measurement, capacity_ah: float) -> dict[int, float]:
+    """Standard deviation of the noise, V, by the lag, rows, at which values are compared: that of white noise is the
+    same at each, that of a filtered or held channel grows with the lag.
+
+    From third differences in stretches of steady current, `SETTLED_S` after they begin, which tell noise from a
+    relaxing voltage. That grows as the cube of the lag; a lag at which the noise has grown by more than the lag did is
+    left out, with all that are longer, and so are those with fewer than `FEWEST_SPANS` spans that do not overlap.
+    """
+    typical = float(np.median(np.diff(data.time_s))) if len(data) > 1 else np.inf
+    settled = max(int(np.ceil(SETTLED_S / typical)), 1)
+    out: dict[int, float] = {}
+    for lag in (one for one in SMOOTH_LAGS if one == 1 or one * typical <= LONGEST_SMOOTH_S):
+        span = settled + 3 * lag
+        if len(data) <= span:
+            break
+        v = data.voltage_v[settled:]
+        third = v[3 * lag :] - 3.0 * v[2 * lag : -lag] + 3.0 * v[lag : -2 * lag] - v[: -3 * lag]
+        steady = _calm(data, span, EVEN_TIMES * span * typical, STEP_C_RATE * capacity_ah)
+        if np.count_nonzero(steady) < FEWEST_SPANS * lag:
+            break
+        found_v = _scale(third[steady], HELD_SHARE) / float(np.sqrt(20.0))
+        before = max(out, default=lag)
+        if out and found_v > lag / before * max(out[before], SMALLEST_NOISE_V):
+            break
+        out[lag] = found_v
+    return out
+
+
+def _calm(data: Measurement, span: int, longest_s: float, most_a: float) -> BoolArray:
+    """(n - span,) whether the current is steady from a row on to `span` rows later: as in the calmest of the spans that
+    take no longer and in which it moves by no more."""
+    inside = slice((span + 1) // 2, (span + 1) // 2 + len(data) - span)
+    highest, lowest = (of(data.current_a, span + 1)[inside] for of in (maximum_filter1d, minimum_filter1d))
+    moves = highest - lowest
+    calm = (data.time_s[span:] - data.time_s[:-span] <= longest_s) & (moves <= most_a)
+    return calm & (moves <= np.quantile(moves[calm], CALM_SHARE)) if calm.any() else calm
 
 
 def prepare(
@@ -159,8 +299,10 @@ def _prepared(
     until = data.time_s[0] + (1.0 - holdout) * duration if holdout > 0 else np.inf
     n_fit = int(np.searchsorted(thin.time_s, until))
     fitted = data.take(slice(0, int(np.searchsorted(data.time_s, until))))
-    noise_full = noise_floor_v(fitted.voltage_v, fitted.current_a)
-    white = _white_v(record, thin.take(slice(0, n_fit)), noise_full)
+    noise = noise_of(fitted, cell.nominal_capacity_ah)
+    of_thin = noise_of(thin.take(slice(0, n_fit)), cell.nominal_capacity_ah)
+    white = _white_v(record, noise, of_thin)
+    as_white = _as_white_v(record, noise, of_thin, white, n_fit)
     as_given = start.basis == "given" and not (start.contradicted or start.doubted)
     said = () if as_given else (start.sentence,)
     return PreparedRecord(
@@ -172,7 +314,8 @@ def _prepared(
         hold=record.hold,
         thin_hold=record.thin_hold,
         white_v=np.hypot(white, THINNED_SHARE * lost),
-        noise_full_v=noise_full,
+        as_white_v=np.hypot(as_white, THINNED_SHARE * lost),
+        noise_full_v=noise.sd_v,
         notes=(
             *said,
             hold_sentence(data.name, record.hold, data.hold is not None, HOLD_OPTION),
@@ -181,13 +324,29 @@ def _prepared(
     )
 
 
-def _white_v(record: ThinnedRecord, seen: Measurement, noise_full_v: float) -> Array:
-    """(n_thin,) V: white noise of the rows of `thin`, told from those that fits see."""
+def _white_v(record: ThinnedRecord, noise: Noise, of_thin: Noise) -> Array:
+    """(n_thin,) V: noise of the rows of `thin`, by that of the rows of the record and of `thin` that fits see."""
     if record.rows is not None:  # what lies between rows that far apart is no noise
-        return np.maximum(noise_full_v / np.sqrt(record.rows), SMALLEST_NOISE_V)
+        return np.maximum(noise.of_means_v(record.rows), SMALLEST_NOISE_V)
     # Averages have no more of it than rows: what a drive that never rests moves them by is not noise.
-    noise = min(noise_floor_v(seen.voltage_v, seen.current_a), noise_full_v)
-    return np.full(len(record.thin), noise)
+    return np.full(len(record.thin), min(max(of_thin.sd_v, noise.resolution_v), noise.sd_v))
+
+
+def _as_white_v(record: ThinnedRecord, noise: Noise, of_thin: Noise, white_v: Array, n_fit: int) -> Array:
+    """(n_thin,) V: `PreparedRecord.as_white_v` for the noise `white_v` (n_thin,) of the rows.
+
+    As many rows as share a value tell no more than one of them does: those over which a channel is smooth, and those
+    that were rounded to one value, of which `resolution_v` is the same.
+    """
+    share = np.maximum(noise.rows / record.rows, 1.0) if record.rows is not None else float(of_thin.rows)
+    if not noise.resolution_v:
+        return np.sqrt(share) * white_v
+    code = np.round(record.thin.voltage_v / _quantum_v(record.whole.voltage_v))
+    opens = np.diff(code, prepend=np.nan) != 0.0
+    opens[n_fit : n_fit + 1] = True  # what is held back moves nothing that fits see
+    alike = np.bincount(np.cumsum(opens) - 1)[np.cumsum(opens) - 1]
+    scattered_v2 = np.maximum(white_v**2 - noise.resolution_v**2, 0.0)
+    return np.sqrt(share * scattered_v2 + alike * noise.resolution_v**2)
 
 
 def _temperature_noted(data: Measurement) -> tuple[str, ...]:

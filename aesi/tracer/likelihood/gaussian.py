@@ -10,7 +10,11 @@ and what is said of blocks F by those outside is log p(y_F | y_-F) = log p(y) - 
 Bishop, Pattern Recognition and Machine Learning (2006), section 3.5.
 
 Parameters have bounds, which (1) does not know. Those that all data together push onto a bound are held there, and (2)
-is of the rest.
+is of the rest. The evidence is an integral over those that are held, too: along the distance d >= 0 of one from its
+bound, with the free ones marginalised and the others held where they are, the density is
+
+    p(d) ~ exp(g d - a d^2 / 2)    g < 0 where the data push onto the bound, a > 0 their curvature    (3)
+
 """
 
 from __future__ import annotations
@@ -22,6 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import lsq_linear
+from scipy.special import log_ndtr
 
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.tracer.case.blocks import Blocks
@@ -281,11 +286,46 @@ def held_at_bounds(posterior: Posterior, bounds: Array) -> tuple[Array, BoolArra
     return np.where(held, inside, 0.0), held
 
 
+class AtBound(NamedTuple):
+    """(3) of one parameter that is held.  slope : g.  curvature : a."""
+
+    slope: float
+    curvature: float
+
+    @property
+    def log_mass(self) -> float:
+        """Logarithm of the integral of (3) over d, nats, in units of the root of 2 pi."""
+        beyond = self.slope / float(np.sqrt(self.curvature))
+        return 0.5 * (beyond**2 - float(np.log(self.curvature))) + float(log_ndtr(beyond))
+
+
+def along_bounds(sums: BlockSums, place: Array, bounds: Array, held: BoolArray) -> dict[int, AtBound]:
+    """(3) of each parameter that is held, by its number.
+
+    sums : about `place` (m,), where some parameters are on their bounds (m, 2).  held : (m,) which these are.
+    """
+    a = sums.gram.sum(axis=0) + np.eye(len(place))
+    b = sums.moment.sum(axis=0) - place
+    free, out = np.flatnonzero(~held), {}
+    for j in np.flatnonzero(held).tolist():
+        taken = np.linalg.solve(a[np.ix_(free, free)], a[free, j])
+        slope = float(b[j] - taken @ b[free])
+        inwards = 1.0 if on_lower_bound(place[j], bounds[j]) else -1.0
+        out[j] = AtBound(inwards * slope, float(a[j, j] - taken @ a[free, j]))
+    return out
+
+
+def on_lower_bound(place: float, bounds: Array) -> bool:
+    """Whether a parameter that is held is on the lower of its bounds (2,)."""
+    return bool(place - bounds[0] <= bounds[1] - place)
+
+
 @dataclass(frozen=True, eq=False)
 class Weighed:
     """A hypothesis at one size of the model error, worked out as far as it takes to compare sizes.
 
-    posterior : of the parameters that are free.  folds : by partition.  x : (m,) the point.
+    posterior : of the parameters that are free.  folds : by partition.  x : (m,) the point.  bounds : (m, 2).
+    sums : of all of them about that point.
     to_bounds, held : (m,) change to the bounds of those that are not free, and which these are.  log_prior : of the
     size.
     """
@@ -293,6 +333,8 @@ class Weighed:
     posterior: Posterior
     folds: Mapping[str, Sequence[Sequence[int]]]
     x: Array
+    bounds: Array
+    sums: BlockSums
     to_bounds: Array
     held: BoolArray
     size: Size
@@ -322,9 +364,20 @@ class Weighed:
         whole[:, free] = posterior.shifts
         shift, covariance = self.to_bounds.copy(), np.zeros((m, m))
         shift[free], covariance[np.ix_(free, free)] = posterior.shift, posterior.covariance
-        evidence = posterior.evidence - 0.5 * float(np.sum((self.x + self.to_bounds)[self.held] ** 2))
         shifts = self._by_partition(whole)
-        return PredictiveScore(self.size, self.log_density, self.total, evidence, shifts, shift, covariance)
+        return PredictiveScore(
+            self.size, self.log_density, self.total, self._evidence, shifts, shift, covariance
+        )
+
+    @property
+    def _evidence(self) -> float:
+        """As `PredictiveScore.evidence`: that of the free parameters, with what (3) and the prior say of the others."""
+        if not self.held.any():
+            return self.posterior.evidence
+        place = self.x + self.to_bounds
+        beside = along_bounds(self.sums.moved(self.to_bounds), place, self.bounds, self.held)
+        of_held = sum(one.log_mass for one in beside.values()) - 0.5 * float(np.sum(place[self.held] ** 2))
+        return self.posterior.evidence + of_held
 
 
 def weighed(
@@ -340,7 +393,7 @@ def weighed(
     if held.any():
         free = np.flatnonzero(~held)
         posterior = Posterior(sums.moved(to_bounds).take(free), x[free], folds)
-    return Weighed(posterior, blocks.folds, x, to_bounds, held, size, log_prior)
+    return Weighed(posterior, blocks.folds, x, bounds, sums, to_bounds, held, size, log_prior)
 
 
 def best_over_sizes(sizes: Sequence[Weighed], own: int) -> PredictiveScore:

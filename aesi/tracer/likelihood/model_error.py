@@ -169,7 +169,7 @@ class SplitTable:
         """
         problem, amplitude = self.problem, self._amplitude(size)
         if not problem.coarse:
-            return whiten(self.table, problem.time_s, self.blocks.starts[:-1], amplitude, problem.white_v)
+            return whiten(self.table, problem.time_s, self.blocks.starts[:-1], amplitude, problem.as_white_v)
         root = np.sqrt(problem.independent)
         if self.blocks.windows is None:
             return self.table * (root / amplitude)[:, None], self.log_det(size)

@@ -1,10 +1,13 @@
 """The likelihood against brute force: dense covariances, refits without a block, draws of its noise."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from aesi.numerics.noise.discrepancy import CORRELATION_LENGTHS_S, whiten
 from aesi.physics.effects import CATALOGUE
+from aesi.records import Measurement
 from aesi.tracer.case.blocks import Blocks, blocks_of
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import prepare_all
@@ -82,10 +85,52 @@ def test_what_the_data_push_beyond_a_bound_is_held_there_and_scored_as_if_it_wer
     table, log_det = whiten(known, TIME, STARTS[:-1], AMPLITUDE, WHITE)
     two = Posterior(block_sums(BLOCKS, table, log_det), np.zeros(2), BLOCKS.folds["block"])
     assert score.log_density["block"] == pytest.approx(two.log_density, rel=1e-9)
-    assert score.evidence == pytest.approx(two.evidence - 0.5)
     assert score.shift == pytest.approx([1.0, *two.shift])
     assert score.covariance[1:, 1:] == pytest.approx(two.covariance)
     assert not score.covariance[0].any()
+
+
+@pytest.mark.parametrize("bounds", [(-1.0, 1.0), (-1.0, 0.0)])
+def test_the_evidence_of_what_is_held_on_a_bound_was_not_an_integral_over_what_is_allowed(bounds):
+    rng = np.random.default_rng(8)
+    jacobian = rng.normal(size=(N, M))
+    residual = jacobian @ [1.3, 0.2, -0.1] + 0.5 * rng.normal(size=N)
+    white = whiten(np.column_stack([residual, jacobian]), TIME, STARTS[:-1], AMPLITUDE, WHITE)
+    allowed = np.array([bounds, *[(-9.0, 9.0)] * (M - 1)])
+    held = weighed(BLOCKS, block_sums(BLOCKS, *white), np.zeros(M), allowed, Size(1.0), 0.0)
+    assert held.held.tolist() == [True, False, False]
+
+    def with_first(z):
+        column = np.column_stack([residual - z * jacobian[:, 0], jacobian[:, 1:]])
+        others = block_sums(BLOCKS, *whiten(column, TIME, STARTS[:-1], AMPLITUDE, WHITE))
+        return Posterior(others, np.zeros(M - 1), FOLDS["block"]).evidence - 0.5 * (z**2 + LOG_2PI)
+
+    z = np.linspace(*bounds, 1001)
+    said = np.array([with_first(one) for one in z])
+    integral = said.max() + np.log(np.trapezoid(np.exp(said - said.max()), z))
+    assert held.score.evidence == pytest.approx(integral, abs=1e-3)
+
+
+def samples_under_load(cell, data):
+    problem = replace(InverseProblem(cell, prepare_all(cell, [data], 0.9, 0.0), {}), trust="measured")
+    assert problem.independent.max() <= 1.0
+    return problem.independent[np.abs(problem.seen[0].current_a) > 0.3].sum()
+
+
+def test_a_rest_and_a_pause_of_the_logger_took_the_evidence_from_the_load(cell, make):
+    drive = make(n=3000)
+    alone = samples_under_load(cell, drive)
+    rest_s = drive.time_s[-1] + 60.0 * np.arange(1.0, 601.0)
+    rested = Measurement(
+        np.append(drive.time_s, rest_s),
+        np.append(drive.current_a, np.zeros(600)),
+        np.append(drive.voltage_v, np.full(600, drive.voltage_v[-1])),
+        name="rested",
+    )
+    paused = replace(drive, time_s=drive.time_s + np.where(np.arange(3000) > 100, 36_000.0, 0.0))
+    assert alone > 6.0
+    assert samples_under_load(cell, rested) > alone - 1.0
+    assert samples_under_load(cell, paused) > alone - 1.0
 
 
 def test_draws_have_the_variance_that_is_whitened():

@@ -10,7 +10,7 @@ from aesi.data.thinning import averaged_over
 from aesi.physics import simulate
 from aesi.records import Measurement
 from aesi.tracer.case.checks import check_record
-from aesi.tracer.case.records import led_by, noise_floor_v, prepare, prepare_test
+from aesi.tracer.case.records import led_by, noise_floor_v, noise_of, prepare, prepare_test
 from aesi.tracer.case.thinned import thinned_record, thinned_together
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.model_state import ModelState
@@ -134,6 +134,56 @@ def test_noise_floor_is_found_under_a_drive(rng):
 def test_quantised_data_have_at_least_the_noise_of_the_quantum():
     voltage = np.round(np.linspace(4.0, 3.9, 3000), 2)
     assert noise_floor_v(voltage, np.ones(3000)) >= 0.01 / np.sqrt(12) * 0.999
+
+
+def test_the_resolution_of_a_voltage_was_averaged_away_as_white_noise(cell):
+    time = np.arange(6000.0)
+    current = np.where((time > 600) & (time < 3000), 3.0, 0.0)
+    voltage = simulate(cell, time, current, soc0=0.8).voltage_v
+    data = Measurement(time, current, 5e-3 * np.round(voltage / 5e-3), name="coarse")
+    record = prepare(cell, data, 0.8, 0.0)
+    assert len(record.thin) < 1000
+    assert record.white_v.min() > 0.99 * 5e-3 / np.sqrt(12.0)
+    last = (record.thin.time_s > 3000.0) & (np.abs(record.thin.voltage_v - data.voltage_v[-1]) < 1e-3)
+    assert np.count_nonzero(last) > 20  # rows of a rest that were rounded to one value
+    together = np.sum(record.as_white_v[last] ** -2.0) ** -0.5
+    assert together > 0.9 * 5e-3 / np.sqrt(12.0)
+
+
+def test_noise_of_half_a_step_lets_means_tell_more_than_the_step(rng):
+    time = np.arange(20_000.0)
+    voltage = 3.7 + 1e-5 * np.arange(20_000.0) + 1e-3 * rng.normal(size=len(time))
+    data = Measurement(time, np.full(len(time), 3.0), 2e-3 * np.round(voltage / 2e-3), name="scattered")
+    noise = noise_of(data, 3.0)
+    assert noise.sd_v == pytest.approx(np.hypot(1e-3, 2e-3 / np.sqrt(12.0)), rel=0.05)
+    assert noise.of_means_v(np.array([1.0, 100.0])) == pytest.approx(
+        noise.sd_v * np.array([1.0, 0.1]), rel=0.01
+    )
+
+
+def over_five_rows(values):
+    return np.convolve(values, np.ones(5) / np.sqrt(5.0), mode="same")
+
+
+@pytest.mark.parametrize("smooth", [over_five_rows, lambda values: np.repeat(values[::5], 5)])
+def test_the_noise_of_a_filtered_or_held_channel_was_told_from_neighbouring_rows(cell, make, rng, smooth):
+    data = make(n=6000)
+    clean = simulate(cell, data.time_s, data.current_a, 0.9).voltage_v
+    noise = smooth(rng.normal(size=len(data)))
+    channel = replace(data, voltage_v=clean + 1e-3 * noise)
+    assert noise_of(channel, 30.0).sd_v == pytest.approx(1e-3, rel=0.15)
+    assert noise_of(channel, 30.0).rows > 2
+    record = prepare(cell, channel, 0.9, 0.0)
+    assert record.noise_v == pytest.approx(1e-3, rel=0.15)
+    assert record.as_white_v.min() > 1.4 * record.white_v.max()
+
+
+def test_neither_white_noise_nor_a_relaxing_voltage_is_taken_for_that_of_a_filter(cell, make):
+    data = make(n=6000)
+    clean = replace(data, voltage_v=simulate(cell, data.time_s, data.current_a, 0.9).voltage_v)
+    for one in (data, clean):
+        noise = noise_of(one, 30.0)
+        assert (noise.sd_v, noise.rows) == (noise_floor_v(one.voltage_v, one.current_a), 1)
 
 
 @pytest.mark.parametrize("degc", [None, 20.0])
