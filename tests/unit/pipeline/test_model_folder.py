@@ -12,14 +12,14 @@ PARTS = {"correction": {"weights": NUMBERS, "names": ["a", "b"]}}
 
 
 def test_what_was_written_is_read(tmp_path):
-    write_model(tmp_path / "model", {"dt_s": 1.0}, PARTS)
+    write_model(tmp_path / "model", {"dt_s": 1.0}, PARTS, {})
     head, parts = read_model(tmp_path / "model")
     assert head["dt_s"] == 1.0
     np.testing.assert_array_equal(parts["correction"]["weights"], NUMBERS)
 
 
 def test_arrays_with_any_byte_changed_are_refused(tmp_path):
-    write_model(tmp_path, {}, PARTS)
+    write_model(tmp_path, {}, PARTS, {})
     file = tmp_path / model_folder.ARRAYS
     whole = file.read_bytes()
     # Header, compressed stream and directory; a byte of a time of day, say, does not matter.
@@ -33,20 +33,20 @@ def test_arrays_with_any_byte_changed_are_refused(tmp_path):
 
 
 def test_empty_arrays_are_refused(tmp_path):
-    write_model(tmp_path, {}, PARTS)
+    write_model(tmp_path, {}, PARTS, {})
     (tmp_path / model_folder.ARRAYS).write_bytes(b"")
     with pytest.raises(InputError, match=r"arrays\.npz cannot be read"):
         read_model(tmp_path)
 
 
 def test_a_folder_that_was_half_written_over_is_no_model(tmp_path, monkeypatch):
-    write_model(tmp_path, {}, PARTS)
+    write_model(tmp_path, {}, PARTS, {})
 
     def killed(*_args, **_named):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(np, "savez_compressed", killed)
     with pytest.raises(KeyboardInterrupt):
-        write_model(tmp_path, {}, PARTS)
+        write_model(tmp_path, {}, PARTS, {})
     with pytest.raises(InputError, match=r"holds no model\.json"):
         read_model(tmp_path)
