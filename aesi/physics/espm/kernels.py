@@ -60,6 +60,19 @@ def parts_of(step, longest, most, finer):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", fastmath=FASTMATH)
+def steps_ahead(step, last):  # type: ignore[no-untyped-def]
+    """By how much of what it moved over the last step, 0 s for none, what is explicit is taken on over a step; no more
+    than all of it.
+
+    Beyond it a long step behind a short one takes on whatever a jump of the current began. With at most all of it no
+    order of long and short steps grows where equal ones do not: by at most 0.96 a step in 20,000 cycles of 2 to 5
+    lengths that are up to 400 times one another, with an explicit rest of 0.316 of the diffusivity that is stepped
+    exactly (`EXTRAPOLATED_MARGIN`); with twice as much at most 1.18, without a limit hundreds.
+    """
+    return min(step / last, 1.0) if last > 0.0 else 0.0
+
+
+@njit(inline="always", fastmath=FASTMATH)
 def open_circuit(table, theta):  # type: ignore[no-untyped-def]
     """Potential at `theta`, falling on at a fixed slope outside [0, 1]."""
     inside = min(max(theta, 0.0), 1.0)

@@ -162,6 +162,25 @@ def test_a_held_row_is_a_step_at_the_row_before(nmc):
     assert held.series["c_sn"] == pytest.approx(steps.series["c_sn"][[0, 2, 4]], rel=1e-7)
 
 
+@pytest.mark.parametrize("early_s", [0.1, 1e-3])
+@pytest.mark.parametrize(
+    ("effects", "model"), [((), "espm"), (("charge_transfer_kinetics",), "espm"), ((), "dfn")]
+)
+def test_a_long_step_behind_a_short_one_went_a_thousand_times_too_far(lg_m50, effects, model, early_s):
+    """Loggers write a row where a current jumps; a lag puts one beside each. At 10 degC the salt ran out."""
+    time = np.arange(600.0)
+    current = np.where(time // 100 % 2 == 0, 7.5, 0.0)
+    rows = np.sort(np.concatenate([time, time[1:] - early_s]))
+    active = [CATALOGUE[name].activate() for name in effects]
+    even, uneven = (
+        simulate(
+            lg_m50, t, current[np.searchsorted(time, t)], 0.8, active, 10.0, "backward", model=model
+        ).voltage_v
+        for t in (time, rows)
+    )
+    assert uneven[np.searchsorted(rows, time)] == pytest.approx(even, abs=5e-4)
+
+
 def test_the_general_path_agrees_with_the_plain_one(nmc, load):
     time, current = load
     plain = simulate(nmc, time, current, soc0=0.9)
