@@ -12,6 +12,7 @@ import pint
 import pytest
 
 from aesi.errors import CellError, InputError, ParameterError, SimulationError
+from aesi.numerics.metrics import rms
 from aesi.physics import Cell, impedance, simulate
 from aesi.physics.effect import Contribution, Effect, Record, Trace
 from aesi.physics.effects import CATALOGUE, active_effect, describe, find_effect, load_effect
@@ -255,6 +256,26 @@ def test_the_units_of_voltage_laws_add_up():
         assert (1.0 * unit * ampere).check(volt.dimensionality)
     heat = registry.parse_units(CATALOGUE["self_heating"].parameters["heat_transfer_w_k"].unit)
     assert (1.0 * heat * registry.kelvin).check(registry.watt.dimensionality)
+
+
+@each
+@both
+@pytest.mark.parametrize("hold", ["backward", "linear"])
+def test_rows_between_rows_under_the_same_current_change_nothing(effect, model, hold):
+    """Long steps behind ones a thousand times shorter; a double layer is not exact in steps of seconds."""
+    skip_what_the_model_holds(effect, model)
+    rng = np.random.default_rng(0)
+    early_s = rng.choice([1e-3, 0.3, 1.0, 1.998], len(TIME) - 1)
+    rows = np.sort(np.concatenate([TIME, TIME[1:] - early_s]))
+    held = CURRENT[np.searchsorted(TIME, rows)] if hold == "backward" else np.interp(rows, TIME, CURRENT)
+    few, many = (
+        simulate(
+            CELL, time, current, 0.8, [effect.activate()], hold=hold, model=model, on_depletion="clip"
+        ).voltage_v
+        for time, current in ((TIME, CURRENT), (rows, held))
+    )
+    apart = rms(many[np.searchsorted(rows, TIME)] - few)
+    assert apart < (1e-3 if effect.id == "double_layer" else 5e-5), f"{1e3 * apart:.3f} mV"
 
 
 @pytest.mark.parametrize("pair", list(itertools.combinations(CATALOGUE, 2)), ids="+".join)
