@@ -31,6 +31,7 @@ from aesi.pipeline.notes import (
     of_another_model,
     of_contradiction,
     of_day,
+    of_dry_collector,
     of_fitted,
     on_temperatures,
     temperature_sentence,
@@ -130,6 +131,7 @@ def simulate_file(
     _write_run(out, run, degc)
     say([f"{placed.record.name}: {words}" for words in of_case])
     say(reached(used.cell, placed.record, run.voltage_v, run.series["soc"]))
+    say(of_dry_collector(placed.record.name, run, used.model))
     if asked.run_on and np.any(run.series["depleted"]):
         at = int(np.argmax(run.series["depleted"]))
         say([ran_out(placed.record.name, {"this model": float(run.time_s[at])})])

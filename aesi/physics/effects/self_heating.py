@@ -7,11 +7,13 @@
 Where the temperature of the case was measured that is used, with what the winding is warmer by where the cell file
 tells how it conducts (`aesi.physics.model.of_record`), and this balance is not needed.
 
-Energy is kept from one rest to another: what diffusion dissipates is heat, too. It counts when it is taken from the
-voltage; that gradients of lithium and salt hold part of it until they have levelled out is left out, as are gradients
-of temperature within the cell, the casing's own heat capacity, and the heat of effects in series with the cell
-(film_growth, ocv_hysteresis) and of a leakage_current. Holds for cells whose Biot number is small. Needs density,
-specific heat and volume in the cell file.
+Energy is kept from one rest to another: what diffusion within particles and electrolyte dissipates is heat, too, from
+when the voltage lacks it.
+
+Leaves out what gradients of lithium and salt hold of it until they have levelled out, gradients of temperature within
+the cell, the casing's own heat capacity, and the heat of effects in series with the cell (film_growth, ocv_hysteresis)
+and of a leakage_current. Holds for cells whose Biot number is small. Needs density, specific heat and volume in the
+cell file.
 
 Source: Bernardi, Pawlikowski & Newman, J. Electrochem. Soc. 132 (1985) 5, doi:10.1149/1.2113792.
 """

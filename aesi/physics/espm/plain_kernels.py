@@ -135,17 +135,17 @@ def step_salt(i0, i1, dt, last_step, slot, cell, salt, memory):  # type: ignore[
 def salt_at_gauss_points(c, c0, gauss, g):  # type: ignore[no-untyped-def]
     """g : (6,) salt over rest at the Gauss points of both electrodes, kept positive.
 
-    Returns 18 times the mean over rest of the electrode that has less, as it is.
+    Returns the salt where they meet the separator, over rest, of the electrode that has less there, as it is.
     """
     nodes = c.shape[0]
     width = (nodes - 1) // 3 + 1
+    driest = min(c[width - 1], c[nodes - width]) / c0
     for i in range(6):
         first = 0 if i < 3 else nodes - width
         value = 0.0
         for j in range(width):
             value += gauss[i, first + j] * c[first + j]
         g[i] = value / c0
-    driest = min(5.0 * (g[0] + g[2]) + 8.0 * g[1], 5.0 * (g[3] + g[5]) + 8.0 * g[4])
     for i in range(6):
         g[i] = wet(g[i])
     return driest

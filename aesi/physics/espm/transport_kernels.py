@@ -148,20 +148,15 @@ def solid_forcing(mean, z, at, project, psi, nodes, force):  # type: ignore[no-u
 def observe_salt(c, c0, gauss, salt, log_salt, region_salt):  # type: ignore[no-untyped-def]
     """Salt at the Gauss points over rest, its mean logarithm and mean (mol/m3) in each region.
 
-    Returns the mean over rest of the electrode that has less.
+    Returns the salt where they meet the separator, over rest, of the electrode that has less there.
     """
     for i in range(gauss.shape[0]):
         g = 0.0
         for j in range(c.shape[0]):
             g += gauss[i, j] * c[j]
         salt[i] = g / c0
-    regions = log_salt.shape[0] // 2
-    driest = 1.0
-    for side in range(2):
-        whole = 0.0
-        for r in range(side * regions, (side + 1) * regions):
-            whole += (5.0 * (salt[3 * r] + salt[3 * r + 2]) + 8.0 * salt[3 * r + 1]) / 18.0 / regions
-        driest = min(driest, whole)
+    regions, layer = log_salt.shape[0] // 2, (c.shape[0] - 1) // 3
+    driest = min(c[layer], c[2 * layer]) / c0
     for i in range(gauss.shape[0]):
         salt[i] = wet(salt[i])
     for r in range(2 * regions):

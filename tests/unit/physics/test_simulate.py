@@ -204,7 +204,7 @@ def test_a_measured_temperature_is_used_as_given(nmc, load):
 
 @pytest.mark.parametrize("hold", ["linear", "backward"])
 def test_a_winding_stores_and_conducts_what_it_loses(nmc, hold):
-    """Without entropy that is I (U - V), U of the surfaces: the heat of a run against the course of its temperature."""
+    """Without entropy that is I (U - V), U of the mean: the heat of a run against the course of its temperature."""
     cell = replace(
         nmc.with_negative(entropic=NO_ENTROPY).with_positive(entropic=NO_ENTROPY),
         thermal_conductivity_w_m_k=0.3,
@@ -216,10 +216,8 @@ def test_a_winding_stores_and_conducts_what_it_loses(nmc, hold):
     case = 10.0 + 3.0 * time / 3000.0
     run = simulate(cell, time, current, 0.9, temperature_degc=case, hold=hold)
     winding = run.series["temperature_k"] - 273.15
-    surface_v = cell.positive.ocp(run.series["c_sp"] / cell.positive.c_max_mol_m3) - cell.negative.ocp(
-        run.series["c_sn"] / cell.negative.c_max_mol_m3
-    )
-    lost_j = np.sum((current * (surface_v - run.voltage_v))[1:] * np.diff(time))
+    mean_v = cell.rest_voltage_v(run.series["soc"])
+    lost_j = np.sum((current * (mean_v - run.voltage_v))[1:] * np.diff(time))
     conducted_j = np.trapezoid(winding - case, time) / resistance
     assert winding[0] == case[0]
     assert winding[200:300].mean() > case[200:300].mean() + 0.5
