@@ -20,9 +20,9 @@ PARAMETERS = {
     "per_throughput_ohm_ah": Parameter(
         1e-4,
         "ohm/(A*hour)",
-        bounds=(0.0, 0.1),
+        bounds=(0.0, 1e6),
         neutral=0.0,
-        source="zero to a doubling of a 100 mohm cell within one ampere-hour; half a doubling of 10 mohm at 3 Ah",
+        source="zero to a doubling of a 1 kohm cell of 1 mAh within its capacity; half a doubling of 10 mohm at 3 Ah",
         description="growth per charge throughput, a",
         expected=0.045,
         capacity_power=-2,
@@ -30,9 +30,9 @@ PARAMETERS = {
     "per_root_time_ohm": Parameter(
         0.0,
         "ohm/hour**0.5",
-        bounds=(0.0, 0.1),
+        bounds=(0.0, 1e3),
         neutral=0.0,
-        source="zero to a doubling of a 100 mohm cell within one hour; half a doubling of 10 mohm at 3 Ah",
+        source="zero to a doubling of a 1 kohm cell of 1 mAh within one hour; half a doubling of 10 mohm at 3 Ah",
         description="growth per square root of time, b",
         expected=0.015,
         capacity_power=-1,

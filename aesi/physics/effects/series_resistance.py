@@ -16,9 +16,9 @@ PARAMETERS = {
     "resistance_ohm": Parameter(
         1e-3,
         "ohm",
-        bounds=(0.0, 0.1),
+        bounds=(0.0, 1e3),
         neutral=0.0,
-        source="0.1 mohm (large pouch, welded tabs) to 100 mohm (small cylindrical cell in a clamp)",
+        source="0.1 mohm (large pouch, welded tabs), 100 mohm (small cylindrical cell in a clamp), 1 kohm (some 1 mAh)",
         description="resistance added to what the cell file declares",
         counted="added",
         expected=0.02,

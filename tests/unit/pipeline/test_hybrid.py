@@ -512,8 +512,8 @@ def test_a_damaged_folder_is_named(model, tmp_path, damage):
         ("effects.json", ["series_resistance"], "effects.json is not as it was saved"),
         (
             "effects.json",
-            [{"effect": "series_resistance", "parameters": {"resistance_ohm": 99}}],
-            "effects.json: series_resistance: resistance_ohm = 99 ohm is outside",
+            [{"effect": "series_resistance", "parameters": {"resistance_ohm": 9999}}],
+            "effects.json: series_resistance: resistance_ohm = 9999 ohm is outside",
         ),
         ("correction.json", {"terms": "array:none"}, "arrays.npz lacks 'none', which correction.json names"),
     ],

@@ -107,6 +107,14 @@ def test_values_and_coordinates_are_one_anothers_inverse():
     }
 
 
+@pytest.mark.parametrize("effect", ["series_resistance", "film_growth"])
+def test_a_resistance_of_a_coin_cell_was_beyond_bounds_in_ohm(effect):
+    """A prior that goes with one over the capacity came to a fortieth of a deviation, at 5 mAh."""
+    for capacity_ah in (1e-3, 5e-3, 0.25, 5.0):
+        for free in of_effect(effect, CATALOGUE[effect].parameters, capacity_ah):
+            assert free.bounds[1] >= FURTHEST_SDS
+
+
 def test_fits_start_a_third_of_the_way_to_what_is_typical():
     (first,) = starts(of_effect("a", {"resistance_ohm": OHM}, 5.0))
     (ohm,) = of_effect("a", {"resistance_ohm": OHM}, 5.0)
