@@ -184,13 +184,13 @@ def check_sign(columns: Columns, context: Context, advice: str) -> None:
     advice : what the user can do about it, from '; ' on.
     """
     found = clearest_answer(columns)
-    if found is not None and abs(found[1]) > CLEAR_CORRELATION:
+    right, other = _explained(columns, -1.0), _explained(columns, 1.0)
+    if found is not None and _tells(found, right, other):
         contradicts, evidence = found[1] > 0, "at its steps"
     else:
         trend = _trend(columns)
         contradicts, evidence = trend > CLEAR_CORRELATION, "along the test"
         if abs(trend) <= CLEAR_CORRELATION:
-            right, other = _explained(columns, -1.0), _explained(columns, 1.0)
             contradicts = other > EXPLAINED_SHARE and right < UNEXPLAINED_SHARE
     if contradicts:
         row = int(np.argmax(np.abs(np.diff(columns["current_a"])))) + 1
@@ -198,6 +198,17 @@ def check_sign(columns: Columns, context: Context, advice: str) -> None:
             f"{context.at('current_a', row)}: the voltage rises with the current {evidence}, so its sign "
             f"contradicts the one declared{advice}."
         )
+
+
+def _tells(answer: tuple[float, float], right: float, other: float) -> bool:
+    """Whether an answer to the steps of the current says which sign it has: clearly, and not against what resistance
+    and capacity together explain. While a charge holds its voltage the current falls by steps of its own, and it is the
+    charge that has moved the voltage.
+
+    right, other : as `_explained` gives them, of the sign that was declared and of the other; 0 of too few rows.
+    """
+    clear = abs(answer[1]) > CLEAR_CORRELATION
+    return clear and (right == other or (answer[1] > 0) == (other > right))
 
 
 def _check_pace(columns: Columns, context: Context) -> None:

@@ -168,3 +168,18 @@ def test_a_charge_whose_current_only_falls_has_no_wrong_sign(tmp_path):
     current = -3.0 * np.exp(-TIME / 3000.0)
     resting = 3.4 + 0.02 * np.sin(TIME / 500.0)
     read_measurement(written(tmp_path, TIME, current, np.round(resting - 0.02 * current, 3)))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0], ids=["as it is", "turned"])
+def test_a_charge_alone_whose_voltage_is_held_was_of_the_wrong_sign(tmp_path, sign):
+    """A row a minute at 3 A, and on at 4.2 V behind leads of 60 mohm: the cell's own voltage rises meanwhile."""
+    time, current, charge = np.arange(0.0, 9000.0, 60.0), [], 0.0
+    for _ in time:
+        current.append(max(-3.0, (3.5 - 0.18 * charge - 4.2) / (0.02 + 0.06)))
+        charge += current[-1] / 60.0
+    falling = np.array(current)
+    volts = 3.5 - 0.18 * np.cumsum([0.0, *current[:-1]]) / 60.0 - 0.02 * falling
+    if sign > 0:
+        assert len(read_measurement(written(tmp_path, time, falling, volts))) == len(time)
+    else:
+        assert "contradicts the one declared" in refusal(tmp_path, time, -falling, volts)
