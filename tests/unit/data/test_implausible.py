@@ -183,3 +183,15 @@ def test_a_charge_alone_whose_voltage_is_held_was_of_the_wrong_sign(tmp_path, si
         assert len(read_measurement(written(tmp_path, time, falling, volts))) == len(time)
     else:
         assert "contradicts the one declared" in refusal(tmp_path, time, -falling, volts)
+
+
+def test_five_minutes_of_a_drive_at_ten_rows_a_second_were_in_another_unit(tmp_path):
+    """Half a second passes until a current's drop is in the voltage: from row to row a fifth of it shows."""
+    time = np.arange(0.0, 300.0, 0.1)
+    current = np.repeat(np.random.default_rng(0).normal(1.0, 3.0, 100), 31)[: len(time)]
+    drop = [0.0]
+    for now in current[1:]:
+        drop.append(drop[-1] + 0.2 * (0.04 * now - drop[-1]))
+    volts = 3.8 - 0.18 * np.cumsum(current) * 0.1 / 3600.0 - np.array(drop)
+    assert len(read_measurement(written(tmp_path, time, current, volts))) == len(time)
+    assert "--unit time_s=h" in refusal(tmp_path, TIME / 3600, CYCLE, voltage(CYCLE))
