@@ -200,7 +200,7 @@ def _full_discharge_ah(cell: Cell, data: Measurement) -> float | None:
     # A full cell of a flat potential falls by more at rest; where it is being charged, any state may be as high.
     charged = data.current_a < -OPEN_SHARE * np.abs(data.current_a).max()
     full |= ~charged & (data.voltage_v >= OpenCircuit(cell).lingers_from_v)
-    taken_ah = data.discharged_ah(counted(data))
+    taken_ah = data.discharged_ah(hold_counted(data))
     most: float | None = None
     position = 0
     while full[position:].any():
@@ -238,10 +238,10 @@ def _emptied_ah(cell: Cell, data: Measurement, taken_ah: Array, start: int, stop
     if taken_ah[end] - taken_ah[start] < ALL_OF_IT * (taken_ah[start:stop].max() - taken_ah[start]):
         return None
     # One sum, not the last of running ones: where a descent ends moves by millivolts with the last digit of this.
-    return float(data.steps_as(counted(data))[start:end].sum()) / SECONDS_PER_HOUR
+    return float(data.steps_as(hold_counted(data))[start:end].sum()) / SECONDS_PER_HOUR
 
 
-def counted(data: Measurement) -> Hold:
+def hold_counted(data: Measurement) -> Hold:
     """How the charge of a record is counted, and its thinned rows run: as declared; undeclared rows are a logger's, or
     so close that either will do."""
     return data.hold or "backward"
