@@ -131,7 +131,10 @@ def of_contradiction(model: HybridModel, record: Measurement, soc0: float, hold:
 
 
 def of_day(cell: Cell, soh: Soh | None) -> tuple[str, ...]:
-    """A sentence on what a state of health that is a day stands for; none for a share."""
+    """A sentence on what a state of health that is a day stands for; none for a share.
+
+    cell : of the file, before it is taken at that state.
+    """
     if not isinstance(soh, date):
         return ()
     return (

@@ -100,11 +100,12 @@ def simulate_file(
     asked, say = asked or ProfileRequest(), say_notes or _silent
     profile = read_current(current, asked.reading)
     say(profile.notes)
-    declared = declared_model(cell).with_soh(asked.soh)
+    given = declared_model(cell)
+    declared = given.with_soh(asked.soh)
     if declared.correction is not None:
         say(["the saved model's learnt correction is no part of a simulation; `aesi predict` has it."])
         declared = replace(declared, finding="")  # it is of the model with its correction
-    say([*of_another_model(declared, model), *of_day(declared.cell, asked.soh)])
+    say([*of_another_model(declared, model), *of_day(given.cell, asked.soh)])
     saved, lone = cell.is_dir(), profile.voltage_v is None
     assumed = declared.hold if saved else "linear" if lone else assumed_hold(profile.time_s)
     used = replace(
@@ -191,8 +192,9 @@ def predict_file(
     say(profile.notes)
     if measured and profile.voltage_v is None:
         raise DataError(f"{current.name} has no voltage_v; leave out --measured for a free run.")
-    saved = HybridModel.load(model).with_soh(asked.soh)
-    say(of_day(saved.cell, asked.soh))
+    given = HybridModel.load(model)
+    saved = given.with_soh(asked.soh)
+    say(of_day(given.cell, asked.soh))
     used = replace(saved, hold=asked.hold or saved.hold)
     placed = _placed(used, profile, current, asked, say, saved=True)
     hybrid, record = placed.model, placed.record

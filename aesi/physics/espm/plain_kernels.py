@@ -17,9 +17,9 @@ from aesi.physics.espm.kernels import (
     mean_asinh,
     open_circuit,
     parts_of,
+    share_ahead,
     slot_of,
     step_weights,
-    steps_ahead,
     wet,
 )
 
@@ -112,7 +112,7 @@ def step_salt(i0, i1, dt, last_step, slot, cell, salt, memory):  # type: ignore[
             for i in range(c.shape[0]):
                 for j in range(q.shape[0]):
                     forcing[j] += salt.project[i, j] * memory.rest[i]
-        ahead = steps_ahead(length, last_step)
+        ahead = share_ahead(length, last_step)
         for j in range(q.shape[0]):
             q[j] = (
                 w[slot, 0, j] * q[j]

@@ -5,7 +5,7 @@ import math
 from numba import njit
 
 from aesi.constants import GAS_CONSTANT_J_MOL_K
-from aesi.physics.espm.kernels import FASTMATH, compiled, lookup, step_weights, steps_ahead, wet
+from aesi.physics.espm.kernels import FASTMATH, compiled, lookup, share_ahead, step_weights, wet
 
 EXACT_SHARE = 0.78
 """Of the largest diffusivity in a particle, what is stepped exactly: between `CORRECTED_MARGIN`, above which the
@@ -50,7 +50,7 @@ def step_electrolyte(  # type: ignore[no-untyped-def]
     """Step the modes q and the concentrations c at the nodes.
 
     j0, j1 : cell current density at both ends.  deviation : (2 regions,) of each region's current from its share.
-    ahead : see `steps_ahead`.  faster : factor of temperature on the explicit part.
+    ahead : see `share_ahead`.  faster : factor of temperature on the explicit part.
     """
     rates, gains, to_nodes, project = electrolyte[:4]
     psi, top, c0, one_minus_t = electrolyte.psi, electrolyte.top, electrolyte.c0, electrolyte.supply
@@ -207,7 +207,7 @@ def diffuse(  # type: ignore[no-untyped-def]
 
     last_step : of the step before, 0 for the first.
     """
-    ahead = steps_ahead(dt, last_step)
+    ahead = share_ahead(dt, last_step)
     step_electrolyte(
         j0, j1, memory.deviation, ahead, modes.faster[2], electrolyte, modes.w_e[slot], dissolved
     )
