@@ -62,7 +62,7 @@ def warm(model: EspmModel, *, heat_transfer_w_k: float, heat_capacity_factor: fl
 TYPICAL_W_M2_K = 10.0
 """Heat transfer from a case whose file declares none: what the shipped files of the LG M50, Prada's LFP and Kim's NCA
 cell have, after the parameter sets of PyBaMM, air that hardly moves. Fitted to measured temperatures the Panasonic
-NCR18650PF and LG 18650HG2 in their chambers have 27 to 122 W/(m2 K)."""
+NCR18650PF and LG 18650HG2 in their chambers have 27 to 110 W/(m2 K)."""
 CUBE = 6.0
 """Surface of a cube over its volume to the two thirds: no box has less. Cells of the shipped files have 6.0 to 17."""
 
