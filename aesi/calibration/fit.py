@@ -37,6 +37,7 @@ from aesi.calibration.shapes import Shapes
 from aesi.calibration.silicon import SILICON_V
 from aesi.calibration.start import (
     of_activation,
+    of_area,
     one_branch,
     size_assumed,
     sized,
@@ -277,10 +278,8 @@ def _sized(cell: Cell, records: Sequence[Measurement], same_cell: bool) -> tuple
 def _of_size(cell: Cell, sized_cell: Cell) -> Cell:
     """The start file at the size that the records tell, without the typical values that a fit fills in: the limits
     beyond which a record contradicts its temperature were set with files as they are."""
-    return replace(
-        cell,
-        electrode_area_m2=sized_cell.electrode_area_m2,
-        nominal_capacity_ah=sized_cell.nominal_capacity_ah,
+    return of_area(
+        cell, sized_cell.electrode_area_m2 / cell.electrode_area_m2, sized_cell.nominal_capacity_ah
     )
 
 

@@ -48,10 +48,23 @@ def sized(cell: Cell, measurements: Sequence[Measurement]) -> tuple[Cell, tuple[
     if known is None:
         return cell, (size_assumed(cell, measurements),)
     factor = known / cell.capacity_ah
-    scaled = replace(cell, electrode_area_m2=cell.electrode_area_m2 * factor, nominal_capacity_ah=known)
-    return scaled, (
+    return of_area(cell, factor, known), (
         f"a full discharge took {known:.3f} Ah, and {cell.capacity_ah:.3f} Ah are declared: the fit starts from an "
         f"electrode area scaled by {factor:.3f}; what the cell holds is its state of health.",
+    )
+
+
+def of_area(cell: Cell, factor: float, nominal_ah: float) -> Cell:
+    """The cell with this factor on its area: twice as large a cell drops as much over its contacts at twice the
+    current.
+
+    nominal_ah : Ah, its new nominal capacity.
+    """
+    return replace(
+        cell,
+        electrode_area_m2=cell.electrode_area_m2 * factor,
+        nominal_capacity_ah=nominal_ah,
+        contact_resistance_ohm=cell.contact_resistance_ohm / factor,
     )
 
 
@@ -187,7 +200,7 @@ def _full_discharge_ah(cell: Cell, data: Measurement) -> float | None:
     # A full cell of a flat potential falls by more at rest; where it is being charged, any state may be as high.
     charged = data.current_a < -OPEN_SHARE * np.abs(data.current_a).max()
     full |= ~charged & (data.voltage_v >= OpenCircuit(cell).lingers_from_v)
-    taken_ah = data.discharged_ah(_counted(data))
+    taken_ah = data.discharged_ah(hold_counted(data))
     most: float | None = None
     position = 0
     while full[position:].any():
@@ -225,10 +238,10 @@ def _emptied_ah(cell: Cell, data: Measurement, taken_ah: Array, start: int, stop
     if taken_ah[end] - taken_ah[start] < ALL_OF_IT * (taken_ah[start:stop].max() - taken_ah[start]):
         return None
     # One sum, not the last of running ones: where a descent ends moves by millivolts with the last digit of this.
-    return float(data.steps_as(_counted(data))[start:end].sum()) / SECONDS_PER_HOUR
+    return float(data.steps_as(hold_counted(data))[start:end].sum()) / SECONDS_PER_HOUR
 
 
-def _counted(data: Measurement) -> Hold:
-    """How the charge of a record is counted: as declared; undeclared rows are a logger's, or so close that either will
-    do."""
+def hold_counted(data: Measurement) -> Hold:
+    """How the charge of a record is counted, and its thinned rows run: as declared; undeclared rows are a logger's, or
+    so close that either will do."""
     return data.hold or "backward"

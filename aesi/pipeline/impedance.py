@@ -59,14 +59,15 @@ def impedance_file(
     say_notes : is given a sentence where the model has no double layer, and frequencies at which that shows, and on
     frequencies too low and too high for it.
     """
-    declared = declared_model(cell).with_soh(soh)
+    given = declared_model(cell)
+    declared = given.with_soh(soh)
     hz = read_frequencies(frequencies)
     active = (*declared.effects, *effects)
     z = impedance(declared.cell, hz, soc, temperature_degc, active, model=model or declared.model)
     write_table(out, {"frequency_hz": hz, "z_real_ohm": z.real, "z_imag_ohm": z.imag})
     if say_notes is not None:
         cold = on_temperatures(declared.cell, [temperature_degc])
-        told = (*of_another_model(declared, model), *of_day(declared.cell, soh), *cold, *_left_out(active))
+        told = (*of_another_model(declared, model), *of_day(given.cell, soh), *cold, *_left_out(active))
         say_notes([*declared.cell.unread, *told])
         if hz.max() > INSTANT_HZ and not _has_double_layer(declared.cell, active):
             say_notes([NO_DOUBLE_LAYER])

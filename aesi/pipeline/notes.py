@@ -12,12 +12,13 @@ from aesi.calibration.records.thinning import thinned
 from aesi.calibration.records.zero import zero_of
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.numerics.typing import Array
+from aesi.over_time import stamp
 from aesi.physics import ActiveEffect, Cell, ModelName
 from aesi.physics.cell import Soh
 from aesi.physics.simulation import MODEL_WORDS, model_with
 from aesi.physics.start.temperature import contradicted_temperature
 from aesi.pipeline.product.hybrid import HybridModel
-from aesi.records import Hold, Measurement, at_its_temperature
+from aesi.records import Hold, Measurement, Run, at_its_temperature
 
 SEPARATOR = ": "
 MERE_NAMES = re.compile(r"[^\s,]+(, [^\s,]+)*")
@@ -130,7 +131,10 @@ def of_contradiction(model: HybridModel, record: Measurement, soc0: float, hold:
 
 
 def of_day(cell: Cell, soh: Soh | None) -> tuple[str, ...]:
-    """A sentence on what a state of health that is a day stands for; none for a share."""
+    """A sentence on what a state of health that is a day stands for; none for a share.
+
+    cell : of the file, before it is taken at that state.
+    """
     if not isinstance(soh, date):
         return ()
     return (
@@ -165,6 +169,18 @@ def of_fitted(
             for sentence in zero.sentences
         ]
     return tuple(said)
+
+
+def of_dry_collector(name: str, run: Run, model: ModelName) -> tuple[str, ...]:
+    """That a single particle used up the salt at a collector, and from when; () where it did not."""
+    dry = np.minimum(run.series["c_e0"], run.series["c_eL"]) < 0.0
+    if model != "espm" or not dry.any():
+        return ()
+    return (
+        f"{name}: the salt at a collector is used up in {100 * dry.mean():.2g} % of the rows, from "
+        f"{stamp(run.time_s[int(np.argmax(dry))])} s on. There the reaction moves towards the separator, which one "
+        "particle an electrode does not see: compare with --model dfn.",
+    )
 
 
 def of_another_model(declared: HybridModel, asked: ModelName | None) -> tuple[str, ...]:

@@ -31,6 +31,7 @@ from aesi.pipeline.notes import (
     of_another_model,
     of_contradiction,
     of_day,
+    of_dry_collector,
     of_fitted,
     on_temperatures,
     temperature_sentence,
@@ -99,11 +100,12 @@ def simulate_file(
     asked, say = asked or ProfileRequest(), say_notes or _silent
     profile = read_current(current, asked.reading)
     say(profile.notes)
-    declared = declared_model(cell).with_soh(asked.soh)
+    given = declared_model(cell)
+    declared = given.with_soh(asked.soh)
     if declared.correction is not None:
         say(["the saved model's learnt correction is no part of a simulation; `aesi predict` has it."])
         declared = replace(declared, finding="")  # it is of the model with its correction
-    say([*of_another_model(declared, model), *of_day(declared.cell, asked.soh)])
+    say([*of_another_model(declared, model), *of_day(given.cell, asked.soh)])
     saved, lone = cell.is_dir(), profile.voltage_v is None
     assumed = declared.hold if saved else "linear" if lone else assumed_hold(profile.time_s)
     used = replace(
@@ -130,6 +132,7 @@ def simulate_file(
     _write_run(out, run, degc)
     say([f"{placed.record.name}: {words}" for words in of_case])
     say(reached(used.cell, placed.record, run.voltage_v, run.series["soc"]))
+    say(of_dry_collector(placed.record.name, run, used.model))
     if asked.run_on and np.any(run.series["depleted"]):
         at = int(np.argmax(run.series["depleted"]))
         say([ran_out(placed.record.name, {"this model": float(run.time_s[at])})])
@@ -189,8 +192,9 @@ def predict_file(
     say(profile.notes)
     if measured and profile.voltage_v is None:
         raise DataError(f"{current.name} has no voltage_v; leave out --measured for a free run.")
-    saved = HybridModel.load(model).with_soh(asked.soh)
-    say(of_day(saved.cell, asked.soh))
+    given = HybridModel.load(model)
+    saved = given.with_soh(asked.soh)
+    say(of_day(given.cell, asked.soh))
     used = replace(saved, hold=asked.hold or saved.hold)
     placed = _placed(used, profile, current, asked, say, saved=True)
     hybrid, record = placed.model, placed.record

@@ -11,6 +11,7 @@ from aesi.calibration.records.thinning import thinned
 from aesi.calibration.records.zero import is_slow, steadily_flowing
 from aesi.calibration.start import flowing
 from aesi.constants import ZERO_CELSIUS_K
+from aesi.data.thinning import Averaged, Runs
 from aesi.errors import DataError
 from aesi.numerics.typing import Array, BoolArray
 from aesi.over_time import stamp
@@ -113,10 +114,13 @@ def hold_told(record: Prepared) -> str:
     declared = record.data.hold
     if record.rows is record.data:
         return hold_sentence(record.name, record.hold, declared is not None)
-    taken = {
-        "linear": "averages over {step:.3g} s, with the current in straight lines between them",
-        "backward": "averages the longer the further a step lies back, with the current constant since the row before",
-    }[record.hold].format(step=float(np.median(np.diff(record.rows.time_s))))
+    step_s = float(np.median(np.diff(record.rows.time_s)))
+    by_steps = isinstance(record.rows, Averaged) and isinstance(record.rows.window, Runs)
+    averages = (
+        "averages the longer the further a step lies back" if by_steps else f"averages over {step_s:.3g} s"
+    )
+    between = {"linear": "in straight lines between them", "backward": "constant since the row before"}
+    taken = f"{averages}, with the current {between[record.hold]}"
     against = (
         "" if declared in (None, record.hold) else f"; --hold {declared} holds for rows that are not thinned"
     )

@@ -208,6 +208,8 @@ def _simulate(setup: Setup, profile: Profile, time: Array, values: Any) -> dict[
     capacity = float(values["Nominal cell capacity [A.h]"])
     declared = {"contact resistance": "true"} if values.get(CONTACT_RESISTANCE, 0.0) else {}
     options = _options([declared, *(change.options for change, _ in changes)])
+    if _many_sizes(setup):
+        options.pop("heat of mixing", None)  # PyBaMM has it for particles of one size alone
     current = profile.current_a
     for change, chosen in changes:
         current = change.cell_current(profile.time_s, current, chosen)

@@ -286,10 +286,14 @@ class CellParameters:
 
     def with_material(self, share: float) -> Self:
         """The cell with this share of its active material and of the lithium in it, in both electrodes alike: the
-        stoichiometries of full and empty stay."""
+        stoichiometries of full and empty stay. What it had in the records that it was fitted to is of the new capacity
+        then."""
         n, p = self.negative, self.positive
-        return self.with_negative(c_max_mol_m3=n.c_max_mol_m3 * share).with_positive(
+        changed = self.with_negative(c_max_mol_m3=n.c_max_mol_m3 * share).with_positive(
             c_max_mol_m3=p.c_max_mol_m3 * share
+        )
+        return replace(
+            changed, capacity_shares=tuple((name, then / share) for name, then in self.capacity_shares)
         )
 
 

@@ -1,14 +1,19 @@
 """The cell warms itself: one lump, heated by its losses and by entropy, cooled by its surroundings.
 
     C dT/dt = sum_u i_u (T dU/dT - U)_u - I V - G (T - T_amb)      i_u > 0 delithiates, I > 0 on discharge
+    U and dU/dT of particle u at its mean stoichiometry
     D, K, kappa scale with exp(E_a/R (1/T_ref - 1/T)),   U = U_ref + dU/dT (T - T_ref)
 
 Where the temperature of the case was measured that is used, with what the winding is warmer by where the cell file
 tells how it conducts (`aesi.physics.model.of_record`), and this balance is not needed.
 
-Leaves out other gradients within the cell, heat of mixing, the casing's own heat capacity, and the heat of effects in
-series with the cell (film_growth, ocv_hysteresis) and of a leakage_current. Holds for cells whose Biot number is small.
-Needs density, specific heat and volume in the cell file.
+Energy is kept from one rest to another: what diffusion within particles and electrolyte dissipates is heat, too, from
+when the voltage lacks it.
+
+Leaves out what gradients of lithium and salt hold of it until they have levelled out, gradients of temperature within
+the cell, the casing's own heat capacity, and the heat of effects in series with the cell (film_growth, ocv_hysteresis)
+and of a leakage_current. Holds for cells whose Biot number is small. Needs density, specific heat and volume in the
+cell file.
 
 Source: Bernardi, Pawlikowski & Newman, J. Electrochem. Soc. 132 (1985) 5, doi:10.1149/1.2113792.
 """
@@ -57,7 +62,7 @@ def warm(model: EspmModel, *, heat_transfer_w_k: float, heat_capacity_factor: fl
 TYPICAL_W_M2_K = 10.0
 """Heat transfer from a case whose file declares none: what the shipped files of the LG M50, Prada's LFP and Kim's NCA
 cell have, after the parameter sets of PyBaMM, air that hardly moves. Fitted to measured temperatures the Panasonic
-NCR18650PF and LG 18650HG2 in their chambers have 27 to 122 W/(m2 K)."""
+NCR18650PF and LG 18650HG2 in their chambers have 27 to 110 W/(m2 K)."""
 CUBE = 6.0
 """Surface of a cube over its volume to the two thirds: no box has less. Cells of the shipped files have 6.0 to 17."""
 

@@ -60,7 +60,7 @@ def parts_of(step, longest, most, finer):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def steps_ahead(step, last):  # type: ignore[no-untyped-def]
+def share_ahead(step, last):  # type: ignore[no-untyped-def]
     """By how much of what it moved over the last step, 0 s for none, what is explicit is taken on over a step; no more
     than all of it.
 

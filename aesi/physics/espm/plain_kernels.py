@@ -17,9 +17,9 @@ from aesi.physics.espm.kernels import (
     mean_asinh,
     open_circuit,
     parts_of,
+    share_ahead,
     slot_of,
     step_weights,
-    steps_ahead,
     wet,
 )
 
@@ -112,7 +112,7 @@ def step_salt(i0, i1, dt, last_step, slot, cell, salt, memory):  # type: ignore[
             for i in range(c.shape[0]):
                 for j in range(q.shape[0]):
                     forcing[j] += salt.project[i, j] * memory.rest[i]
-        ahead = steps_ahead(length, last_step)
+        ahead = share_ahead(length, last_step)
         for j in range(q.shape[0]):
             q[j] = (
                 w[slot, 0, j] * q[j]
@@ -135,17 +135,17 @@ def step_salt(i0, i1, dt, last_step, slot, cell, salt, memory):  # type: ignore[
 def salt_at_gauss_points(c, c0, gauss, g):  # type: ignore[no-untyped-def]
     """g : (6,) salt over rest at the Gauss points of both electrodes, kept positive.
 
-    Returns 18 times the mean over rest of the electrode that has less, as it is.
+    Returns the salt where they meet the separator, over rest, of the electrode that has less there, as it is.
     """
     nodes = c.shape[0]
     width = (nodes - 1) // 3 + 1
+    driest = min(c[width - 1], c[nodes - width]) / c0
     for i in range(6):
         first = 0 if i < 3 else nodes - width
         value = 0.0
         for j in range(width):
             value += gauss[i, first + j] * c[first + j]
         g[i] = value / c0
-    driest = min(5.0 * (g[0] + g[2]) + 8.0 * g[1], 5.0 * (g[3] + g[5]) + 8.0 * g[4])
     for i in range(6):
         g[i] = wet(g[i])
     return driest

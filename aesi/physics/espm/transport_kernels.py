@@ -5,7 +5,7 @@ import math
 from numba import njit
 
 from aesi.constants import GAS_CONSTANT_J_MOL_K
-from aesi.physics.espm.kernels import FASTMATH, compiled, lookup, step_weights, steps_ahead, wet
+from aesi.physics.espm.kernels import FASTMATH, compiled, lookup, share_ahead, step_weights, wet
 
 EXACT_SHARE = 0.78
 """Of the largest diffusivity in a particle, what is stepped exactly: between `CORRECTED_MARGIN`, above which the
@@ -50,7 +50,7 @@ def step_electrolyte(  # type: ignore[no-untyped-def]
     """Step the modes q and the concentrations c at the nodes.
 
     j0, j1 : cell current density at both ends.  deviation : (2 regions,) of each region's current from its share.
-    ahead : see `steps_ahead`.  faster : factor of temperature on the explicit part.
+    ahead : see `share_ahead`.  faster : factor of temperature on the explicit part.
     """
     rates, gains, to_nodes, project = electrolyte[:4]
     psi, top, c0, one_minus_t = electrolyte.psi, electrolyte.top, electrolyte.c0, electrolyte.supply
@@ -148,20 +148,15 @@ def solid_forcing(mean, z, at, project, psi, nodes, force):  # type: ignore[no-u
 def observe_salt(c, c0, gauss, salt, log_salt, region_salt):  # type: ignore[no-untyped-def]
     """Salt at the Gauss points over rest, its mean logarithm and mean (mol/m3) in each region.
 
-    Returns the mean over rest of the electrode that has less.
+    Returns the salt where they meet the separator, over rest, of the electrode that has less there.
     """
     for i in range(gauss.shape[0]):
         g = 0.0
         for j in range(c.shape[0]):
             g += gauss[i, j] * c[j]
         salt[i] = g / c0
-    regions = log_salt.shape[0] // 2
-    driest = 1.0
-    for side in range(2):
-        whole = 0.0
-        for r in range(side * regions, (side + 1) * regions):
-            whole += (5.0 * (salt[3 * r] + salt[3 * r + 2]) + 8.0 * salt[3 * r + 1]) / 18.0 / regions
-        driest = min(driest, whole)
+    regions, layer = log_salt.shape[0] // 2, (c.shape[0] - 1) // 3
+    driest = min(c[layer], c[2 * layer]) / c0
     for i in range(gauss.shape[0]):
         salt[i] = wet(salt[i])
     for r in range(2 * regions):
@@ -212,7 +207,7 @@ def diffuse(  # type: ignore[no-untyped-def]
 
     last_step : of the step before, 0 for the first.
     """
-    ahead = steps_ahead(dt, last_step)
+    ahead = share_ahead(dt, last_step)
     step_electrolyte(
         j0, j1, memory.deviation, ahead, modes.faster[2], electrolyte, modes.w_e[slot], dissolved
     )

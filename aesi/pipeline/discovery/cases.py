@@ -7,7 +7,7 @@ from pathlib import Path
 
 from aesi.data.read import Reading, read
 from aesi.data.reading import record_names
-from aesi.errors import ConfigError
+from aesi.errors import ConfigError, DataError
 from aesi.physics import ModelName
 from aesi.physics.cell import Soh
 from aesi.pipeline.discovery.budget import within_budget
@@ -15,7 +15,7 @@ from aesi.pipeline.discovery.cold import with_cold_admitted
 from aesi.pipeline.discovery.discover import Case
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.sections import DiscoverConfig
-from aesi.pipeline.experiment.sources import cell_path, discovery_records
+from aesi.pipeline.experiment.sources import cell_path, discovery_records, with_keys
 from aesi.records import Hold
 
 
@@ -68,7 +68,8 @@ def case_of_files(
 def case_of_experiment(config: ExperimentConfig) -> Case:
     """The case that an experiment with a `discover` section describes.
 
-    Raises ConfigError where it names no record to look at, or effects that the cell is declared to have.
+    Raises ConfigError where it names no record to look at, or effects that the cell is declared to have, DataError for
+    a record that cannot be of the cell, at any temperature that is looked for.
     """
     wanted = config.discover or DiscoverConfig()
     if config.cell.effects:
@@ -95,4 +96,7 @@ def case_of_experiment(config: ExperimentConfig) -> Case:
         good=good,
         of_experiment=True,
     )
-    return within_budget(case.checked())
+    try:
+        return with_cold_admitted(within_budget(case.checked()))
+    except DataError as error:
+        raise DataError(with_keys(str(error))) from None

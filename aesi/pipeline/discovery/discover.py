@@ -123,7 +123,7 @@ class Case:
         left = () if given.correction is None else (without,)
         return (
             *given.cell.unread,
-            *of_day(given.cell, self.soh),
+            *of_day(declared_model(self.cell).cell, self.soh),
             *on_temperatures(given.cell, (m.temperature_degc for m in self.records), given.effects),
             *left,
             *(temperature_sentence(given.cell, m, given.effects) for m in untold),

@@ -123,7 +123,8 @@ def _called(config: ExperimentConfig) -> str:
 
 def _load(config: ExperimentConfig) -> Loaded:
     path = cell_path(config)
-    file = declared_model(path).with_soh(config.cell.soh)
+    declared = declared_model(path)
+    file = declared.with_soh(config.cell.soh)
     given = replace(file, effects=(*file.effects, *_effects(config)), model=config.cell.model or file.model)
     sources = sources_of(config, path)
     records, starts, told = _on_grid(config, given, sources)
@@ -133,7 +134,7 @@ def _load(config: ExperimentConfig) -> Loaded:
     split = by_role(config.data, series, sources.roles)
     notes = [
         *given.cell.unread,
-        *of_day(given.cell, config.cell.soh),
+        *of_day(declared.cell, config.cell.soh),
         *_of_starts(physics, records, starts, config.data.hold),
         *told,
         *_of_repeats(config, records),

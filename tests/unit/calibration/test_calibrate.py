@@ -420,6 +420,21 @@ def test_the_charge_of_a_full_discharge_was_held_since_the_row_before_whatever_w
     assert sized(start, [slow])[0].capacity_ah == pytest.approx(taken, rel=1e-9)
 
 
+def test_a_large_cell_from_the_file_of_a_small_one_kept_its_contact_resistance(start):
+    """15 mohm of a cell of 2.9 Ah, of one of ten times its size: 0.45 V at 1C, and none of it could be taken out."""
+    small = replace(start, contact_resistance_ohm=0.015)
+    factor = 10.0
+    time = np.arange(0.0, 19.0 * 3600.0, 600.0)
+    current = np.full(len(time), factor * start.nominal_capacity_ah / 20.0)
+    voltage = np.linspace(start.upper_voltage_v, start.lower_voltage_v, len(time))
+    found = sized(small, [Measurement(time, current, voltage, name="large", hold="backward")])[0]
+    grown = found.electrode_area_m2 / small.electrode_area_m2
+    assert grown == pytest.approx(factor, rel=0.1)
+    assert found.contact_resistance_ohm == pytest.approx(0.015 / grown)
+    contact = next(one for one in free_parameters(found, 0.0) if one.name == "contact.resistance")
+    assert contact.value(contact.bounds[0]) == pytest.approx(0.0, abs=1e-9)
+
+
 def test_a_long_fit_said_nothing_until_its_end(start, records):
     told = []
     calibrate(start, records[:1], evaluations=3, on_step=lambda steps, left: told.append((steps, left)))

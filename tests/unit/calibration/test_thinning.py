@@ -35,6 +35,18 @@ def test_a_pulse_test_keeps_its_charge_and_its_pulses_in_a_tenth_of_the_rows():
     assert thin.data.current_a.max() == pytest.approx(5.0, abs=1e-6)
 
 
+@pytest.mark.parametrize("hold", ["linear", "backward"])
+def test_a_thinned_record_kept_the_charge_of_a_held_current_whatever_was_declared(hold):
+    rng = np.random.default_rng(0)
+    time = np.concatenate([[0.0], np.cumsum(rng.choice([0.5, 1.0, 2.0, 5.0], 2000))])
+    current = np.repeat(rng.normal(1.0, 2.0, 201), 10)[: len(time)]
+    data = Measurement(time, current, 3.7 - 0.02 * current, hold=hold)
+    thin = thinned(data, 3.0)
+    assert len(thin.data) < len(data)
+    assert thin.hold == hold
+    assert charge_ah(thin.data, thin.hold) == pytest.approx(charge_ah(data, hold), rel=1e-4)
+
+
 def test_a_drive_is_averaged_to_its_window_and_keeps_its_charge():
     time = np.arange(0.0, 600.0, 0.1)
     current = 3.0 * np.sin(time / 3.0) + 1.0
@@ -78,7 +90,10 @@ def drive(step_s: float, hold: str | None = None) -> Measurement:
             drive(0.1, "backward"),
             "straight lines between them; --hold backward holds for rows that are not thinned.",
         ),
-        (replace(pulses(), hold="linear"), "row before; --hold linear holds for rows that are not thinned."),
+        (
+            replace(pulses(), hold="linear"),
+            "a step lies back, with the current in straight lines between them.",
+        ),
     ],
 )
 def test_how_the_current_was_taken_between_the_rows_of_a_fit_is_told(data, taken):

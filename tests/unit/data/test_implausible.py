@@ -168,3 +168,30 @@ def test_a_charge_whose_current_only_falls_has_no_wrong_sign(tmp_path):
     current = -3.0 * np.exp(-TIME / 3000.0)
     resting = 3.4 + 0.02 * np.sin(TIME / 500.0)
     read_measurement(written(tmp_path, TIME, current, np.round(resting - 0.02 * current, 3)))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0], ids=["as it is", "turned"])
+def test_a_charge_alone_whose_voltage_is_held_was_of_the_wrong_sign(tmp_path, sign):
+    """A row a minute at 3 A, and on at 4.2 V behind leads of 60 mohm: the cell's own voltage rises meanwhile."""
+    time, current, charge = np.arange(0.0, 9000.0, 60.0), [], 0.0
+    for _ in time:
+        current.append(max(-3.0, (3.5 - 0.18 * charge - 4.2) / (0.02 + 0.06)))
+        charge += current[-1] / 60.0
+    falling = np.array(current)
+    volts = 3.5 - 0.18 * np.cumsum([0.0, *current[:-1]]) / 60.0 - 0.02 * falling
+    if sign > 0:
+        assert len(read_measurement(written(tmp_path, time, falling, volts))) == len(time)
+    else:
+        assert "contradicts the one declared" in refusal(tmp_path, time, -falling, volts)
+
+
+def test_five_minutes_of_a_drive_at_ten_rows_a_second_were_in_another_unit(tmp_path):
+    """Half a second passes until a current's drop is in the voltage: from row to row a fifth of it shows."""
+    time = np.arange(0.0, 300.0, 0.1)
+    current = np.repeat(np.random.default_rng(0).normal(1.0, 3.0, 100), 31)[: len(time)]
+    drop = [0.0]
+    for now in current[1:]:
+        drop.append(drop[-1] + 0.2 * (0.04 * now - drop[-1]))
+    volts = 3.8 - 0.18 * np.cumsum(current) * 0.1 / 3600.0 - np.array(drop)
+    assert len(read_measurement(written(tmp_path, time, current, volts))) == len(time)
+    assert "--unit time_s=h" in refusal(tmp_path, TIME / 3600, CYCLE, voltage(CYCLE))

@@ -40,3 +40,12 @@ def test_the_number_of_sizes_had_decided_the_voltage_by_millivolts(nmc, monkeypa
 
     # Even divisions err by 0.6 mV RMS with eight sizes; 5 sizes of the Gauss rule by 0.04 under US06.
     assert 1e3 * np.sqrt(np.mean((voltage_v(5) - voltage_v(9)) ** 2)) < 0.1
+
+
+def test_a_cell_of_many_sizes_that_warms_itself_can_be_made(nmc):
+    """PyBaMM has no heat of mixing for it."""
+    bench = Bench(30.0, 1.0)
+    profile = bench.profile("pulse", [bench.rest(10), bench.pulse(2.0, 60)], 0.6)
+    sizes = Applied("particle_size_distribution", {"negative_spread": 0.3, "positive_spread": 0.3})
+    truth = simulate_truth(Setup(nmc, "SPMe", (sizes, Applied("self_heating")), radial_points=30), profile)
+    assert truth.temperature_degc[-1] > truth.temperature_degc[0] + 0.1

@@ -593,6 +593,13 @@ def test_between_two_days_the_share_runs_evenly(dated, lg_m50):
     assert dated.with_soh(date(2017, 3, 24)).capacity_ah == pytest.approx(expected * lg_m50.capacity_ah)
 
 
+def test_a_cell_at_a_state_of_health_had_that_of_a_day_taken_off_twice(dated, lg_m50):
+    aged = dated.with_soh(date(2017, 3, 30))
+    for same in (aged.with_soh(date(2017, 3, 30)), Cell.from_bpx(aged.to_bpx()).with_soh(date(2017, 3, 30))):
+        assert same.capacity_ah == pytest.approx(0.952 * lg_m50.capacity_ah)
+    assert aged.with_soh(date(2017, 3, 11)).capacity_ah == pytest.approx(1.01 * lg_m50.capacity_ah)
+
+
 @pytest.mark.parametrize("day", [date(2017, 3, 10), date(2017, 3, 31)])
 def test_what_the_file_does_not_know_of_a_day_is_not_made_up(dated, day):
     with pytest.raises(CellError, match=r"knows its cell from 2017-03-11 to 2017-03-30; give the share"):

@@ -114,7 +114,7 @@ def test_where_a_porous_electrode_runs_dry_its_solution_goes_on_to_the_cut_off()
     cell = cell_of("lg_18650hg2")
     time = np.arange(0.0, 100.0, 0.25)
     current = np.full(len(time), 4.0 * cell.nominal_capacity_ah)
-    run = simulate(cell, time, current, 0.85, (), 0.0, on_depletion="clip", model="dfn")
+    run = simulate(cell, time, current, 0.85, (), -10.0, on_depletion="clip", model="dfn")
     ends = int(np.argmax(run.voltage_v < cell.lower_voltage_v))
     dry = np.abs(run.series["c_eL"]) < 0.01 * cell.electrolyte.c0_mol_m3
     assert ends > 0
@@ -126,9 +126,20 @@ def test_an_electrolyte_that_is_too_cold_is_named_and_not_the_charge():
     cell = cell_of("nmc_30ah")
     time = np.arange(200.0)
     with pytest.raises(SimulationError, match="too cold for this current") as caught:
-        simulate(cell, time, np.full(200, 3.0 * cell.nominal_capacity_ah), 1.0, (), -20.0)
+        simulate(cell, time, np.full(200, 8.0 * cell.nominal_capacity_ah), 1.0, (), -20.0)
     assert "soc0" not in str(caught.value)
     assert "-20 degC" in str(caught.value)
+
+
+def test_a_single_particle_stopped_where_a_porous_electrode_goes_on():
+    """At the collectors the salt is used up after a minute, and the reaction goes on nearer to the separator: the
+    single particle ended there, and is up to 0.16 V above a porous electrode that gives all of its charge."""
+    cell = cell_of("lg_18650hg2")
+    time = np.arange(0.0, 780.0)
+    current = np.full(len(time), 3.0 * cell.nominal_capacity_ah)
+    single, porous = (simulate(cell, time, current, 0.9, (), 0.0, model=model) for model in ("espm", "dfn"))
+    assert (single.series["c_eL"] < 0.0).mean() > 0.5
+    assert single.voltage_v[:600] == pytest.approx(porous.voltage_v[:600], abs=0.2)
 
 
 def test_a_current_asked_of_an_empty_cell_is_named_as_charge():

@@ -204,7 +204,7 @@ def test_a_measured_temperature_is_used_as_given(nmc, load):
 
 @pytest.mark.parametrize("hold", ["linear", "backward"])
 def test_a_winding_stores_and_conducts_what_it_loses(nmc, hold):
-    """Without entropy that is I (U - V), U of the surfaces: the heat of a run against the course of its temperature."""
+    """Without entropy that is I (U - V), U of the mean: the heat of a run against the course of its temperature."""
     cell = replace(
         nmc.with_negative(entropic=NO_ENTROPY).with_positive(entropic=NO_ENTROPY),
         thermal_conductivity_w_m_k=0.3,
@@ -216,14 +216,29 @@ def test_a_winding_stores_and_conducts_what_it_loses(nmc, hold):
     case = 10.0 + 3.0 * time / 3000.0
     run = simulate(cell, time, current, 0.9, temperature_degc=case, hold=hold)
     winding = run.series["temperature_k"] - 273.15
-    surface_v = cell.positive.ocp(run.series["c_sp"] / cell.positive.c_max_mol_m3) - cell.negative.ocp(
-        run.series["c_sn"] / cell.negative.c_max_mol_m3
-    )
-    lost_j = np.sum((current * (surface_v - run.voltage_v))[1:] * np.diff(time))
+    mean_v = cell.rest_voltage_v(run.series["soc"])
+    lost_j = np.sum((current * (mean_v - run.voltage_v))[1:] * np.diff(time))
     conducted_j = np.trapezoid(winding - case, time) / resistance
     assert winding[0] == case[0]
     assert winding[200:300].mean() > case[200:300].mean() + 0.5
     assert capacity * (winding[-1] - winding[0]) + conducted_j == pytest.approx(lost_j, rel=0.01)
+
+
+@pytest.mark.parametrize("model", ["espm", "dfn"])
+def test_what_diffusion_within_particles_dissipates_was_no_heat(lg_m50, model):
+    """Half an hour at 1C and hours of rest, all but adiabatic: 0.59 of what the cell gave and did not deliver."""
+    time = np.arange(0.0, 12.0 * SECONDS_PER_HOUR, 10.0)
+    current = np.where(time <= SECONDS_PER_HOUR / 2.0, lg_m50.nominal_capacity_ah, 0.0)
+    kept = CATALOGUE["self_heating"].activate(heat_transfer_w_k=1e-3, heat_capacity_factor=3.0)
+    run = simulate(lg_m50, time, current, 0.95, [kept], hold="backward", model=model)
+    warmer = run.series["temperature_k"] - lg_m50.ambient_temperature_k
+    lost_j = 1e-3 * np.trapezoid(warmer, time)
+    heat_j = 3.0 * lg_m50.heat_capacity_j_k * warmer[-1] + lost_j
+    soc = np.linspace(run.series["soc"][-1], 0.95, 2001)
+    chemical_j = lg_m50.capacity_ah * SECONDS_PER_HOUR * np.trapezoid(lg_m50.rest_voltage_v(soc), soc)
+    electric_j = float(np.sum((current * run.voltage_v)[1:] * np.diff(time)))
+    assert lg_m50.negative.entropic == lg_m50.positive.entropic == NO_ENTROPY
+    assert heat_j == pytest.approx(chemical_j - electric_j, rel=0.01)
 
 
 def test_both_models_warm_a_winding_alike_and_need_less_voltage(nmc):

@@ -99,6 +99,20 @@ def test_a_left_out_piece_is_as_open_as_the_other_rows_leave_it(drive) -> None:
     assert errors.root.shape == (2, 2)
 
 
+def test_physics_is_as_open_in_calibration_as_in_use_where_one_drive_trains(drive) -> None:
+    """It was fitted to all rows of that drive: taken away in calibration alone, they made its band too narrow."""
+    train = replace(drive, slopes_v=5e-3 * np.ones((N, 1)))
+    errors = OutOfSampleErrors.of([(Bare(), train, slice(0, N))], (train,), (10.0,))
+    np.testing.assert_allclose(errors.spread[0], 5e-3 * errors.root[0, 0])
+    # 400 rows of 1 s, 100 s of which count as one of two deviations.
+    np.testing.assert_allclose(errors.root, [[1 / np.sqrt(1 + 4 / 2**2)]])
+    # A second drive can be fitted without the first.
+    other = replace(train, name="other")
+    apart = OutOfSampleErrors.of([(Bare(), train, slice(0, N))], (train, other), (10.0,))
+    np.testing.assert_allclose(apart.spread[0], 5e-3 / np.sqrt(1 + 4 / 2**2))
+    np.testing.assert_allclose(apart.root, [[1 / np.sqrt(1 + 8 / 2**2)]])
+
+
 def test_rows_are_as_open_as_the_error_that_their_fit_allowed_for_leaves_them(drive) -> None:
     slopes = 5e-3 * np.ones((N, 1))
     train = replace(drive, slopes_v=slopes, missed_v=0.02)

@@ -99,8 +99,8 @@ def test_effects_of_the_cell_and_files_with_effects_were_passed_over_in_silence(
         "discover.test=[]",
         "cell.effect_files=[mine.py]",
     ]
-    case = case_of_experiment(read_experiment(EXPERIMENTS / "measured_nmc.yaml", overrides))
-    assert case.effect_files == (EXPERIMENTS / "mine.py",)
+    with pytest.raises(InputError, match=f"there is no effect file {EXPERIMENTS / 'mine.py'}"):
+        case_of_experiment(read_experiment(EXPERIMENTS / "measured_nmc.yaml", overrides))
 
 
 def test_what_was_not_tried_is_said_so_that_no_verdict_is_read_as_one_about_it(tmp_path):
@@ -207,3 +207,18 @@ def test_a_discovery_of_an_experiment_advised_options_that_it_does_not_have(tmp_
     (told,) = run_case(case_of_experiment(settings)).warnings
     assert told.endswith("leaves it out) (in an experiment file: data.columns).")
     assert run_case(case_of_files(BPX, [record])) == found
+
+
+def test_a_record_of_another_cell_was_searched_where_an_experiment_names_it(tmp_path):
+    """Three hours at C/3 of a cell of 2.9 Ah, with the file of one of 30 Ah, as the options refuse it."""
+    time_s = np.arange(0.0, 10_800.0, 60.0)
+    current_a = np.where(time_s < 600.0, 0.0, 0.9)
+    volts = 4.1 - 0.3 * np.cumsum(current_a) * 60.0 / 3600.0 - 0.03 * current_a
+    rows = np.column_stack([time_s, current_a, volts])
+    np.savetxt(tmp_path / "small.csv", rows, delimiter=",", header="time_s,current_a,voltage_v", comments="")
+    text = f"name: a\ndata: {{kind: files}}\ncell: {BPX}\ndiscover: {{fit: [small.csv]}}\n"
+    (tmp_path / "a.yaml").write_text(text)
+    with pytest.raises(
+        DataError, match=r"the cell file is another cell's.* \(in an experiment file: cell\.soh\)"
+    ):
+        case_of_experiment(read_experiment(tmp_path / "a.yaml"))

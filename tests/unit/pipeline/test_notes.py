@@ -13,6 +13,7 @@ from aesi.pipeline import notes
 from aesi.pipeline.notes import (
     beyond_fitted,
     of_another_model,
+    of_dry_collector,
     of_fitted,
     on_temperatures,
     temperature_sentence,
@@ -130,3 +131,14 @@ def test_what_a_fit_took_out_of_the_current_of_a_slow_cycle_was_told_by_its_repo
     assert of_fitted(cell, cycle, None, (taken,)) == (first,)
     assert of_fitted(cell, replace(cycle, voltage_v=np.full(len(hours), np.nan)), None) == (first,)
     assert of_fitted(cell, replace(cycle, name="another"), None) == ()
+
+
+def test_a_collector_without_salt_is_told_with_when_and_which_model_sees_it():
+    cell = Cell.from_bpx(NMC)
+    time = np.arange(120.0)
+    dry, wet = (simulate(cell, time, np.full(120, 90.0), 1.0, (), degc) for degc in (-20.0, 25.0))
+    (told,) = of_dry_collector("cold", dry, "espm")
+    assert "cold: the salt" in told
+    assert "from 47 s on" in told
+    assert "--model dfn" in told
+    assert of_dry_collector("warm", wet, "espm") == of_dry_collector("cold", dry, "dfn") == ()
