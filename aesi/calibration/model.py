@@ -21,8 +21,6 @@ from aesi.physics.model import EspmModel
 from aesi.physics.simulation import ModelName, solver
 from aesi.records import Spectrum
 
-SOLID_ORDER = 8
-"""Modes of solid diffusion: eight are 0.02 mV RMS off under the pulses to 1.4C of the calibrated files at 10 degC."""
 ELECTRODE_POINTS = 4
 """Points across a porous electrode: four err by 0.14 mV at most on discharges of the shipped cells to 1C."""
 FitState = Literal["declared", "simulated", "fitted"]
@@ -179,7 +177,6 @@ class Model:
         record = self.records[index]
         model = EspmModel(
             self.aged(cell, more * self.material(index, x), self.silicon(index, x)),
-            solid_order=SOLID_ORDER,
             electrode_points=ELECTRODE_POINTS,
             most_substeps=MOST_STEPS,
         )

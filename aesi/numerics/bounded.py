@@ -3,6 +3,8 @@
 A step is the least of the damped quadratic model within the box. Slopes by finite differences cost as many simulations
 as there are coordinates, a step one: after each step the slopes are brought up to date by what the step showed
 (Broyden, Math. Comp. 19 (1965) 577), as long as that brings the cost down, and only then taken anew.
+A place where the residual jumps, or has no value beyond, is a wall: what cannot pass it stays on its side, as on an end
+of the box, and the others go on. So is one at which a slope turns round.
 Nocedal & Wright, Numerical Optimization, 2nd ed. (2006), chapters 10, 11 and 16.
 """
 
@@ -17,6 +19,10 @@ import numpy as np
 
 from aesi.numerics.typing import Array
 
+DAMPING = 1e-3
+"""Of a first step, over the curvature: next to none. A convention."""
+STRONGER = 8.0
+"""Factor on the damping after a step that does not gain. A convention."""
 UPDATED_TRIALS = 2
 """Trials of a step whose slopes were only brought up to date: where it fails, these may be what is wrong."""
 
@@ -80,7 +86,7 @@ def descend(
     residual = model.residual(x)
     if residual is None or not np.isfinite(residual).all():
         return Minimum(x, np.inf, 0, False, x)
-    damping = 1e-3
+    damping = DAMPING
     if slopes is not None:
         near = _Place(x, residual, slopes)
         here, damping = _broyden_steps(model, near, low, high, tolerance, damping, fresh=False)
@@ -91,6 +97,11 @@ def descend(
             return Minimum(x, _half_square(residual), done, False, x)
         start = _Place(x, residual, taken)
         here, damping = _broyden_steps(model, start, low, high, tolerance, damping, fresh=True)
+        if start.cost - here.cost < tolerance:
+            walled = _within_walls(model, start, low, high, tolerance)
+            if walled is not None:
+                low, high = walled
+                here, damping = _broyden_steps(model, start, low, high, tolerance, DAMPING, fresh=True)
         x, residual = here.x, here.residual
         if start.cost - here.cost < tolerance:
             return Minimum(x, here.cost, done + 1, True, start.x)
@@ -100,7 +111,7 @@ def descend(
 def foreseen_cost(x: Array, residual: Array, slopes: Array, low: Array, high: Array) -> float:
     """Half a sum of squares after one step within the box, to first order."""
     here = _Place(x, residual, slopes)
-    step = _step(here, low, high, 1e-3)
+    step = _step(here, low, high, DAMPING)
     return _half_square(residual + slopes @ step)
 
 
@@ -138,17 +149,48 @@ def _accepted_step(
         foreseen = here.residual + here.slopes @ step
         if here.cost - _half_square(foreseen) < tolerance and (trial or not fresh):
             return None, damping
-        x = here.x + step
+        x = np.clip(here.x + step, low, high)
         residual = model.residual(x)
         if residual is not None and _half_square(residual) < here.cost:
             slopes = here.slopes + np.outer(residual - foreseen, step / (step @ step))
             return _Place(x, residual, slopes), max(damping / 5.0, 1e-6)
-        damping *= 8.0
+        damping *= STRONGER
     return None, damping
+
+
+def _within_walls(
+    model: Residual, here: _Place, low: Array, high: Array, tolerance: float
+) -> tuple[Array, Array] | None:
+    """The box up to the walls at x, of a place whose slopes promise what no step along them gains; None where they
+    promise less than the tolerance, or there is no wall.
+
+    A wall is where a coordinate by itself, in the shortest step that still promises as much, ends higher by more than
+    the tolerance than its slope foresees.
+    """
+    step, damping = np.zeros(len(here.x)), DAMPING
+    while (tried := _step(here, low, high, damping)).any():
+        if here.cost - _half_square(here.residual + here.slopes @ tried) < tolerance:
+            break
+        step, damping = tried, damping * STRONGER
+    low, high, found = low.copy(), high.copy(), False
+    for j in np.flatnonzero(step):
+        x = here.x.copy()
+        x[j] += step[j]
+        residual = model.residual(x)
+        foreseen = _half_square(here.residual + here.slopes[:, j] * step[j])
+        if residual is None or not _half_square(residual) - foreseen <= tolerance:  # NaN is no value either
+            (low if step[j] < 0.0 else high)[j] = here.x[j]
+            found = True
+    return (low, high) if found else None
 
 
 def _step(here: _Place, low: Array, high: Array, damping: float) -> Array:
     """(n,) a damped Gauss-Newton step: the least of the damped quadratic model within the box."""
+    room = low < high  # none between a wall and an end of the box
+    if not room.all():
+        out, free = np.zeros(len(here.x)), _Place(here.x[room], here.residual, here.slopes[:, room])
+        out[room] = _step(free, low[room], high[room], damping) if room.any() else 0.0
+        return out
     gradient = here.slopes.T @ here.residual
     normal = here.slopes.T @ here.slopes
     lifted = normal + damping * np.diag(np.diag(normal) + 1e-12 * np.trace(normal) + 1e-300)

@@ -17,7 +17,9 @@ from aesi.physics.cell.relations import Constant, hashed_once
 
 DEFAULT_SOLID_ORDER = 12
 """Against 24, it moves the voltage by 0.001 mV RMS at most: LG M50 to 2C, the load of `aesi bench espm`; 8 by 0.03
-mV. Where diffusion is ten times as slow, under a third of the load, by 0.02 mV; 8 by 0.3."""
+mV. Where diffusion is ten times as slow, under a third of the load, by 0.02 mV; 8 by 0.3. Where a diffusivity falls
+off with the stoichiometry, as in the calibrated files, by 0.07 to 1.3 mV on what they were fitted to; 16 by 0.01 to
+0.8, 8 by 0.4 to 3.2."""
 DEFAULT_ELECTROLYTE_ORDER = 3
 """Against 8, it moves that voltage by 0.007 mV RMS at most; 2 by 0.09 mV."""
 DEFAULT_ELECTRODE_POINTS = 7

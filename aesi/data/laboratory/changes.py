@@ -227,7 +227,12 @@ def _sizes(parameters: Any, values: Values) -> None:
 CHANGES: dict[str, Change] = {
     change.id: change
     for change in (
-        Change("self_heating", {"cooling_w_m2_k": 10.0}, {"thermal": "lumped"}, _heat),
+        Change(
+            "self_heating",
+            {"cooling_w_m2_k": 10.0},
+            {"thermal": "lumped", "heat of mixing": "true"},
+            _heat,
+        ),
         Change("ambient_temperature", {"shift_k": -5.0}, alter=_ambient),
         Change("temperature_course", {"shift_k": 0.0, "rise_k": 5.0, "constant_s": 1000.0}, alter=_course),
         Change("series_resistance", {"resistance_ohm": 5e-4}, {"contact resistance": "true"}, _resistance),

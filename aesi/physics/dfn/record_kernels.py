@@ -183,14 +183,14 @@ def voltage_of(s, e, state, t, phi_n, phi_p, density):  # type: ignore[no-untype
 
 @compiled
 def heat_power(p, e, state, half, current, voltage, t_k):  # type: ignore[no-untyped-def]
-    """Heat released (W): what the reaction gives, with its entropy, less what double layers store and what leaves as
-    electric power."""
+    """Heat released (W): what lithium gives on its way from the mean of its particle, with its entropy, less what
+    double layers store and what leaves as electric power."""
     power = -current * voltage
     for r in range(state.layer.shape[0]):
         power -= e.area * state.layer[r] * state.psi[r]
     for u in range(p.place.shape[0]):
         side = 0 if p.place[u] < half else 1
-        slope = row_lookup(e.entropic, side, state.theta[u])
-        level = equilibrium(e.ocp, e.entropic, side, t_k - e.reference_k, state.theta[u])[0]
+        slope = row_lookup(e.entropic, side, state.mean[u])
+        level = equilibrium(e.ocp, e.entropic, side, t_k - e.reference_k, state.mean[u])[0]
         power += e.area * state.y[u] * (t_k * slope - level)
     return power

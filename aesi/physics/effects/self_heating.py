@@ -1,14 +1,17 @@
 """The cell warms itself: one lump, heated by its losses and by entropy, cooled by its surroundings.
 
     C dT/dt = sum_u i_u (T dU/dT - U)_u - I V - G (T - T_amb)      i_u > 0 delithiates, I > 0 on discharge
+    U and dU/dT of particle u at its mean stoichiometry
     D, K, kappa scale with exp(E_a/R (1/T_ref - 1/T)),   U = U_ref + dU/dT (T - T_ref)
 
 Where the temperature of the case was measured that is used, with what the winding is warmer by where the cell file
 tells how it conducts (`aesi.physics.model.of_record`), and this balance is not needed.
 
-Leaves out other gradients within the cell, heat of mixing, the casing's own heat capacity, and the heat of effects in
-series with the cell (film_growth, ocv_hysteresis) and of a leakage_current. Holds for cells whose Biot number is small.
-Needs density, specific heat and volume in the cell file.
+Energy is kept from one rest to another: what diffusion dissipates is heat, too. It counts when it is taken from the
+voltage; that gradients of lithium and salt hold part of it until they have levelled out is left out, as are gradients
+of temperature within the cell, the casing's own heat capacity, and the heat of effects in series with the cell
+(film_growth, ocv_hysteresis) and of a leakage_current. Holds for cells whose Biot number is small. Needs density,
+specific heat and volume in the cell file.
 
 Source: Bernardi, Pawlikowski & Newman, J. Electrochem. Soc. 132 (1985) 5, doi:10.1149/1.2113792.
 """

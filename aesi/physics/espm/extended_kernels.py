@@ -97,7 +97,7 @@ def run_general(  # type: ignore[no-untyped-def]
             if heat[0] > 0.0:
                 power = 0.0
                 if fault_at < 0 and surfaces_inside(particles, memory.theta):
-                    power = reaction_heat(t_k, cell, particles, surfaces, memory) - i1 * voltage
+                    power = reaction_heat(t_k, cell, particles, surfaces, memory, modes.means) - i1 * voltage
                 if k > 0:
                     t_k = heated(start_k, mean_heat(watts, power, i0, i1), dt, heat, around_k)
                 watts = power
@@ -207,15 +207,16 @@ def take_deviations(density, dt, slot, particles, memory, modes):  # type: ignor
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def reaction_heat(t_k, cell, particles, surfaces, memory):  # type: ignore[no-untyped-def]
-    """Power (W) that the reactions give, with their entropy, less what double layers store."""
+def reaction_heat(t_k, cell, particles, surfaces, memory, means):  # type: ignore[no-untyped-def]
+    """Power (W) that lithium gives on its way from the mean of its particle, with its entropy, less what double layers
+    store."""
     power = 0.0
     for r in range(memory.layer.shape[0]):
         power -= cell.area * memory.layer[r] * memory.delta[r]
     for u in range(memory.y.shape[0]):
         side = particles.place[u, 0]
-        slope = lookup(surfaces.entropic[side], memory.theta[u])
-        u_eq = open_circuit(surfaces.ocp[side], memory.theta[u]) + (t_k - cell.reference_k) * slope
+        slope = lookup(surfaces.entropic[side], means[u])
+        u_eq = open_circuit(surfaces.ocp[side], means[u]) + (t_k - cell.reference_k) * slope
         power += cell.area * memory.y[u] * (t_k * slope - u_eq)
     return power
 

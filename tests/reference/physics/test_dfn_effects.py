@@ -31,9 +31,9 @@ def ours(peer, effect, **parameters):
     return simulate(peer.cell, peer.time, peer.current, peer.soc0, active, model="dfn")
 
 
-def test_self_heating_is_thermal_lumped(pulsed):
+def test_self_heating_is_thermal_lumped_with_the_heat_of_mixing(pulsed):
     update = {"Total heat transfer coefficient [W.m-2.K-1]": COEFFICIENT_W_M2_K}
-    solution = theirs(pulsed, options={"thermal": "lumped"}, update=update)
+    solution = theirs(pulsed, options={"thermal": "lumped", "heat of mixing": "true"}, update=update)
     run = ours(pulsed, "self_heating", heat_transfer_w_k=COEFFICIENT_W_M2_K * pulsed.cell.surface_area_m2)
     assert rmse_mv(run.voltage_v, solution["Voltage [V]"](pulsed.time)) < REACHED_MV
     temperature = solution["Volume-averaged cell temperature [K]"](pulsed.time)

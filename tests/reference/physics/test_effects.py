@@ -34,10 +34,12 @@ def agrees(change, theirs, share, least_v=1e-3):
     assert rms(change - theirs) < share * rms(theirs)
 
 
-def test_self_heating_is_thermal_lumped(peer, plain_v):
+def test_self_heating_is_thermal_lumped_with_the_heat_of_mixing(peer, plain_v):
+    """Of the salt a lump leaves out the heat of mixing; lithium that is on its way within a particle gives its own."""
     coefficient = 5.0
     solution = peer.solve(
-        options={"thermal": "lumped"}, update={"Total heat transfer coefficient [W.m-2.K-1]": coefficient}
+        options={"thermal": "lumped", "heat of mixing": "true"},
+        update={"Total heat transfer coefficient [W.m-2.K-1]": coefficient},
     )
     conductance = coefficient * peer.cell.surface_area_m2
     agrees(
@@ -59,7 +61,7 @@ def test_a_double_layer_gives_back_what_it_stored_and_heated_the_cell_by_it(peer
         f"{side} electrode double-layer capacity [F.m-2]": capacity for side in ("Negative", "Positive")
     }
     solution = peer.solve(
-        options={"thermal": "lumped", "surface form": "differential"},
+        options={"thermal": "lumped", "heat of mixing": "true", "surface form": "differential"},
         update={**update, "Total heat transfer coefficient [W.m-2.K-1]": coefficient},
     )
     theirs = solution["Volume-averaged cell temperature [K]"](peer.time)

@@ -155,3 +155,29 @@ def test_a_step_is_at_most_a_quarter_of_what_the_bounds_span():
 
 def test_bounds_without_room_between_them_gave_a_slope_of_no_number():
     assert slope_within(lambda x: 2.0 * x, np.array([0.5]), np.ones(1), 0, (0.5, 0.5), 1e-3) is None
+
+
+@pytest.mark.parametrize("beyond", [lambda x: np.array([1e3, x[0], x[1]]), lambda x: None])
+def test_a_descent_stayed_where_it_began_beside_a_jump_of_one_coordinate(beyond):
+    # What one coordinate would gain below nought, where the residual jumps or has no value, is not to be had; the other
+    # one's minimum is.
+    slopes = np.array([[1.0, 1.0], [1.0, 0.0], [0.0, 2.0]])
+    target = np.array([2.0, -1.0, 6.0])
+
+    def residual(x):
+        return beyond(x) if x[0] < 0.0 else slopes @ x - target
+
+    box = np.array([-9.0, -9.0]), np.array([9.0, 9.0])
+    found = descend(Counted(residual, lambda x: slopes), np.zeros(2), *box, 20, 1e-9)
+    expected = lsq_linear(slopes, target, (np.array([0.0, -9.0]), box[1]))
+    assert expected.x[0] == pytest.approx(0.0, abs=1e-6)
+    assert found.x == pytest.approx(expected.x, abs=1e-4)
+    assert found.converged
+
+
+def test_a_wall_beside_an_end_of_the_box_left_a_step_no_room():
+    model = Counted(
+        lambda x: np.full(2, 50.0) if x[0] < 1.0 else x - np.array([-3.0, 2.0]), lambda x: np.eye(2)
+    )
+    found = descend(model, np.array([1.0, 0.0]), np.full(2, -5.0), np.array([1.0, 5.0]), 20, 1e-9)
+    assert found.x == pytest.approx([1.0, 2.0], abs=1e-4)

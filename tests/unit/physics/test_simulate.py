@@ -226,6 +226,23 @@ def test_a_winding_stores_and_conducts_what_it_loses(nmc, hold):
     assert capacity * (winding[-1] - winding[0]) + conducted_j == pytest.approx(lost_j, rel=0.01)
 
 
+@pytest.mark.parametrize("model", ["espm", "dfn"])
+def test_what_diffusion_within_particles_dissipates_was_no_heat(lg_m50, model):
+    """Half an hour at 1C and hours of rest, all but adiabatic: 0.59 of what the cell gave and did not deliver."""
+    time = np.arange(0.0, 12.0 * SECONDS_PER_HOUR, 10.0)
+    current = np.where(time <= SECONDS_PER_HOUR / 2.0, lg_m50.nominal_capacity_ah, 0.0)
+    kept = CATALOGUE["self_heating"].activate(heat_transfer_w_k=1e-3, heat_capacity_factor=3.0)
+    run = simulate(lg_m50, time, current, 0.95, [kept], hold="backward", model=model)
+    warmer = run.series["temperature_k"] - lg_m50.ambient_temperature_k
+    lost_j = 1e-3 * np.trapezoid(warmer, time)
+    heat_j = 3.0 * lg_m50.heat_capacity_j_k * warmer[-1] + lost_j
+    soc = np.linspace(run.series["soc"][-1], 0.95, 2001)
+    chemical_j = lg_m50.capacity_ah * SECONDS_PER_HOUR * np.trapezoid(lg_m50.rest_voltage_v(soc), soc)
+    electric_j = float(np.sum((current * run.voltage_v)[1:] * np.diff(time)))
+    assert lg_m50.negative.entropic == lg_m50.positive.entropic == NO_ENTROPY
+    assert heat_j == pytest.approx(chemical_j - electric_j, rel=0.01)
+
+
 def test_both_models_warm_a_winding_alike_and_need_less_voltage(nmc):
     time = np.arange(0.0, 1200.0, 2.0)
     case = 5.0 + 0.001 * time
