@@ -319,7 +319,7 @@ def test_a_value_beyond_the_bounds_sent_users_into_the_installed_package(file):
     with pytest.raises(ParameterError, match=re.escape(f"widen the bounds in {file}.")):
         load_effect(file).activate(lead_ohm=1.0)
     with pytest.raises(ParameterError, match="an effect of your own can have wider bounds"):
-        CATALOGUE["series_resistance"].activate(resistance_ohm=10.0)
+        CATALOGUE["series_resistance"].activate(resistance_ohm=1e4)
 
 
 def test_a_file_that_ends_python_ended_the_command_as_if_all_were_done(tmp_path):
