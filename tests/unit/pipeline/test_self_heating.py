@@ -31,7 +31,7 @@ def test_the_temperature_of_a_winding_was_written_as_that_of_its_case(profile, t
     first, again = tmp_path / "first.csv", tmp_path / "again.csv"
     heated = simulate_file(cell, profile, first, HEATED, model=model)
     followed = simulate_file(cell, first, again, replace(HEATED, self_heating=False), model=model)
-    assert np.ptp(heated.series["temperature_k"]) > 8.0
+    assert np.ptp(heated.series["temperature_k"]) > 5.0
     assert followed.voltage_v == pytest.approx(heated.voltage_v, abs=2e-4)
     assert followed.series["temperature_k"] == pytest.approx(heated.series["temperature_k"], abs=0.05)
     written = pd.read_csv(first)
