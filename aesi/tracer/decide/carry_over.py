@@ -156,10 +156,7 @@ def _end(state: ModelState, rate: float, temperature: float | None) -> tuple[flo
     if not np.isfinite(run.voltage_v).all():
         return 0.0, f"{what} has no finite voltage"
     over = np.append(np.flatnonzero(_beyond_limit(cell, rate, run.voltage_v)), len(time) - 1)[0]
-    # Where a collector is dry a single particle goes on, of which a porous electrode knows better: 2C with a fifth of
-    # the electrolyte's diffusivity (NMC pouch) ends at 654 s in this and at 1,788 in that one.
-    dry = np.minimum(run.series["c_e0"], run.series["c_eL"]) < 0.0
-    empty = np.append(np.flatnonzero(dry | (run.series["depleted"] > 0)), len(time))[0]
+    empty = np.append(np.flatnonzero(run.series["depleted"] > 0), len(time))[0]
     if over <= empty:
         return float(time[over]), None
     return float(time[empty]), (

@@ -411,15 +411,16 @@ def test_what_does_harm_in_a_range_of_charge_is_not_written(path):
 
 
 def test_a_model_that_runs_out_of_salt_where_the_declared_one_does_not_is_refused(path):
-    def fault(diffusivity_factor):
+    def fault(diffusivity_factor, rate_c):
         poor = CATALOGUE["electrolyte_transport"].activate(diffusivity_factor=diffusivity_factor)
         widened = replace(path.problem, effects={**path.problem.effects, poor.id: poor.effect})
-        return range_fault(ModelState(widened, {"soc0": {"0": 0.9}, poor.id: poor.parameters}))
+        return range_fault(ModelState(widened, {"soc0": {"0": 0.9}, poor.id: poor.parameters}), (rate_c,))
 
-    assert range_fault(ModelState(path.problem)) is None
-    assert fault(0.5) is None
-    assert "a full discharge at 2C runs out of lithium or of salt" in fault(0.2)
-    assert "before it reaches its voltage limit" in fault(0.2)
+    assert range_fault(ModelState(path.problem), (4.0,)) is None
+    assert fault(0.5, 4.0) is fault(0.2, 2.0) is None
+    told = fault(0.2, 4.0)
+    assert "a full discharge at 4C runs out of lithium or of salt" in told
+    assert "before it reaches its voltage limit" in told
 
 
 @pytest.mark.parametrize("rate_c", [1.0, -0.5])
