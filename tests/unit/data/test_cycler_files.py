@@ -354,6 +354,16 @@ def test_a_first_column_without_a_name_made_layers_of_an_export(tmp_path, above,
     assert not any("cycles and steps" in note for note in record.notes)
 
 
+def test_a_first_step_in_the_line_of_its_cycle_hid_the_layers_of_a_report(tmp_path):
+    name, content = neware_layers()
+    lines = content.decode("latin-1").split("\r\n")
+    joined = [*lines[:3], lines[3] + lines[4], *lines[5:]]
+    (tmp_path / name).write_text("\r\n".join(joined), encoding="latin-1", newline="")
+    record = read_measurement(tmp_path / name)
+    np.testing.assert_allclose(record.time_s, TIME)
+    np.testing.assert_allclose(record.voltage_v, VOLTAGE)
+
+
 @pytest.mark.parametrize("export", EXPORTS, ids=lambda export: export.__name__)
 def test_every_export_gives_the_same_test(tmp_path, export):
     record = read_measurement(written(tmp_path, export))
