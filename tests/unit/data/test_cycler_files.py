@@ -278,6 +278,17 @@ def test_a_binary_whose_time_begins_anew_with_each_step_is_put_together(tmp_path
     assert len(read(path, Reading(cycle="2", duplicates="first"))) == 43  # steps 4 to 6, less one stamp each
 
 
+def test_an_arbin_export_without_its_points_was_not_known(tmp_path):
+    """As MITS Pro writes its workbooks of late, and batteryarchive.org its time series, without steps either."""
+    head = "Date_Time,Test_Time (s),Cycle_Index,Current (A),Voltage (V),Charge_Capacity (Ah),"
+    head += "Environment_Temperature (C),Cell_Temperature (C)"
+    body = rows(["2010-09-02"] * N, TIME, STEP, -CURRENT, VOLTAGE, TIME * 0, TEMPERATURE - 1.0, TEMPERATURE)
+    (tmp_path / "archive.csv").write_text("\n".join([head, *body, ""]))
+    data = read_measurement(tmp_path / "archive.csv")
+    np.testing.assert_allclose(data.current_a, CURRENT)
+    np.testing.assert_allclose(data.temperature_degc, TEMPERATURE)
+
+
 def test_a_digatron_export_was_held_for_binary_by_the_line_above_its_names(tmp_path):
     name, content = digatron(start_s=26.0 * 3600.0)
     path = tmp_path / name
