@@ -289,6 +289,17 @@ def test_an_arbin_export_without_its_points_was_not_known(tmp_path):
     np.testing.assert_allclose(data.temperature_degc, TEMPERATURE)
 
 
+def test_the_ends_of_steps_in_a_binary_of_newares_were_refused_as_no_other_exports_are(tmp_path, monkeypatch):
+    frame = pd.DataFrame({"Test Time / s": TIME, "Current / A": -CURRENT, "Voltage / V": VOLTAGE})
+    frame.loc[15, "Test Time / s"] = TIME[14]
+    monkeypatch.setitem(sys.modules, "bdf", SimpleNamespace(read=lambda path, validate: frame))
+    path = tmp_path / "test.nda"
+    path.write_bytes(b"NEWARE")
+    data = read_measurement(path)
+    np.testing.assert_allclose(data.current_a, np.delete(CURRENT, 15))
+    assert any("1 row was dropped whose stamp is there twice, the first kept" in note for note in data.notes)
+
+
 def test_a_digatron_export_was_held_for_binary_by_the_line_above_its_names(tmp_path):
     name, content = digatron(start_s=26.0 * 3600.0)
     path = tmp_path / name
