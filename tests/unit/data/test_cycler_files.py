@@ -557,6 +557,19 @@ def test_the_names_of_a_sheet_were_not_proposed(tmp_path):
         read_measurement(tmp_path / "logger.xlsx")
 
 
+def test_the_names_of_a_sheet_of_sums_were_proposed_before_those_of_the_records(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for row in (["Cycle", "PlatTimeD/Sec", "MedVoltD/V"], [1, 0, 3.7], [2, 0, 3.6]):
+        book.active.append(row)
+    sheet = book.create_sheet("Record")
+    for row in (["Elapsed (s)", "Current (A)", "U (V)"], *([k, 1.0, 3.7] for k in range(9))):
+        sheet.append(row)
+    book.save(tmp_path / "logger.xlsx")
+    with pytest.raises(DataError, match=r'--column time_s="Elapsed .s." --column current_a="Current .A."'):
+        read_measurement(tmp_path / "logger.xlsx")
+
+
 def test_a_zip_archive_of_a_record_was_taken_for_a_workbook(tmp_path):
     with zipfile.ZipFile(tmp_path / "cell7.zip", "w") as archive:
         archive.writestr("cell7.csv", "time_s,current_a,voltage_v\n0,1,3.7\n1,1,3.69\n")
