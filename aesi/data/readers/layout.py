@@ -103,9 +103,9 @@ def layout_of(text: str, encoding: str, *, whole: bool, name: str, wanted: Colle
         first_row = start + 1
     separator = _separator_at(lines, start)
     if start:
-        notes.append(
-            f"{start} lines before the {'table' if nameless is not None else 'header'} were passed over."
-        )
+        above = "1 line" if start == 1 else f"{start} lines"
+        of = "table" if nameless is not None else "header"
+        notes.append(f"{above} before the {of} {'was' if start == 1 else 'were'} passed over.")
     if heading is not None and heading.has_units:
         notes.append("The line of units below the header was read as such.")
     if encoding == "latin-1":

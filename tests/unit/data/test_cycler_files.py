@@ -278,17 +278,6 @@ def test_a_binary_whose_time_begins_anew_with_each_step_is_put_together(tmp_path
     assert len(read(path, Reading(cycle="2", duplicates="first"))) == 43  # steps 4 to 6, less one stamp each
 
 
-def test_an_arbin_export_without_its_points_was_not_known(tmp_path):
-    """As MITS Pro writes its workbooks of late, and batteryarchive.org its time series, without steps either."""
-    head = "Date_Time,Test_Time (s),Cycle_Index,Current (A),Voltage (V),Charge_Capacity (Ah),"
-    head += "Environment_Temperature (C),Cell_Temperature (C)"
-    body = rows(["2010-09-02"] * N, TIME, STEP, -CURRENT, VOLTAGE, TIME * 0, TEMPERATURE - 1.0, TEMPERATURE)
-    (tmp_path / "archive.csv").write_text("\n".join([head, *body, ""]))
-    data = read_measurement(tmp_path / "archive.csv")
-    np.testing.assert_allclose(data.current_a, CURRENT)
-    np.testing.assert_allclose(data.temperature_degc, TEMPERATURE)
-
-
 def test_the_ends_of_steps_in_a_binary_of_newares_were_refused_as_no_other_exports_are(tmp_path, monkeypatch):
     frame = pd.DataFrame({"Test Time / s": TIME, "Current / A": -CURRENT, "Voltage / V": VOLTAGE})
     frame.loc[15, "Test Time / s"] = TIME[14]
@@ -298,6 +287,17 @@ def test_the_ends_of_steps_in_a_binary_of_newares_were_refused_as_no_other_expor
     data = read_measurement(path)
     np.testing.assert_allclose(data.current_a, np.delete(CURRENT, 15))
     assert any("1 row was dropped whose stamp is there twice, the first kept" in note for note in data.notes)
+
+
+def test_an_arbin_export_without_its_points_was_not_known(tmp_path):
+    """As MITS Pro writes its workbooks of late, and batteryarchive.org its time series, without steps either."""
+    head = "Date_Time,Test_Time (s),Cycle_Index,Current (A),Voltage (V),Charge_Capacity (Ah),"
+    head += "Environment_Temperature (C),Cell_Temperature (C)"
+    body = rows(["2010-09-02"] * N, TIME, STEP, -CURRENT, VOLTAGE, TIME * 0, TEMPERATURE - 1.0, TEMPERATURE)
+    (tmp_path / "archive.csv").write_text("\n".join([head, *body, ""]))
+    data = read_measurement(tmp_path / "archive.csv")
+    np.testing.assert_allclose(data.current_a, CURRENT)
+    np.testing.assert_allclose(data.temperature_degc, TEMPERATURE)
 
 
 def test_a_digatron_export_was_held_for_binary_by_the_line_above_its_names(tmp_path):
@@ -487,10 +487,18 @@ def test_times_are_read_as_they_are_declared(tmp_path, cells, unit):
 def test_a_time_that_is_no_clock_time_is_named(tmp_path):
     path = tmp_path / "logger.csv"
     path.write_text("time_s,current_a,voltage_v\n00:00:01,1.0,3.7\n00:00:xx,1.0,3.7\n00:00:03,1,3.7\n")
-    with pytest.raises(DataError, match=r"row 2 \(line 3\).*'00:00:xx'"):
+    with pytest.raises(DataError, match=r"row 2 \(line 3\).*'00:00:xx'.*time_s=s \(or min, h, "):
         read_measurement(path, units={"time_s": "h:m:s"})
     with pytest.raises(DataError, match="--unit time_s=h:m:s"):
         read_measurement(path)
+
+
+def test_a_time_in_milliseconds_spelt_out_was_proposed_in_seconds(tmp_path):
+    (tmp_path / "bdf.csv").write_text(
+        "test_time_millisecond,current_ampere,voltage_volt\n0,1,3.7\n1000,1,3.6\n"
+    )
+    with pytest.raises(DataError, match=r'--column time_s="test_time_millisecond" --unit time_s=ms\. It has'):
+        read_measurement(tmp_path / "bdf.csv")
 
 
 def test_an_unknown_unit_names_those_that_there_are(tmp_path):
