@@ -9,7 +9,7 @@ z+ = z(V + d), with z(U) the inverse of the open-circuit voltage of the file:
     c = (COLD_DEGC - T) / COLD_SPAN_K, held within 0 and MOST_SPANS                (3)
 
 v is what the current drops at the contacts and films of the file beyond OHMIC_V_PER_C: of a cell that was calibrated
-with its leads they take most of its drop. (Where the current is turned, what I'
+with its leads they take most of its drop. |I| is the largest within ROWS_APART. (Where the current is turned, what I'
 left counts less by it, on the side that it left alone.) The charge Q_ij that leaves the cell between two rows bounds
 the capacity C from both sides, and a declared capacity well outside these bounds is another cell's, or the record's
 current or time is in another unit:
@@ -29,6 +29,7 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError
@@ -78,6 +79,9 @@ MOST_SPANS = 2.0
 AFTER_S = 1800.0
 """s that a current is felt after it, by slow diffusion. With 0 a drive at 0 degC is refused by its own file, from 300
 to 3600 no measured record is judged otherwise."""
+ROWS_APART = 1
+"""By which loggers write a current beside another row's voltage: the largest current within them is what flowed. With 0
+the pulses of an 18650 are refused by its own file for one row, of 0 A beside the voltage under 4.6 A."""
 AFTER_SHARE = 0.3
 """Of the largest current of that time, which counts as if it flowed still. With 0 a drive at 0 degC is refused by its
 own file, with 0.15 a record wants 1.1 times the capacity of its own; from 0.3 to 1 none is judged otherwise."""
@@ -374,7 +378,8 @@ def _largest_drop_v(cell: Cell, record: Measurement, rows: IntArray, sign: float
         ]
     )
     after_a = AFTER_SHARE * before_a
-    here_a = np.where(turned, after_a + flows[rows], np.maximum(np.abs(flows[rows]), after_a))
+    beside_a = maximum_filter1d(np.abs(flows), 1 + 2 * ROWS_APART, mode="nearest")[rows]
+    here_a = np.where(turned, after_a + flows[rows], np.maximum(beside_a, after_a))
     further_v_per_c = max(cell.contacts_and_films_ohm * cell.nominal_capacity_ah - OHMIC_V_PER_C, 0.0)
     c_rate = np.maximum(here_a, 0.0) / cell.nominal_capacity_ah
     drop = DROP_V + (DROP_V_PER_C + further_v_per_c) * c_rate
