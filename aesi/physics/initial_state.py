@@ -35,7 +35,7 @@ from aesi.physics.effect import ActiveEffect, Record, as_cell_saw, instruments_f
 from aesi.physics.rest.open_circuit import CHARGED_V, GIVEN_SD, GOOD_READING_V, READING_V, OpenCircuit
 from aesi.physics.rest.voltage import first_rows_v, freed_of_instruments, freed_of_series
 from aesi.physics.simulation import ModelName, model_with
-from aesi.physics.start.charge import told_by_charge
+from aesi.physics.start.charge import carried_from, told_by_charge
 from aesi.physics.start.load import DROP_ERROR, FLOWED_S, LoadedStart
 from aesi.physics.start.relaxing import Rest, resting_rows, settled_voltage
 from aesi.physics.start.state import Basis, InitialState
@@ -85,7 +85,8 @@ def initial_state(
     voltage of a rest; the same after the drop of the model under the current that flows.
 
     record : its temperature is used where it was measured.  soc0 : given by the user, for this record, or (`shared`)
-    for several, so that one whose voltage contradicts it starts where its voltage says.
+    for several, so that one whose voltage contradicts it starts where its voltage says, unless the charge that the
+    record moves allows what was given and not that.
     hold : how the current runs between rows.  effects : what the cell and its instruments have beyond the file, as in
     `simulate`.  model : that a loaded start is simulated with.  potentials_v : V, how far the potentials of the file
     are off, one standard deviation; a fit that moves them takes `GOOD_READING_V`.
@@ -118,7 +119,8 @@ def initial_state(
                 words = _given(record, soc0, read).sentence
                 return InitialState(soc0, GIVEN_SD, "given", words, doubt=doubt, doubted=True)
             return replace(_given(record, soc0, None), doubt=doubt)
-        if shared:
+        held, other = (carried_from(soc, seen, hold, cell.capacity_ah) for soc in (soc0, read.soc))
+        if shared and (other or not held):
             return _read_instead(read, soc0)
         return replace(_given(record, soc0, read), doubt=abs(read.soc - soc0))
     return start.read()
