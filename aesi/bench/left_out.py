@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from aesi.bench import CaseRow, some_chosen
-from aesi.bench.limit import NoAnswer, Stopwatch, answer_of
+from aesi.bench.limit import NOT_RUN, NoAnswer, Stopwatch, answer_of
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.data import read_measurement
 from aesi.data.catalogue import locate
@@ -90,7 +90,7 @@ def judged(case: LeftOutCase, cells: str, limit_s: float | None = LIMIT_S) -> Ca
         path = Path(cells) / case.set.cell if case.set.cell else locate(case.set.data, "cell.bpx.json")
         cell = Cell.from_bpx(path)
     except DataError as error:
-        return row | {"verdict": "not run", "error": str(error), **spent.row}
+        return row | {"verdict": NOT_RUN, "error": str(error), **spent.row}
     test = records.pop(case.test)
     content = answer_of(lambda: discovery_content(discover(cell, list(records.values()), [test])), limit_s)
     if isinstance(content, NoAnswer):
@@ -110,7 +110,7 @@ def _records(one: MeasuredSet) -> Iterator[tuple[str, Measurement]]:
 
 def summary(rows: Sequence[CaseRow]) -> dict[str, Any]:
     """How often the written model is no worse than leaving the cell alone, the worst case, and what was named."""
-    ran = [row for row in rows if row["verdict"] != "not run"]
+    ran = [row for row in rows if row["verdict"] != NOT_RUN]
     judged_rows = [row for row in ran if "times_better" in row]
     worst = max(judged_rows, key=lambda row: float(row["times_better"]), default=None)
     return {

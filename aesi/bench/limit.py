@@ -19,6 +19,8 @@ T = TypeVar("T")
 ERROR, OUT_OF_TIME = "error", "out of time"
 NO_ANSWER = (ERROR, OUT_OF_TIME)
 """Verdicts of cases that gave no answer."""
+NOT_RUN = "not run"
+"""Verdict of a case whose data cannot be had: it is counted, and in no figure."""
 
 
 class OutOfTime(BaseException):

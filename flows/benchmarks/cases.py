@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from aesi import bench
 from aesi.bench import CaseRow
+from aesi.bench.limit import NOT_RUN
 from aesi.numerics.files.source_digest import source_digest
 from aesi.numerics.files.whole import write_whole
 from aesi.pipeline.experiment.sections import TrackingConfig
@@ -102,7 +103,7 @@ def judged_once(
     if known:
         Console().say(f"{case.name}: {path} is of another program, other settings or files; judged again.")
     row = judge(case)
-    if row.get("verdict") != "not run":
+    if row.get("verdict") != NOT_RUN:
         write_whole(path, json.dumps(of_this | {"row": row}))
     return row
 

@@ -18,12 +18,12 @@ from pydantic import PositiveFloat, PositiveInt
 from aesi.bench import CaseRow
 from aesi.bench.hybrid.split_figures import summary, table
 from aesi.bench.hybrid.splits import EXPERIMENTS, SplitCase, chosen_splits, judged
-from aesi.bench.limit import Stopwatch
-from aesi.errors import AesiError, FitError
+from aesi.bench.limit import NOT_RUN, Stopwatch
+from aesi.errors import AesiError, DataError, FitError
 from aesi.pipeline.experiment.config import ExperimentConfig, overridden_key, read_experiment
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.load import Loaded
-from aesi.pipeline.experiment.sources import named_files
+from aesi.pipeline.experiment.sources import check_had, named_files
 from flows.benchmarks.cases import Cases, judged_once, kept, tracked
 from flows.benchmarks.page import write_between
 
@@ -36,7 +36,7 @@ CHEAP = ("conformal.method=split", "conformal.compare=[]", "conformal.horizons_s
 QUICK_MODELS = ("ESPM", "ESPM, one resistor", "ESPM recalibrated", "AESI I", "AESI II")
 
 
-SHOWN = ("split", "cell", "seed", "development", "error")
+SHOWN = ("split", "cell", "seed", "development", "verdict", "error")
 TRACKED = ("mser_pct", "coverage_pct", "winkler_mv")
 """Figures of each model that are metrics of its run."""
 BEGIN, END = "<!-- table of aesi bench splits -->", "<!-- end of splits -->"
@@ -132,7 +132,7 @@ def _laid(case: SplitCase, seed: int, settings: Mapping[str, Any], models: Seque
 
 
 def _row(run: SplitRun) -> CaseRow:
-    """A split that fails says why; it counts as nothing gained over the declared model."""
+    """A split that fails says why; `verdict` is 'not run' where its data cannot be had."""
     spent = Stopwatch()
     case = run.split
     head = {
@@ -143,6 +143,10 @@ def _row(run: SplitRun) -> CaseRow:
         "development": case.development,
     }
     try:
+        check_had(run.config)
+    except DataError as error:
+        return head | {"verdict": NOT_RUN, "error": str(error), **spent.row}
+    try:
         figures = _judged(case, run.config)
     except AesiError as error:
         figures = {"error": str(error)}
@@ -150,7 +154,10 @@ def _row(run: SplitRun) -> CaseRow:
 
 
 def search_and_fit(config: ExperimentConfig) -> tuple[Loaded, Mapping[str, float], Sequence[Fitted]]:
-    """The stages of `aesi run`, untracked: what was loaded, validation MSER (per cent), the models of Table 1."""
+    """The stages of `aesi run`, untracked: what was loaded, validation MSER (per cent), the models of Table 1.
+
+    Raises DataError where the data cannot be had: what an experiment falls back to is no measurement of its cell.
+    """
     from aesi.pipeline.experiment.candidate import top_share
     from aesi.pipeline.experiment.fit import build_problem, final_models
     from aesi.pipeline.experiment.intervals.conformalise import conformalise
@@ -161,7 +168,7 @@ def search_and_fit(config: ExperimentConfig) -> tuple[Loaded, Mapping[str, float
     from flows.search.nsga2 import search
     from flows.search.study import settings_of
 
-    loaded = load(config)
+    loaded = load(config.model_copy(update={"fallback": None}))
     problem = build_problem(loaded, config)
     known = {}
     found = search(

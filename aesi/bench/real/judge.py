@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from aesi.bench.detectable import seen_on_measured
-from aesi.bench.limit import NoAnswer, Stopwatch, answer_of
+from aesi.bench.limit import NOT_RUN, NoAnswer, Stopwatch, answer_of
 from aesi.bench.real.answers import initial_state_row, scored
 from aesi.bench.real.beside import capacity_row, course_row, witness_row
 from aesi.bench.real.case import RealCase, Take
@@ -61,7 +61,7 @@ def judged(case: RealCase, cells: str, limit_s: float | None = LIMIT_S) -> dict[
         known = _known(case, data, declared)
         good = [record(take) for take in case.good]
     except DataError as error:
-        return row | {"verdict": "not run", "error": str(error), **spent.row}
+        return row | {"verdict": NOT_RUN, "error": str(error), **spent.row}
     soc0 = case.soc0
     if case.fault:
         data = with_fault(data, case.fault.kind, case.fault.size)

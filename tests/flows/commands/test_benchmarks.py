@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from aesi.errors import ConfigError, InputError
+from aesi.errors import ConfigError, DataAway, InputError
 from flows import benchmarks
 from flows.benchmarks import splits
-from flows.benchmarks.cases import Cases
+from flows.benchmarks.cases import Cases, judged_once
 from flows.benchmarks.cases import tracked as of_cases
 from flows.benchmarks.history import (
     WATCHED,
@@ -341,6 +341,29 @@ def test_a_benchmark_without_its_peer_said_so_after_half_a_minute(monkeypatch, c
     )
 
 
+def asked_splits(monkeypatch, **asked):
+    """What `aesi bench splits` would run."""
+    folder = str(Path(__file__).resolve().parents[3] / "experiments")
+    monkeypatch.setattr(splits, "tracked", lambda cases, workers, address: iter(cases.specs))
+    return list(benchmarks.run("splits", experiments=folder, **asked))
+
+
+@pytest.mark.parametrize("cell", ["nmc", "hg2"])
+def test_a_split_without_its_data_was_one_of_the_virtual_cell_and_stayed_so(tmp_path, monkeypatch, cell):
+    def away(name):
+        raise DataAway(f"{name} is not here, and there is no network.")
+
+    (run,) = asked_splits(monkeypatch, cells=[cell], a_cell=1)
+    monkeypatch.setattr("aesi.data.catalogue.get", away)
+    keep = tmp_path / "kept"
+    row = judged_once(run, splits._row, str(keep), splits._files)
+    assert row["verdict"] == "not run"
+    assert "models" not in row
+    assert not keep.exists()
+    with pytest.raises(DataAway):
+        splits.search_and_fit(run.config)
+
+
 @pytest.mark.parametrize(
     ("override", "section", "key", "value"),
     [
@@ -353,13 +376,11 @@ def test_what_a_split_lays_over_its_file_could_not_be_asked_for_otherwise(
     monkeypatch, override, section, key, value
 ):
     """It was refused as overridden twice."""
-    monkeypatch.setattr(splits, "tracked", lambda cases, workers, address: iter(cases.specs))
-    folder = str(Path(__file__).resolve().parents[3] / "experiments")
-    asked = {"experiments": folder, "cells": ["hg2"], "a_cell": 1}
-    (plain,) = benchmarks.run("splits", **asked)
-    (run,) = benchmarks.run("splits", **asked, overrides=[override])
+    asked = {"cells": ["hg2"], "a_cell": 1}
+    (plain,) = asked_splits(monkeypatch, **asked)
+    (run,) = asked_splits(monkeypatch, **asked, overrides=[override])
     assert getattr(getattr(run.config, section), key) == value
     assert getattr(getattr(plain.config, section), key) != value
-    (twice,) = benchmarks.run("splits", **asked, overrides=[override, override])
+    (twice,) = asked_splits(monkeypatch, **asked, overrides=[override, override])
     with pytest.raises(ConfigError, match="overridden twice"):
         _ = twice.config
