@@ -70,10 +70,11 @@ def judged(case: RealCase, cells: str, limit_s: float | None = LIMIT_S) -> dict[
     held = 0.0 if good else HELD_OUT  # what a record has beside good ones is asked of all of it
     found = answer_of(lambda: discover(declared, [data], soc0=soc0, holdout=held, good=good), limit_s)
     if isinstance(found, NoAnswer):
-        return row | found.row | {"effects": [], "named": False} | spent.row
-    answer = _held_against(case, known, found, discovery_content(found), data, declared, soc0)
-    seen = seen_on_measured(declared, data, soc0, case.answers, good, held)
-    return row | answer | spent.row | {"seen_nats": seen}
+        answer = found.row | {"effects": [], "named": False}
+    else:
+        answer = _held_against(case, known, found, discovery_content(found), data, declared, soc0)
+    row |= answer | spent.row
+    return row | {"seen_nats": seen_on_measured(declared, data, soc0, case.answers, good, held)}
 
 
 def declared_cell(name: str, cells: str) -> Cell:
