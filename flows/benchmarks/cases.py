@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from hashlib import sha256
@@ -13,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 from aesi import bench
 from aesi.bench import CaseRow
 from aesi.bench.limit import NOT_RUN
+from aesi.data.catalogue import locate
+from aesi.errors import DataError
 from aesi.numerics.files.source_digest import source_digest
 from aesi.numerics.files.whole import write_whole
 from aesi.pipeline.experiment.sections import TrackingConfig
@@ -106,6 +109,16 @@ def judged_once(
     if row.get("verdict") != NOT_RUN:
         write_whole(path, json.dumps(of_this | {"row": row}))
     return row
+
+
+def of_sets(files: Iterable[tuple[str, str]]) -> Iterator[Path]:
+    """The files of data sets that can be had here.
+
+    files : data set, name of the file.
+    """
+    for data, name in files:
+        with suppress(DataError):
+            yield locate(data, name)
 
 
 def kept(folder: str) -> list[CaseRow]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -23,7 +24,7 @@ from aesi.errors import AesiError, DataError, FitError
 from aesi.pipeline.experiment.config import ExperimentConfig, overridden_key, read_experiment
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.load import Loaded
-from aesi.pipeline.experiment.sources import check_had, named_files
+from aesi.pipeline.experiment.sources import catalogue_files, check_had, named_files
 from flows.benchmarks.cases import Cases, judged_once, kept, tracked
 from flows.benchmarks.page import write_between
 
@@ -114,9 +115,12 @@ def over(laid: Sequence[str], overrides: Sequence[str]) -> tuple[str, ...]:
 
 
 def _files(run: SplitRun) -> Iterator[Path]:
-    """The file of its experiment, and those that this names."""
+    """The file of its experiment, those that this names, and the records and the cell of its data set."""
+    config = run.config
     yield Path(run.folder) / run.split.experiment
-    yield from named_files(run.config).values()
+    yield from named_files(config).values()
+    with suppress(DataError):
+        yield from catalogue_files(config)
 
 
 def _laid(case: SplitCase, seed: int, settings: Mapping[str, Any], models: Sequence[str]) -> tuple[str, ...]:
