@@ -25,6 +25,7 @@ from aesi.pipeline.experiment.config import ExperimentConfig, overridden_key, re
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.load import Loaded
 from aesi.pipeline.experiment.sources import catalogue_files, check_had, named_files
+from flows.base.console import Console
 from flows.benchmarks.cases import Cases, judged_once, kept, tracked
 from flows.benchmarks.page import write_between
 
@@ -58,6 +59,12 @@ class SplitRun:
         return f"{self.split.name}, seed {self.seed}"
 
     @property
+    def settings(self) -> list[str]:
+        """What is laid over the file for every split alike."""
+        own = ("seed", *map(overridden_key, self.split.overrides))
+        return [override for override in self.overrides if overridden_key(override) not in own]
+
+    @property
     def config(self) -> ExperimentConfig:
         """The experiment."""
         return read_experiment(Path(self.folder) / self.split.experiment, self.overrides)
@@ -88,7 +95,8 @@ def run(
     cells, a_cell, only, development : which splits.  models : which rows of Table 1.  overrides : laid over all files.
     workers, address : processes here, or a Dask scheduler.  write : a page whose part between the two marks becomes
     the table.  keep : a folder for what each split gave; one that is in it is not run again by the same program, as it
-    was asked, so that an interrupted run goes on, and the table is of all that the program has kept there.
+    was asked, so that an interrupted run goes on, and the table is of all that the program has kept there with these
+    settings, of whatever cells and seeds.
     """
     asked = {"a_cell": a_cell, "seeds": seeds, "candidates": candidates, "resamples": resamples, "dt_s": dt_s}
     standing = {"seeds": 3} if whole else QUICK
@@ -104,7 +112,16 @@ def run(
         rows.append(row)
         yield row
     if write is not None:
-        write_between(write, BEGIN, END, table(kept(keep) if keep else rows[:-1]))
+        write_between(write, BEGIN, END, table(_kept(keep, runs[0].settings) if keep else rows[:-1]))
+
+
+def _kept(folder: str, settings: Sequence[str]) -> list[CaseRow]:
+    """The rows that this program has kept there with these settings."""
+    rows = kept(folder)
+    other = [row["case"] for row in rows if row["settings"] != settings]
+    if other:
+        Console().say(f"{folder}: of other settings, and left out of the table: {'; '.join(other)}.")
+    return [row for row in rows if row["settings"] == settings]
 
 
 def over(laid: Sequence[str], overrides: Sequence[str]) -> tuple[str, ...]:
@@ -145,6 +162,7 @@ def _row(run: SplitRun) -> CaseRow:
         "cell": case.cell,
         "seed": run.seed,
         "development": case.development,
+        "settings": run.settings,
     }
     try:
         check_had(run.config)

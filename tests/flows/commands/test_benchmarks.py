@@ -364,6 +364,34 @@ def test_a_split_without_its_data_was_one_of_the_virtual_cell_and_stayed_so(tmp_
         splits.search_and_fit(run.config)
 
 
+def test_a_table_of_kept_splits_mixed_settings(tmp_path, monkeypatch, capsys):
+    """A quick look into the folder of whole runs gave a split with one seed of one and two of the other."""
+
+    def of(candidates):
+        def row(run):
+            head = {"case": run.name, "split": run.split.name, "cell": "hg2", "development": False}
+            return head | {"settings": run.settings, "error": f"{candidates} candidates"}
+
+        return row
+
+    page, keep = tmp_path / "page.md", str(tmp_path / "kept")
+    page.write_text(f"{splits.BEGIN}\n{splits.END}\n")
+    folder = str(Path(__file__).resolve().parents[3] / "experiments")
+    monkeypatch.setattr(splits, "tracked", lambda cases, *_: [*map(cases.judge, cases.specs), {}])
+    for candidates, cells, seeds in ((60, ["hg2"], 2), (8, ["hg2"], 1), (8, ["nmc"], 1)):
+        monkeypatch.setattr(splits, "_row", of(candidates))
+        asked = {"cells": cells, "a_cell": 1, "seeds": seeds, "candidates": candidates}
+        list(benchmarks.run("splits", experiments=folder, keep=keep, write=str(page), **asked))
+    assert [line for line in page.read_text().splitlines() if "failed" in line] == [
+        "hg2 without 25degC_us06, seed 0 failed: 8 candidates",
+        "nmc 1+2+3, seed 0 failed: 8 candidates",
+    ]
+    assert (
+        "of other settings, and left out of the table: hg2 without 25degC_us06, seed 1."
+        in capsys.readouterr().err
+    )
+
+
 @pytest.mark.parametrize(
     ("override", "section", "key", "value"),
     [
