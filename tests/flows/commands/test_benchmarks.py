@@ -15,6 +15,7 @@ from flows.benchmarks.history import (
     WATCHED,
     Entry,
     latest,
+    not_compared,
     read_history,
     regressions,
     worth_keeping,
@@ -285,6 +286,23 @@ def test_a_benchmark_that_nobody_watches_is_recorded_again():
     assert regressions([Entry("2026-01-01", "abcdef0", "a machine", 0.5, [line])], [line]) == []
 
 
+def test_other_blind_cases_were_called_worse():
+    line = {"bench": "blind", "summary": True, "seed": 24, "cases": 20, "effect_exact_pct": 50.0}
+    recorded = [Entry("2026-01-01", "abcdef0", "a machine", 0.5, (line,))]
+    worse = line | {"effect_exact_pct": 33.0}
+    assert len(regressions(recorded, [worse])) == 1
+    assert regressions(recorded, [worse | {"seed": 25}]) == []
+    assert not_compared(recorded, [worse]) == []
+    assert not_compared(recorded, [worse | {"seed": 25}]) == ["blind"]
+
+
+def test_measured_cases_none_of_which_was_run_were_no_worse():
+    line = {"bench": "real", "summary": True, "cases": 76, "ran": 76, "withheld_named_pct": 83.3}
+    recorded = [Entry("2026-01-01", "abcdef0", "a machine", 0.5, (line,))]
+    assert not_compared(recorded, [line | {"ran": 0, "withheld_named_pct": None}]) == ["real"]
+    assert not_compared(recorded, [line | {"withheld_named_pct": None}]) == ["real"]
+
+
 def test_the_newest_of_each_case_counts():
     entries = [entry(), entry(case="pulse"), entry("2026-03-01")]
     assert {key: each.date for key, (each, _) in latest(entries).items()} == {
@@ -326,6 +344,9 @@ def test_the_command_compares_and_ends_with_1(call, monkeypatch, tmp_path):
     assert err == ("aesi: worse than recorded: espm (drive): ratio was 200 and is 3 (2026-01-01, abcdef0).\n")
     monkeypatch.setattr("flows.benchmarks.run", lambda name, **_: iter([SPEED]))
     assert call("bench", "espm", "--compare", path)[0] == 0
+    monkeypatch.setattr("flows.benchmarks.run", lambda name, **_: iter([{**SPEED, "case": "pulse"}]))
+    code, _, err = call("bench", "espm", "--compare", path)
+    assert (code, err) == (0, f"{path} holds no figure of the same cases of espm: not compared.\n")
     assert call("bench", "espm", "--compare", tmp_path / "none.json")[0] == 2
 
 
