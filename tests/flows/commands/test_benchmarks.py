@@ -45,6 +45,7 @@ def test_tracking_costs_something_and_leaves_the_workspace_alone(workspace):
 @pytest.mark.parametrize(
     ("name", "options", "said"),
     [
+        ("ensemble", {"peer_models": 0}, "peer_models=0: it has to be greater than 0"),
         ("real", {"every": 0}, "every=0: it has to be greater than 0"),
         ("blind", {"workers": "many"}, "workers=many: it has to be a valid integer"),
         ("splits", {"cells": "nmc"}, r"cells=nmc: it has to be a list, in \[ \]"),
