@@ -64,6 +64,15 @@ class NoAnswer:
         return {"verdict": self.verdict, "error": self.error}
 
 
+LOST = NoAnswer(
+    ERROR,
+    "the system ended the process that worked on it, perhaps for want of memory; fewer workers have more each.",
+)
+"""Of a case whose process was ended from outside."""
+NO_TIME: CaseRow = {"processor_s": 0.0, "ours_s": 0.0}
+"""What a row has in the place of a stopwatch's that was lost with its process."""
+
+
 def answer_of(look: Callable[[], T], limit_s: float | None) -> T | NoAnswer:
     """What `look` returns; NoAnswer where it raises AesiError or uses more than limit_s processor seconds."""
     try:

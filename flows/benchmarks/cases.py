@@ -37,7 +37,8 @@ class Cases:
     """What is judged and how.
 
     name : of the experiment in the tracking store.  judge : a specification -> its row, a function that a process
-    elsewhere can import (or a partial of one).  summary : rows -> the last line.
+    elsewhere can import (or a partial of one).  summary : rows -> the last line.  lost : a specification -> its row
+    where the system ended the process that judged it.
     shown : keys of a row that are parameters of its run; other numbers are metrics.
     """
 
@@ -46,6 +47,7 @@ class Cases:
     specs: Sequence[Any]
     judge: Callable[[Any], CaseRow]
     summary: Callable[[list[CaseRow]], CaseRow]
+    lost: Callable[[Any], CaseRow]
     shown: tuple[str, ...]
 
 
@@ -151,10 +153,10 @@ def _read(path: Path) -> dict[str, Any]:
 
 def _judged(cases: Cases, workers: int, address: str | None) -> Iterator[CaseRow]:
     if address is not None:
-        return on_dask(cases.judge, cases.specs, workers, address)
+        return on_dask(cases.judge, cases.specs, workers, address, cases.lost)
     if workers == 1:
         return map(cases.judge, cases.specs)
-    return in_processes(cases.judge, cases.specs, workers)
+    return in_processes(cases.judge, cases.specs, workers, cases.lost)
 
 
 def _track(tracker: Tracker, row: CaseRow, shown: tuple[str, ...]) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import PositiveFloat, PositiveInt
 
-from aesi.bench.left_out import LIMIT_S, LeftOutCase, judged, plan, summary, table
+from aesi.bench.left_out import LIMIT_S, LeftOutCase, judged, lost, plan, summary, table
 from flows.benchmarks.cases import Cases, judged_once, of_sets, tracked
 from flows.benchmarks.page import write_between
 
@@ -40,7 +40,7 @@ def run(
         keep=keep,
         files=partial(_files, cells=cells),
     )
-    for row in tracked(Cases("left_out", 0, plan(only), judge, summary, SHOWN), workers, address):
+    for row in tracked(Cases("left_out", 0, plan(only), judge, summary, lost, SHOWN), workers, address):
         rows.append(row)
         yield row
     if write is not None:

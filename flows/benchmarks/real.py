@@ -12,7 +12,7 @@ from typing import Any
 
 from pydantic import PositiveFloat, PositiveInt
 
-from aesi.bench.real import chosen, judged, summary, table, write_report
+from aesi.bench.real import chosen, judged, lost, summary, table, write_report
 from aesi.bench.real.case import RealCase
 from aesi.bench.real.judge import LIMIT_S
 from flows.benchmarks.cases import Cases, judged_once, of_sets, tracked
@@ -53,7 +53,7 @@ def run(
         files=partial(_files, cells=cells),
     )
     rows = []
-    for row in tracked(Cases("real", 0, specs, judge, summary, SHOWN), workers, address):
+    for row in tracked(Cases("real", 0, specs, judge, summary, lost, SHOWN), workers, address):
         if row.get("summary"):
             if report:
                 write_report(Path(report), rows, row)

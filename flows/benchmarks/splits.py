@@ -19,7 +19,7 @@ from pydantic import PositiveFloat, PositiveInt
 from aesi.bench import CaseRow
 from aesi.bench.hybrid.split_figures import summary, table
 from aesi.bench.hybrid.splits import EXPERIMENTS, SplitCase, chosen_splits, judged
-from aesi.bench.limit import NOT_RUN, Stopwatch
+from aesi.bench.limit import LOST, NO_TIME, NOT_RUN, Stopwatch
 from aesi.errors import AesiError, DataError, FitError
 from aesi.pipeline.experiment.config import ExperimentConfig, overridden_key, read_experiment
 from aesi.pipeline.experiment.fit import Fitted
@@ -108,7 +108,7 @@ def run(
     ]
     rows = []
     judge = partial(judged_once, judge=_row, keep=keep, files=_files)
-    for row in tracked(Cases("splits", 0, runs, judge, summary, SHOWN), workers, address):
+    for row in tracked(Cases("splits", 0, runs, judge, summary, _lost, SHOWN), workers, address):
         rows.append(row)
         yield row
     if write is not None:
@@ -155,15 +155,7 @@ def _laid(case: SplitCase, seed: int, settings: Mapping[str, Any], models: Seque
 def _row(run: SplitRun) -> CaseRow:
     """A split that fails says why; `verdict` is 'not run' where its data cannot be had."""
     spent = Stopwatch()
-    case = run.split
-    head = {
-        "case": run.name,
-        "split": case.name,
-        "cell": case.cell,
-        "seed": run.seed,
-        "development": case.development,
-        "settings": run.settings,
-    }
+    case, head = run.split, _head(run)
     try:
         check_had(run.config)
     except DataError as error:
@@ -173,6 +165,21 @@ def _row(run: SplitRun) -> CaseRow:
     except AesiError as error:
         figures = {"error": str(error)}
     return head | figures | spent.row
+
+
+def _lost(run: SplitRun) -> CaseRow:
+    return _head(run) | {"error": LOST.error} | NO_TIME
+
+
+def _head(run: SplitRun) -> CaseRow:
+    return {
+        "case": run.name,
+        "split": run.split.name,
+        "cell": run.split.cell,
+        "seed": run.seed,
+        "development": run.split.development,
+        "settings": run.settings,
+    }
 
 
 def search_and_fit(config: ExperimentConfig) -> tuple[Loaded, Mapping[str, float], Sequence[Fitted]]:

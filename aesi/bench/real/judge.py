@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from aesi.bench.detectable import seen_on_measured
-from aesi.bench.limit import NOT_RUN, NoAnswer, Stopwatch, answer_of
+from aesi.bench.limit import LOST, NO_TIME, NOT_RUN, NoAnswer, Stopwatch, answer_of
 from aesi.bench.real.answers import initial_state_row, scored
 from aesi.bench.real.beside import capacity_row, course_row, witness_row
 from aesi.bench.real.case import RealCase, Take
@@ -41,20 +41,7 @@ def judged(case: RealCase, cells: str, limit_s: float | None = LIMIT_S) -> dict[
     cells : folder of the cell files.  limit_s : processor seconds; a case that takes longer is a miss.
     """
     spent = Stopwatch()
-    row: dict[str, Any] = {
-        "case": case.name,
-        "group": case.group,
-        "development": case.development,
-        "cell": case.cell,
-        "record": f"{case.take.set}/{case.take.file}",
-        "seconds_of_record": case.take.stop_s,
-        "given": "temperature" if case.take.temperature else "no temperature",
-        "good_records": [f"{take.set}/{take.file}" for take in case.good],
-        "put_in": f"{case.fault.kind} {case.fault.size:g}" if case.fault else "",
-        "answer": list(case.answers),
-        "source": case.source,
-        "matched": case.matched,
-    }
+    row = _asked(case)
     try:
         data = record(case.take)
         declared = declared_cell(case.cell, cells)
@@ -70,11 +57,37 @@ def judged(case: RealCase, cells: str, limit_s: float | None = LIMIT_S) -> dict[
     held = 0.0 if good else HELD_OUT  # what a record has beside good ones is asked of all of it
     found = answer_of(lambda: discover(declared, [data], soc0=soc0, holdout=held, good=good), limit_s)
     if isinstance(found, NoAnswer):
-        answer = found.row | {"effects": [], "named": False}
+        answer = found.row | MISSED
     else:
         answer = _held_against(case, known, found, discovery_content(found), data, declared, soc0)
     row |= answer | spent.row
     return row | {"seen_nats": seen_on_measured(declared, data, soc0, case.answers, good, held)}
+
+
+def lost(case: RealCase) -> dict[str, Any]:
+    """The row of a case whose process the system ended: a miss. What there was to be seen is not known."""
+    return _asked(case) | LOST.row | MISSED | NO_TIME
+
+
+MISSED: dict[str, Any] = {"effects": [], "named": False}
+"""What a case scores that gave no answer."""
+
+
+def _asked(case: RealCase) -> dict[str, Any]:
+    return {
+        "case": case.name,
+        "group": case.group,
+        "development": case.development,
+        "cell": case.cell,
+        "record": f"{case.take.set}/{case.take.file}",
+        "seconds_of_record": case.take.stop_s,
+        "given": "temperature" if case.take.temperature else "no temperature",
+        "good_records": [f"{take.set}/{take.file}" for take in case.good],
+        "put_in": f"{case.fault.kind} {case.fault.size:g}" if case.fault else "",
+        "answer": list(case.answers),
+        "source": case.source,
+        "matched": case.matched,
+    }
 
 
 def declared_cell(name: str, cells: str) -> Cell:

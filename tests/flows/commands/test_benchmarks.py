@@ -1,11 +1,17 @@
 """The benchmarks of the platform, small: they measure what they say, and leave nothing behind."""
 
 import json
+import os
+import signal
 import time
 from pathlib import Path
 
 import pytest
 
+from aesi.bench import blind as bench_blind
+from aesi.bench import left_out, real
+from aesi.bench.hybrid import split_figures
+from aesi.bench.limit import LOST
 from aesi.errors import ConfigError, DataAway, InputError
 from flows import benchmarks
 from flows.benchmarks import splits
@@ -94,7 +100,9 @@ def test_a_benchmark_that_was_killed_was_tracked_as_running_for_ever(tracked):
     store = Store()
     killed = store.create_run(store.experiment("small"), "small, seed 0", {KIND: "run"})
     RunRecord(killed, "small", "0", store.uri, time.time()).write()
-    cases = Cases("small", 0, ["a", "b"], lambda spec: {"case": spec, "ours_s": 0.0}, lambda rows: {}, ())
+    cases = Cases(
+        "small", 0, ["a", "b"], lambda spec: {"case": spec, "ours_s": 0.0}, lambda rows: {}, dict, ()
+    )
     lines = of_cases(cases)
     next(lines)
     (now,) = [record for record in records("small") if record.status == "running"]
@@ -115,7 +123,9 @@ def test_counts_in_the_rows_of_cases_were_not_tracked(tracked):
     def judge(spec):
         return {"case": spec, "ours_s": 0.5, "verdict": "found", "simulations": 120, "silent": True}
 
-    cases = Cases("small", 0, ["a"], judge, lambda rows: {"summary": True, "no_worse": 17}, ("verdict",))
+    cases = Cases(
+        "small", 0, ["a"], judge, lambda rows: {"summary": True, "no_worse": 17}, dict, ("verdict",)
+    )
     list(of_cases(cases))
     store = Store()
     runs = store.runs(store.find_experiment("small"), "")
@@ -124,6 +134,44 @@ def test_counts_in_the_rows_of_cases_were_not_tracked(tracked):
         "run": {"no_worse": 17.0},
         "case": {"ours_s": 0.5, "simulations": 120.0, "silent": 1.0},
     }
+
+
+def judged_or_ended(spec):
+    if spec == "ended":
+        os.kill(os.getpid(), signal.SIGKILL)
+    return {"case": spec, "ours_s": 0.0}
+
+
+def test_a_case_whose_process_the_system_ended_took_all_with_it(tracked):
+    names = ["a", "ended", "b", "c"]
+
+    def summed(rows):
+        return {"summary": True, "cases": len(rows)}
+
+    def lost(spec):
+        return {"case": spec, "ours_s": 0.0} | LOST.row
+
+    cases = Cases("small", 0, names, judged_or_ended, summed, lost, ())
+    *rows, last = of_cases(cases, workers=2)
+    assert {row["case"]: row.get("verdict") for row in rows} == dict.fromkeys(names) | {"ended": "error"}
+    assert last["cases"] == 4
+
+
+def test_a_case_that_was_lost_with_its_process_is_a_miss(monkeypatch):
+    (blind_case,), (left_out_case,) = bench_blind.chosen(cases=1, only="pair"), left_out.plan("nmc/C20")
+    row = bench_blind.lost(blind_case)
+    last = bench_blind.summary([row])
+    assert (last["no_answer"], last["exact_pct"], last["effect_exact_cases"]) == (1, 0.0, 1)
+    assert any("| error | no | no |" in line for line in bench_blind.table([row]))
+    fault = next(case for case in real.plan() if case.group == "fault")
+    measured = real.summary([real.lost(fault)])
+    assert (measured["no_answer"], measured["fault_named_pct"]) == (1, 0.0)
+    assert any("| error | no |" in line for line in real.table([real.lost(fault)]))
+    one = left_out.lost(left_out_case)
+    assert left_out.summary([one])["failed"] == 1
+    assert "memory" in left_out.table([one])[-1]
+    (run,) = asked_splits(monkeypatch, cells=["hg2"], a_cell=1)
+    assert split_figures.summary([splits._lost(run)])["failed"] == 1
 
 
 @pytest.mark.slow
