@@ -231,7 +231,7 @@ def reaction_heat(t_k, cell, particles, surfaces, memory, means):  # type: ignor
 
 @njit(inline="always", fastmath=FASTMATH)
 def surfaces_inside(particles, theta):  # type: ignore[no-untyped-def]
-    """Is the mean surface of each electrode in [0, 1]?  That of a particle that has filled lies a hair beyond."""
+    """True where the mean surface of each electrode is in [0, 1]; in a full particle it exceeds that by round-off."""
     mean_n, mean_p = 0.0, 0.0
     for u in range(theta.shape[0]):
         if particles.place[u, 0] == 0:

@@ -170,7 +170,7 @@ def voltage(current, theta_n, theta_p, cell, salt, c, g):  # type: ignore[no-unt
 
 @njit(inline="always", fastmath=FASTMATH)
 def out_of_range(theta_n, theta_p, driest):  # type: ignore[no-untyped-def]
-    """What left its range: 1 the negative surface, 2 the positive, 3 the electrolyte, 0 nothing."""
+    """The state that left its range: 1 negative surface, 2 positive surface, 3 electrolyte, 0 none."""
     if not 0.0 <= theta_n <= 1.0:
         return 1
     if not 0.0 <= theta_p <= 1.0:
