@@ -11,7 +11,7 @@ import numpy as np
 
 from aesi.data.channels.checks import Columns, Context, check_alive, check_finite, check_ranges, check_time
 from aesi.data.channels.columns import QUANTITIES, REQUIRED, Mapped
-from aesi.data.channels.gaps import without_gaps
+from aesi.data.channels.gaps import untold_charge, without_gaps
 from aesi.data.channels.glitches import glitch_doubts, glitches
 from aesi.data.channels.implausible import check_scale, check_sign, check_signed
 from aesi.data.channels.load_columns import keep_rows, load_columns
@@ -145,6 +145,7 @@ def _examine(
     data, context = without_gaps(data, context, notes)
     check_alive(data, context)
     notes.extend(time_doubts(data))
+    notes.extend(untold_charge(data))
     notes.extend(temperature_doubts(data, context))
     found = glitches(data)
     notes.extend(glitch_doubts(found, data, context))

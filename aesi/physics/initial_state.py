@@ -35,7 +35,7 @@ from aesi.physics.effect import ActiveEffect, Record, as_cell_saw, instruments_f
 from aesi.physics.rest.open_circuit import CHARGED_V, GIVEN_SD, GOOD_READING_V, READING_V, OpenCircuit
 from aesi.physics.rest.voltage import first_rows_v, freed_of_instruments, freed_of_series
 from aesi.physics.simulation import ModelName, model_with
-from aesi.physics.start.charge import told_by_charge
+from aesi.physics.start.charge import carried_from, told_by_charge
 from aesi.physics.start.load import DROP_ERROR, FLOWED_S, LoadedStart
 from aesi.physics.start.relaxing import Rest, resting_rows, settled_voltage
 from aesi.physics.start.state import Basis, InitialState
@@ -85,7 +85,8 @@ def initial_state(
     open-circuit voltage of a rest; the open-circuit voltage under load, after the voltage drop of the model.
 
     record : its temperature is used where it was measured.  soc0 : state of charge given by the user, 0 to 1.
-    shared : True where `soc0` was given for several records; one whose voltage contradicts it is then read instead.
+    shared : True where `soc0` was given for several records; one whose voltage contradicts it is then read instead,
+    unless the charge that the record moves allows `soc0` and not the state of charge that is read.
     hold : how the current runs between rows.  effects : active effects of cell and instruments, as in `simulate`.
     model : for the simulation of a start under load.  potentials_v : standard deviation of the file's open-circuit
     voltage, V; a fit that moves the potentials takes `GOOD_READING_V`.
@@ -118,7 +119,8 @@ def initial_state(
                 words = _given(record, soc0, read).sentence
                 return InitialState(soc0, GIVEN_SD, "given", words, doubt=doubt, doubted=True)
             return replace(_given(record, soc0, None), doubt=doubt)
-        if shared:
+        held, other = (carried_from(soc, seen, hold, cell.capacity_ah) for soc in (soc0, read.soc))
+        if shared and (other or not held):
             return _read_instead(read, soc0)
         return replace(_given(record, soc0, read), doubt=abs(read.soc - soc0))
     return start.read()

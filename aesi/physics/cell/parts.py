@@ -196,6 +196,17 @@ class CellParameters:
         return window * self.electrode_capacity_ah(self.negative)
 
     @property
+    def contacts_and_films_ohm(self) -> float:
+        """Resistance of the contacts and of both electrodes' films over the whole cell, half charged and at the
+        reference temperature."""
+        half = self.stoichiometries(0.5)
+        ohm = self.contact_resistance_ohm
+        for electrode, theta in zip((self.negative, self.positive), half, strict=True):
+            surface_m2 = electrode.area_per_volume_1_m * electrode.thickness_m * self.total_area_m2
+            ohm += float(electrode.film_ohm_m2(np.array([theta]))[0]) / surface_m2
+        return ohm
+
+    @property
     def winding_resistance_k_w(self) -> float:
         """Thermal resistance between the mean of the winding and its case, K/W; 0 where the file declares no thermal
         conductivity or no heat capacity.

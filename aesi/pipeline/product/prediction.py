@@ -41,7 +41,7 @@ class Prediction:
         return len(self.time_s)
 
     def __repr__(self) -> str:
-        band = "no band" if self.nominal is None else f"{100 * self.nominal:.0f} % band"
+        band = "no band" if self.nominal is None else f"{100 * self.nominal:g} % band"
         outside = (
             f", {100 * self.outside.mean():.0f} % outside the trained range" if self.outside.any() else ""
         )
@@ -53,7 +53,7 @@ class Prediction:
         voltage = {"predicted": self.voltage_v, "physics alone": self.physics_v}
         panels = {"voltage, V": voltage, "state of charge": {"state of charge": self.soc}}
         band = (
-            None if self.nominal is None else (f"{100 * self.nominal:.0f} % band", self.lower_v, self.upper_v)
+            None if self.nominal is None else (f"{100 * self.nominal:g} % band", self.lower_v, self.upper_v)
         )
         return over_time(self.time_s, panels, band)
 

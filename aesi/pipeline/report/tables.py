@@ -203,7 +203,7 @@ def _table(key: str, caption: str, columns: Sequence[Column], models: Sequence[R
 
 def _interval_columns(group: str) -> list[Column]:
     return [
-        ("nominal, %", lambda row: _number(row, f"{group}.nominal_pct", 0)),
+        ("nominal, %", lambda row: _as_asked(row, f"{group}.nominal_pct")),
         ("coverage, %", lambda row: _ranged(row, group, "coverage_pct")),
         ("worst bin, %", lambda row: _number(row, f"{group}.worst_bin_coverage_pct", 2)),
         ("low minutes, %", lambda row: _number(row, f"{group}.low_minutes_pct", 2)),
@@ -255,6 +255,12 @@ def _find(row: Row, path: str) -> Any:
 def _number(row: Row, path: str, digits: int, factor: float = 1.0) -> str:
     value = _find(row, path)
     return _formatted(None if value is None else value * factor, digits)
+
+
+def _as_asked(row: Row, path: str) -> str:
+    """A number that was asked for, which is exact: 97.5 is not 98."""
+    value = _find(row, path)
+    return ABSENT if value is None else f"{value:g}"
 
 
 def _formatted(value: float | None, digits: int) -> str:
