@@ -81,7 +81,8 @@ def open_circuit(table, theta):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", fastmath=FASTMATH)
 def wet(salt):  # type: ignore[no-untyped-def]
-    """Salt over rest, kept positive: itself down to `NEARLY_DRY`, then falling to nought with the slope it had."""
+    """Salt concentration over rest, kept positive: unchanged down to `NEARLY_DRY`, then decaying to zero with the same
+    slope there."""
     return (
         salt if salt >= NEARLY_DRY else NEARLY_DRY * math.exp(max(salt / NEARLY_DRY, SMALLEST_EXPONENT) - 1.0)
     )
