@@ -75,7 +75,7 @@ class FreeRunBands:
     energies_j_mol: Array | None = None
 
     def __repr__(self) -> str:
-        return f"FreeRunBands({100 * (1 - self.alpha):.0f} %, {len(self.horizons)} horizons)"
+        return f"FreeRunBands({100 * (1 - self.alpha):g} %, {len(self.horizons)} horizons)"
 
     @classmethod
     def fit(

@@ -161,13 +161,23 @@ def calibrated_band(
     )
 
 
-def _check_pieces(pieces: Sequence[_Piece], horizon: float) -> None:
-    """Raises FitError where these are too few, or their errors are all zero."""
-    if len(pieces) < MIN_PIECES:
-        raise FitError(
-            f"{len(pieces)} pieces of {MIN_ROWS} or more predictions {horizon:g} s ahead cannot calibrate a band: "
-            f"at least {MIN_PIECES} are needed; give longer records."
+class TooFewPieces(FitError):
+    """Records are too few or too short for the band of a horizon (horizon_s), which says nothing of the others."""
+
+    def __init__(self, pieces: int, horizon_s: float) -> None:
+        ahead = "over a whole drive" if horizon_s == WHOLE_DRIVE else f"{horizon_s:g} s ahead"
+        advice = "longer records" if horizon_s == WHOLE_DRIVE else "longer records, or a shorter horizon"
+        super().__init__(
+            f"{pieces} pieces of {MIN_ROWS} or more predictions {ahead} cannot calibrate a band: at least {MIN_PIECES} "
+            f"are needed; give {advice}."
         )
+        self.horizon_s = horizon_s
+
+
+def _check_pieces(pieces: Sequence[_Piece], horizon: float) -> None:
+    """Raises TooFewPieces, or FitError where their errors are all zero."""
+    if len(pieces) < MIN_PIECES:
+        raise TooFewPieces(len(pieces), horizon)
     if not any(piece.sizes.any() for piece in pieces):
         raise FitError(f"the errors at {horizon:g} s are zero; calibrate on predictions of measured voltage.")
 

@@ -41,7 +41,7 @@ class Calibrated:
     floor_v: float
 
     def __repr__(self) -> str:
-        return f"Calibrated({self.method}, {100 * (1 - self.alpha):.0f} %, window {self.window})"
+        return f"Calibrated({self.method}, {100 * (1 - self.alpha):g} %, window {self.window})"
 
     @property
     def needs_current(self) -> bool:
