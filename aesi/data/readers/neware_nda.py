@@ -33,9 +33,8 @@ def open_nda(path: Path) -> FrameTable:
     columns = {str(name): frame[name].to_numpy() for name in frame.columns}
     notes = ["Read by batterydf, which converted its units and names to BDF."]
     table = of_mapping(path, _of_the_test(columns, notes), tuple(notes))
-    table.format = (
-        neware.FORMAT
-    )  # It names none of these columns; of a known export two rows may share a stamp.
+    # Its columns have BDF's names. Of a known export two rows may share a stamp.
+    table.format = neware.FORMAT
     return table
 
 
