@@ -98,6 +98,18 @@ def salt_at_separator(c, c0):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", fastmath=FASTMATH)
+def out_of_range(theta_n, theta_p, driest):  # type: ignore[no-untyped-def]
+    """What left its range: 1 the negative surface, 2 the positive, 3 the electrolyte, 0 nothing."""
+    if not 0.0 <= theta_n <= 1.0:
+        return 1
+    if not 0.0 <= theta_p <= 1.0:
+        return 2
+    if not driest > 0.0:
+        return 3
+    return 0
+
+
+@njit(inline="always", fastmath=FASTMATH)
 def step_weights(rate, dt):  # type: ignore[no-untyped-def]
     """exp(-rate dt), and the integrals over the step that weigh the input at its start and at its end."""
     z = rate * dt
