@@ -67,6 +67,8 @@ refused by their own file."""
 OHMIC_V_PER_C = 0.06
 """Drop over a file's contacts and films that DROP_V_PER_C includes, V h per C-rate: 0.053 at most in the files that the
 measured records were judged by. A cell on two wires of 0.15 ohm has 0.35."""
+LEADS_V_PER_C = 0.35
+"""Drop over leads that a record may hold and its file not, V h per C-rate: those of the cell on two wires."""
 COLD_DEGC = 15.0
 """Temperature above which a cell counts as warm: with 5 a drive at 0 degC requires 1/1.11 times the capacity of its own
 file, with 10 or 25 no measured record more than now."""
@@ -286,6 +288,11 @@ def _check_capacity(cell: Cell, record: Measurement, slack: Slack | None = None)
             f". Or it was far colder than the {_declared_degc(cell):.4g} degC that the cell's file declares: give its "
             "temperature in a column temperature_degc, or declare another in that file (Initial temperature [K])"
         )
+    if _of_leads(cell, record):
+        fault += (
+            ". Or its voltage holds the drop of leads, as on two wires (`aesi data convert` prints the resistance that "
+            "the steps of its current show): a file that was calibrated with them has it"
+        )
     declared = [note.rstrip(".") for note in record.notes if CONVERTED in note and DECLARED in note]
     if declared:
         fault += f". First look at what was declared: {'; '.join(declared)}"
@@ -296,6 +303,13 @@ def _of_the_cold(cell: Cell, record: Measurement) -> bool:
     """Whether a record that does not fit the cell's capacity would fit it if the cell was cold."""
     coldest = replace(record, temperature_degc=np.full(len(record), COLD_DEGC - MOST_SPANS * COLD_SPAN_K))
     return _capacity_fault(cell, record) is not None and _capacity_fault(cell, coldest) is None
+
+
+def _of_leads(cell: Cell, record: Measurement) -> bool:
+    """Whether a record that the cell's capacity does not explain would be of it behind leads."""
+    leads_ohm = LEADS_V_PER_C / cell.nominal_capacity_ah
+    wired = replace(cell, contact_resistance_ohm=cell.contact_resistance_ohm + leads_ohm)
+    return _capacity_fault(cell, record) is not None and _capacity_fault(wired, record) is None
 
 
 def _capacity_ah(cell: Cell) -> float:
