@@ -1,4 +1,4 @@
-"""Measurements in: files, public data sets, drive schedules, a virtual laboratory, labelled blind cases.
+"""Sources of measurements: files, public data sets, drive schedules, a virtual laboratory, labelled blind cases.
 
 Names are imported where they are first used: PyBaMM, pandas and pyarrow are heavy.
 """

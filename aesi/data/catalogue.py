@@ -1,6 +1,6 @@
 """Public data sets of measured cells: where they come from, where they are on this machine, how to get them.
 
-Nothing measured is part of the package. Some sets are fetched from their public address and checked; the others lie
+The package itself contains no measurements. Some sets are fetched from their public address and checked; the others are
 behind pages that a program cannot follow, so they are listed with their DOI and how to read them.
 """
 
@@ -17,9 +17,9 @@ from aesi.errors import DataAway, DataError, did_you_mean
 from aesi.numerics.files.cache_folder import cache_folder
 
 FOLDER_VARIABLE = "AESI_DATA"
-"""Names a folder of the user's own copies: `<folder>/<set>/` or `<folder>/measured/<set>/`."""
+"""Environment variable with a folder of the user's own copies: `<folder>/<set>/` or `<folder>/measured/<set>/`."""
 SHARED = Path("shared") / "data"
-"""A group's copies, in the working folder or in one above it."""
+"""Folder with a group's copies, in the working folder or in one above it."""
 SUFFIXES = ("", ".csv", ".csv.gz", ".parquet", ".mat", ".bpx.json", ".json")
 
 ABOUT_ENERGY = (
@@ -33,8 +33,9 @@ ABOUT_ENERGY_COLUMNS = {"time_s": "Time [s]", "current_a": "I[A]", "voltage_v": 
 class DataSet:
     """One cell and its tests.
 
-    files : what `get` fetches; empty where a program cannot.  how : to get the set by hand, and to read it.
-    published : name of a record in the path of its file in the archive as published, its groups joined by `_`.
+    files : files that `get` fetches; empty where a program cannot.  how : how to get the set by hand and to read it.
+    published : pattern of a record's name in the path of its file in the published archive; its groups are joined by
+    `_`.
     """
 
     name: str
@@ -47,7 +48,7 @@ class DataSet:
     published: str = ""
 
     def record_of(self, path: PurePath) -> str | None:
-        """Record of a file of the unpacked archive, in lower case but for its `degC`; None of any other file."""
+        """Name of the record in a file of the unpacked archive, in lower case except `degC`; None for other files."""
         match = re.search(self.published, path.as_posix()) if self.published else None
         return None if match is None else "_".join(match.groups()).lower().replace("degc", "degC")
 
@@ -214,9 +215,9 @@ def find_set(name: str) -> DataSet:
 
 
 def get(name: str, out: Path | None = None) -> Path:
-    """The folder of a data set: a copy on this machine, or else fetched, checked and converted.
+    """The folder of a data set: a copy on this machine, or else the files fetched, checked and converted.
 
-    out : a folder to put the files into; without it, a copy is used where it is, or fetched into the cache.
+    out : a folder to put the files into; without it, a copy is used in place, or the files are fetched into the cache.
     Raises DataError where the set is unknown, cannot be fetched by a program, or there is no network.
     """
     one = find_set(name)
@@ -237,7 +238,7 @@ def get(name: str, out: Path | None = None) -> Path:
 
 
 def _named_in_vain(name: str) -> str:
-    """A sentence on a folder of the user's that was looked into and has not all of a set; '' where none is named."""
+    """A sentence that the user's own folder lacks files of a set; '' where no such folder is named."""
     own = os.environ.get(FOLDER_VARIABLE)
     if not own:
         return ""
@@ -248,12 +249,12 @@ def _named_in_vain(name: str) -> str:
 
 
 def locate(name: str, file: str) -> Path:
-    """A file of a data set, with or without its suffix, fetched where it is not on this machine.
+    """The path of a file of a data set, by its name with or without suffix; fetched where it is not on this machine.
 
-    Of a set whose archive is unpacked in its folder also a record by its name there: `n10degC_cycle_2`,
+    In a set whose archive was unpacked, `file` may also be the name of a record: `n10degC_cycle_2`,
     `n20degC_611_mixed3`.
 
-    Raises DataError where there is none, naming those that are there, or where the set cannot be had.
+    Raises DataError where there is no such file, with the names of those there are, or where the set cannot be fetched.
     """
     folder = get(name)
     if Path(file).name != file:
@@ -289,7 +290,7 @@ def _folder(name: str) -> Path | None:
 
 
 def _complete(name: str, folder: Path) -> bool:
-    """Whether all files are there that `get` would fetch, or any file where it fetches none."""
+    """True where the folder has all files that `get` would fetch, or any file where it fetches none."""
     wanted = [remote.name for remote in find_set(name).files]
     if wanted:
         return all((folder / file).is_file() for file in wanted)

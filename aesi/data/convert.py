@@ -1,4 +1,4 @@
-"""Columns written as CSV; a measurement in any format that is read, in this project's columns or in BDF."""
+"""Writing of columns as CSV, and conversion of measurement files to this project's columns or to BDF."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 TIME_DIGITS = 15
-"""What a double holds of any decimal number: a stamp in seconds since 1970 needs ten for its whole seconds alone."""
+"""Significant digits of times, all that a double holds: seconds since 1970 need ten before the decimal point."""
 DIGITS = 10
-"""Of what is written, besides the time: more than any instrument has."""
+"""Significant digits of the other columns: more than any instrument has."""
 WrittenLayout = Literal["aesi", "bdf"]
 BDF_NAMES = {
     "time_s": "Test Time / s",
@@ -36,10 +36,10 @@ BDF_NAMES = {
 
 
 def write_csv(path: Path, table: pd.DataFrame, digits: int = DIGITS) -> None:
-    """Write a table whole, its first column with all digits of its numbers, the others with so many; compressed where
-    the name ends in .gz.
+    """Write a table in one piece; compressed where the name ends in .gz.
 
-    table : the first column is the time in s, or another that rises.  digits : significant ones.
+    table : its first column, the time in s or another that rises, is written with TIME_DIGITS.
+    digits : significant digits of the other columns.
     Raises OSError where the file cannot be written.
     """
     time = table.columns[0]
@@ -58,10 +58,10 @@ def convert_file(
     layout: WrittenLayout = "aesi",
     admit: Callable[[Measurement], None] | None = None,
 ) -> Measurement:
-    """Read `path`, check it as every command does, and write it whole to `out`; returns what was written.
+    """Read `path`, check it as every command does, and write it in one piece to `out`; returns the written measurement.
 
     admit : a further check, which raises before anything is written.
-    Raises DataError where it cannot be used as a measurement, or `out` cannot be written.
+    Raises DataError where `path` cannot be used as a measurement, or `out` cannot be written.
     """
     record = read(path, reading or Reading(), max_rows=None)
     if admit is not None:
@@ -78,7 +78,7 @@ def convert_file(
 
 
 def record_lines(record: Measurement, *, of_cell: bool = False) -> list[str]:
-    """What a record holds, a sentence each, for whoever checks a conversion.  of_cell : it is known to be of a cell."""
+    """Sentences on the content of a record, to check a conversion.  of_cell : the record is known to be of a cell."""
     step = np.diff(record.time_s)
     charge = record.current_a[1:] * step / SECONDS_PER_HOUR
     out, into = float(np.sum(charge[charge > 0])), float(np.sum(-charge[charge < 0]))
@@ -95,7 +95,7 @@ def record_lines(record: Measurement, *, of_cell: bool = False) -> list[str]:
 
 
 def _size_line(record: Measurement) -> list[str]:
-    """What cell the resistance at the steps of the current is of: nothing else in a record tells kA or a C-rate."""
+    """The size of cell that fits the resistance at current steps: nothing else in a record shows kA or a C-rate."""
     columns = {"time_s": record.time_s, "current_a": record.current_a, "voltage_v": record.voltage_v}
     resistance = step_resistance_ohm(columns)
     if resistance is None:

@@ -1,4 +1,4 @@
-"""A current profile on disk, for a simulation or a prediction; voltage is welcome, not needed."""
+"""A current profile on disk, for a simulation or a prediction; a voltage is optional."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from aesi.numerics.typing import Array
 class CurrentProfile:
     """time_s, current_a : (n,) s, A (discharge positive).  voltage_v, temperature_degc : (n,) or None.
 
-    notes : what the reader dropped, mapped or turned, one sentence each.
+    notes : one sentence on each thing that the reader dropped, mapped or changed the sign of.
     """
 
     time_s: Array
@@ -32,9 +32,9 @@ class CurrentProfile:
 
 
 def read_current(path: str | Path, reading: Reading | None = None) -> CurrentProfile:
-    """Read time and current, and what else of a measurement is there.
+    """Read time and current, and voltage and temperature where the file has them.
 
-    reading : what is said of the file. A file with a voltage is checked as a measurement.
+    reading : how to read the file. A file with a voltage is checked as a measurement.
     Raises DataError naming file, column and first row.
     """
     told = reading or Reading()
@@ -59,8 +59,8 @@ def read_current(path: str | Path, reading: Reading | None = None) -> CurrentPro
 
 
 def _over_gaps(data: Columns) -> list[str]:
-    """A note on each long way between two rows under a current: of corners of a profile it is meant, of a record rows
-    are missing."""
+    """A note on each long interval between two rows with a current: intended in a profile given by its corners, but in
+    a record rows are missing."""
     time, current = data["time_s"], data["current_a"]
     return [
         f"No rows for {time[k + 1] - time[k]:.6g} s from {time[k]:.10g} s on, where the current runs from "

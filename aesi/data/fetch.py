@@ -14,15 +14,15 @@ from aesi.data.read import Sign, read_measurement
 from aesi.errors import DataAway, DataError
 
 TIMEOUT_S = 30
-"""Of a server that does not answer."""
+"""Seconds after which a server counts as not answering."""
 
 
 @dataclass(frozen=True)
 class Remote:
     """A file at an address.
 
-    name : what it is called here.  sha256 : of the file there.  columns, sign : how to read a measurement
-    to be converted to this project's columns; without columns the file is kept as it is.
+    name : local file name.  sha256 : checksum of the file at the address.  columns, sign : how to read a measurement
+    that is converted to this project's columns; without columns the file is kept as it is.
     """
 
     name: str
@@ -33,7 +33,7 @@ class Remote:
 
 
 def fetch(remote: Remote, folder: Path) -> Path:
-    """The file in the folder, converted.
+    """Path of the file in the folder, after download, check and conversion.
 
     Raises DataError, one sentence, where there is no network, the address answers with an error, the content
     has another checksum, or the folder cannot be written.

@@ -1,4 +1,4 @@
-"""How a file is to be read: what the user says of its columns, units, sign and rows."""
+"""Options for reading a file: the user's statements on its columns, units, sign and rows."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ SUFFIXES = (
     ".ndax",
     ".mat",
 )
-"""Of files, not of what their records are called."""
+"""Suffixes of files that are not part of a record's name."""
 
 
 @dataclass(frozen=True)
 class Reading:
-    """What is said of files; everything else is told by their headers.
+    """The user's statements on files; everything else is taken from their headers.
 
     columns : quantity, or `state`, `cycle`, `step` -> the file's name for it; None leaves out the temperature, or the
         voltage of a current to simulate; a number states the temperature of every row, degC or as `units` says.
     units : quantity -> unit of the file's column (`mA`, `mV`, `ms`, `h`, `K`, `h:m:s`, `date`, a strptime pattern).
-    sign : which direction of the file's current is positive; None: that of the export, else discharge.
-    state_words : words of the state column -> charge, discharge or rest, where they are not known.
-    cycle, step : keep the rows of this number, or of these from:to.  start_s, stop_s : keep rows between.
-    duplicates : which row of several with one stamp to keep; None: the first in a known export, whose cyclers
-        write the end of a step and the start of the next with one stamp; any other file is refused.
+    sign : direction in which the file's current is positive; None: that of the export, else discharge.
+    state_words : word of the state column -> charge, discharge or rest, for words that are not known.
+    cycle, step : keep the rows with this number, or "from:to".  start_s, stop_s : keep the rows between these times, s.
+    duplicates : which of several rows with the same time to keep; None: the first in a known export, whose cyclers
+        write the end of a step and the start of the next with the same time; any other file is refused.
     """
 
     columns: Mapping[str, str | None] = field(default_factory=dict)
@@ -68,11 +68,11 @@ class Reading:
 
     @property
     def selectors(self) -> tuple[str, ...]:
-        """The columns that rows are chosen by."""
+        """The columns by which rows are chosen: cycle, step."""
         return tuple(name for name in ("cycle", "step") if getattr(self, name) is not None)
 
     def but(self, **changes: Any) -> Reading:
-        """The same but for these."""
+        """A copy with these fields changed."""
         return replace(self, **changes)
 
 
@@ -93,7 +93,7 @@ def bounds(name: str, text: str | None) -> tuple[float, float] | None:
 
 
 def record_name(path: str | Path) -> str:
-    """What the record of a file is called: W8_0.5C of W8_0.5C.csv.gz."""
+    """Name of the record in a file: W8_0.5C for W8_0.5C.csv.gz."""
     path = Path(path)
     while path.suffix.lower() in SUFFIXES:
         path = path.with_suffix("")
@@ -101,8 +101,8 @@ def record_name(path: str | Path) -> str:
 
 
 def record_names(paths: Sequence[Path]) -> list[str]:
-    """What the records of several files are called; those of one name have that of their folder in front of it, and of
-    the folders above until no two files are called alike. Files of one folder keep their suffix then."""
+    """Names of the records in several files, all different: equal names get the name of their folder in front, and of
+    the folders above as far as needed. Files of the same folder keep their suffix then."""
     files = [path.resolve() for path in paths]
     names = {file: record_name(file) for file in files}
     beside = Counter((file.parent, name) for file, name in names.items())

@@ -1,12 +1,12 @@
-"""Resampling: fewer or evenly spaced rows, with the charge kept, and averages told apart from samples.
+"""Resampling to fewer or evenly spaced rows, with the charge kept and averages distinguished from samples.
 
 A logger writes a row at the end of an interval: row k's current held over (t[k-1], t[k]]. The average of the
 current over any interval then follows from the charge, which is piecewise linear in time, and the charge
-between two kept stamps is exact. A current that was declared to run straight between rows is taken so
-instead: held over the interval before its row it would come half an interval early. The voltage is taken as
-straight lines between rows; its average over the same interval belongs to that average current (the ohmic
-drop is linear in it). Where rows are no denser than the new step there is nothing to average, and the voltage
-is that at the stamp.
+between two kept stamps is exact. A current that was declared linear between rows is interpolated linearly
+instead: held over the interval before its row it would come half an interval early. The voltage is interpolated
+linearly between rows; its average over an interval belongs to the average current there (the ohmic drop is
+linear in the current). Where rows are no denser than the new step there is nothing to average, and the voltage is
+the value at the stamp.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from aesi.records import Hold, Measurement
 from aesi.records.steps import TOLERANCE, after_gap
 
 DENSE = 0.75
-"""Below this share of the new step the old rows count as denser, and the voltage is averaged."""
+"""Rows closer than this share of the new step count as denser, and the voltage is averaged."""
 AVERAGES, AT_STAMPS = "averaged over each interval", "interpolated between rows"
 MOST_EVEN_ROWS = 20_000_000
-"""A fortnight at 10 Hz and more: beyond, a wrong step is likelier than a wish."""
+"""More than a fortnight at 10 Hz: a request for more rows is more likely a wrong step than intended."""
 
 
 @dataclass(frozen=True, eq=False)
 class BetweenStamps:
-    """The intervals between consecutive new stamps, over a record's old ones.
+    """Averages and samples of a record at new stamps.
 
-    time_s : (n,) old stamps.  stamps_s : (m,) new ones, inside the old range; value j of an average belongs
+    time_s : (n,) s, old stamps.  stamps_s : (m,) s, new stamps, inside the old range. Value j of an average belongs
     to (stamps[j-1], stamps[j]], and value 0 to the first stamp itself.
     """
 
@@ -45,7 +45,7 @@ class BetweenStamps:
         return self._average(np.interp(self.stamps_s, self.time_s, area), first)
 
     def linear(self, values: Array) -> Array:
-        """(m,) averages of a quantity that runs straight between rows, such as a voltage."""
+        """(m,) averages of a quantity that is linear between rows, such as a voltage."""
         step = np.diff(self.time_s)
         area = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * step)])
         k = np.clip(np.searchsorted(self.time_s, self.stamps_s, side="right") - 1, 0, len(step) - 1)
@@ -55,17 +55,17 @@ class BetweenStamps:
         return self._average(at_stamps, self.sampled(values)[0])
 
     def sampled(self, values: Array) -> Array:
-        """(m,) values at the new stamps, on straight lines between rows."""
+        """(m,) values at the new stamps, interpolated linearly between rows."""
         return np.interp(self.stamps_s, self.time_s, values)
 
     @property
     def dense(self) -> bool:
-        """Whether the rows are denser than the stamps, so that there is something to average."""
+        """True where the rows are denser than the stamps, so that there is something to average."""
         return bool(np.median(np.diff(self.time_s)) < DENSE * np.median(np.diff(self.stamps_s)))
 
     def as_voltage(self, values: Array) -> Array:
-        """(m,) as `to_even` brings a measured voltage to the stamps: `linear` of dense rows, else `sampled`. What a
-        model says at the rows is brought there alike, or else the two differ where the model is exact."""
+        """(m,) V, resampled as `to_even` does a measured voltage: `linear` of dense rows, else `sampled`. A model's
+        voltage at the rows is resampled in the same way, or the two would differ even for an exact model."""
         return self.linear(values) if self.dense else self.sampled(values)
 
     def _average(self, area: Array, first: float) -> Array:
@@ -73,37 +73,37 @@ class BetweenStamps:
 
 
 def even_stamps(time_s: Array, dt_s: float) -> Array:
-    """(m,) s: stamps dt_s apart from the first row on, as far as the record goes."""
+    """(m,) s, stamps dt_s apart from the first row to the end of the record."""
     count = int(np.floor((time_s[-1] - time_s[0]) / dt_s * (1 + 1e-12))) + 1
     return np.minimum(time_s[0] + dt_s * np.arange(count), time_s[-1])
 
 
 def is_even(time_s: Array, dt_s: float) -> bool:
-    """Whether the rows already lie dt_s apart."""
+    """True where the rows are already dt_s apart."""
     return bool(np.all(np.abs(np.diff(time_s) - dt_s) <= TOLERANCE * dt_s))
 
 
 def is_sparse(time_s: Array, current_a: Array, dt_s: float) -> bool:
-    """Whether most of the charge flows up to rows with none a step of dt_s before them, so that most of what a current
-    does would be filled in. A rest may be written as seldom as it likes."""
+    """True where most of the charge flows in intervals longer than dt_s, so that most of the current would be
+    interpolated. Rests may have rows at any distance."""
     moved = np.abs(current_a[1:]) * np.diff(time_s)
     return bool(2.0 * moved[after_gap(time_s, dt_s)[1:]].sum() > moved.sum())
 
 
 def off_rows(time_s: Array, stamps_s: Array) -> float:
-    """Steps between a stamp and the row nearest to it, in the mean over the even stamps (m,), m >= 2."""
+    """Mean distance from each of the even stamps (m,), m >= 2, to its nearest row, in steps between stamps."""
     after = np.clip(np.searchsorted(time_s, stamps_s), 1, len(time_s) - 1)
     nearest_s = np.minimum(np.abs(time_s[after] - stamps_s), np.abs(stamps_s - time_s[after - 1]))
     return float(np.mean(nearest_s) / (stamps_s[1] - stamps_s[0]))
 
 
 def to_even(measurement: Measurement, dt_s: float, hold: Hold = "backward") -> Measurement:
-    """The measurement on stamps dt_s apart (s), with a note; itself where it already is.
+    """The measurement at stamps dt_s apart (s), with a note; unchanged where it already is.
 
     Voltage and temperature: interval averages where the rows are denser than dt_s, values at the stamps elsewhere.
-    Current: of hold "backward" interval averages (the charge is kept), of "linear" as the voltage. Raises DataError
-    for a record without rows, and a step that is not positive, that is longer than the record, or that would make more
-    than 20 million rows.
+    Current: interval averages for hold "backward" (the charge is kept), as the voltage for "linear". Raises DataError
+    for a record without rows, and for a step that is not positive, is longer than the record, or would make more than
+    20 million rows.
     """
     time = measurement.time_s
     if not len(time):
@@ -129,7 +129,7 @@ def to_even(measurement: Measurement, dt_s: float, hold: Hold = "backward") -> M
 def decimate(measurement: Measurement, max_rows: int) -> Measurement:
     """At most max_rows rows: averages over runs of consecutive rows, stamped at their ends, with a note.
 
-    Rows behind the last whole run are left out, which the note says too.
+    Rows after the last complete run are left out, which the note states.
     """
     n = len(measurement)
     if max_rows < min(n, 2):
@@ -138,15 +138,15 @@ def decimate(measurement: Measurement, max_rows: int) -> Measurement:
 
 
 def run_within(rows: int, most: int) -> int:
-    """How many rows to average over, so that so many become at most `most` (2 or more)."""
+    """Number of rows to average over, so that `rows` become at most `most` (2 or more)."""
     return 1 if rows <= most else -(-(rows - 1) // (most - 1))
 
 
 def in_runs(measurement: Measurement, run: int) -> Measurement:
-    """`decimate` by the number of rows in each run; itself where that is one.
+    """`decimate` by the number of rows in each run; unchanged where that is one.
 
-    The averages hold since the row before, whatever the rows did: a current that was declared to run straight between
-    them is declared so from then on, which keeps the charge.
+    The averages hold since the row before, whatever the rows did: a current that was declared linear between rows is
+    declared as held from then on, which keeps the charge.
     """
     if run == 1:
         return measurement

@@ -21,15 +21,15 @@ from aesi.records import Spectrum
 LABEL = "spectrum"
 STATES = ("soc", "discharged_ah")
 MOST_AGAIN = 1
-"""Frequencies of one spectrum that come again: one of 27 measured ones has one twice."""
+"""Most frequencies that may occur twice in one spectrum: one of 27 measured spectra has one such frequency."""
 SLOW_HZ = 10.0
-"""Up to it a cell is capacitive: all 27 spectra measured of the Panasonic NCR18650PF are below 1,067 Hz, in each row. A
-cell of a hundred times its size, with the inductance of longer leads, is so some decades lower still."""
+"""Frequency up to which a cell is capacitive. All rows below 1,067 Hz are, in all 27 spectra of the Panasonic
+NCR18650PF. In a cell a hundred times larger, with the inductance of longer leads, that limit is some decades lower."""
 MOST_SOC = 0.01
 MOST_OF_NEXT = 0.1
-"""By which a state may move within a sweep, in state of charge, and as a share of its largest change from one spectrum
-to the next where nothing else tells them apart. Conventions: spectra are taken some per cent apart, and what flows in
-one is thousandths."""
+"""Most that a state may change within a sweep: MOST_SOC in state of charge, and MOST_OF_NEXT as a share of its largest
+change between successive spectra where spectra have no names. Conventions: spectra are taken some per cent of the
+charge apart, and one spectrum moves thousandths of it."""
 DESCRIBED = ("voltage_v", "temperature_degc", *STATES)
 
 
@@ -37,11 +37,10 @@ def read_spectra(path: str | Path) -> tuple[Spectrum, ...]:
     """The spectra of a table with frequency_hz, z_real_ohm, z_imag_ohm, and soc or discharged_ah.
 
     The first three, and the temperature, may have an instrument's names with their units (`freq/Hz`, `Re(Z)/Ohm`,
-    `-Im(Z)/Ohm`, `Temperature/°C`).
-    A spectrum ends where its state changes and the frequencies begin anew, or where the name in a column `spectrum`
-    changes: a state that is counted moves a little in each sweep, and its first row stands for all. The imaginary part
-    is negative where capacitive. voltage_v and temperature_degc are kept where they are there, the temperature as the
-    mean over the rows.
+    `-Im(Z)/Ohm`, `Temperature/°C`). A spectrum ends where its state changes and the frequencies start again, or where
+    the name in a column `spectrum` changes. A coulomb-counted state changes a little within each sweep; its first row
+    is taken for all. The imaginary part is negative where capacitive. voltage_v and temperature_degc are optional; the
+    temperature is averaged over the rows.
     Raises DataError naming file and column.
     """
     table = open_table(path)
@@ -63,9 +62,10 @@ def read_spectra(path: str | Path) -> tuple[Spectrum, ...]:
 
 
 def _columns(table: TableFile) -> dict[str, Array]:
-    """NEEDED in the units of their names, and what there is of DESCRIBED, (rows,) each.
+    """The columns NEEDED, in the units of their names, and those columns of DESCRIBED that exist, (rows,) each.
 
-    Raises DataError for a column that is missing or there twice, for no row, and for what is no number.
+    Raises DataError for a column that is missing or exists twice, for a table without rows, and for a cell that is not
+    a number.
     """
     file, header = table.path.name, list(table.header)
     found = find_impedance(table)
@@ -100,7 +100,7 @@ def _columns(table: TableFile) -> dict[str, Array]:
 
 
 def _check_temperature(columns: dict[str, Array], table: TableFile) -> None:
-    """Raises DataError for a temperature that no cell has: said of a whole spectrum, it would end what comes after."""
+    """Raises DataError for a temperature that no cell has; as a spectrum's mean it would stop all later steps."""
     degc = columns.get("temperature_degc", np.empty(0))
     absurd = np.flatnonzero((degc < COLDEST_DEGC) | (degc > WARMEST_DEGC))
     if absurd.size:
@@ -113,7 +113,7 @@ def _check_temperature(columns: dict[str, Array], table: TableFile) -> None:
 
 
 def _check_capacitive(columns: dict[str, Array], table: TableFile) -> None:
-    """Raises DataError where the imaginary part is positive in all slow rows: written as in a plot of Nyquist, -Im."""
+    """Raises DataError where the imaginary part is positive in all rows up to SLOW_HZ: it is -Im then, as in plots."""
     slow = np.flatnonzero(columns["frequency_hz"] <= SLOW_HZ)
     if slow.size and (columns["z_imag_ohm"][slow] > 0.0).all():
         raise DataError(
@@ -123,8 +123,8 @@ def _check_capacitive(columns: dict[str, Array], table: TableFile) -> None:
 
 
 def _check_swept_once(frequency_hz: Array, pieces: Sequence[slice], table: TableFile) -> None:
-    """Raises DataError where frequencies come again at one state: spectra of several temperatures, or of several days,
-    would be taken for one of their mean temperature."""
+    """Raises DataError where frequencies repeat at one state: spectra of several temperatures or days would be taken
+    for one spectrum at their mean temperature."""
     for rows in pieces:
         _, first = np.unique(frequency_hz[rows], return_index=True)
         again = np.setdiff1d(np.arange(rows.stop - rows.start), first)
@@ -137,8 +137,8 @@ def _check_swept_once(frequency_hz: Array, pieces: Sequence[slice], table: Table
 
 
 def _check_one_state(name: str, state: Array, pieces: Sequence[slice], named: bool, table: TableFile) -> None:
-    """Raises DataError where a state moves within one sweep as from one spectrum to the next: rows of several spectra
-    are mixed then, or each belongs to another."""
+    """Raises DataError where a state changes within one sweep as much as between spectra: then rows of several spectra
+    are mixed, or each row belongs to a different spectrum."""
     change = np.abs(np.diff(state))
     between = max((float(change[rows.start - 1]) for rows in pieces if rows.start), default=np.inf)
     most = MOST_SOC if name == "soc" else np.inf
@@ -157,12 +157,12 @@ def _check_one_state(name: str, state: Array, pieces: Sequence[slice], named: bo
 def _pieces(columns: dict[str, Array], labels: AnyArray | None) -> list[slice]:
     """The rows of each spectrum.
 
-    labels : (rows,) its name, where the file has any.
+    labels : (rows,) name of the spectrum of each row; None where the file has no names.
     """
     way = np.sign(np.diff(columns["frequency_hz"]))
     moved = np.any([np.diff(columns[name]) != 0 for name in STATES if name in columns], axis=0)
     renamed = np.zeros(len(way), dtype=bool) if labels is None else labels[1:] != labels[:-1]
-    cuts, swept = [0], 0.0  # swept: up or down, in the spectrum at hand
+    cuts, swept = [0], 0.0  # swept: direction of the current sweep, 1 up, -1 down, 0 unknown
     for k, step in enumerate(way):
         if renamed[k] or (moved[k] and not _goes_on(way[k:], swept)):
             cuts.append(k + 1)
@@ -173,10 +173,10 @@ def _pieces(columns: dict[str, Array], labels: AnyArray | None) -> list[slice]:
 
 
 def _goes_on(way: Array, swept: float) -> bool:
-    """Whether the next step of the frequencies is one of the sweep at hand, whose way is 0 at its first row. One that
-    comes again in the midst of a sweep begins no other.
+    """True where the next step in frequency continues the current sweep. A frequency that is repeated within a sweep
+    does not start another sweep.
 
-    way : (n,) signs of this and the later steps.
+    way : (n,) signs of this step and the later ones.  swept : direction of the sweep, 0 at its first row.
     """
     if way[0]:
         return not swept or bool(way[0] == swept)

@@ -1,4 +1,4 @@
-"""The direction of a current that is written as a magnitude, from a column that says what the cycler did."""
+"""The direction of a current that is written as a magnitude, from a column with the cycler's state in words."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ DISCHARGE = re.compile(r"^d$|dis|dchg|dch|entl|放电", re.IGNORECASE)
 CHARGE = re.compile(r"^c$|chg|cha|lad|充电", re.IGNORECASE)
 REST = re.compile(r"^[rpso]?$|rest|paus?|idle|ocv|stop?|wait|ruhe|off|finish|搁置|静置", re.IGNORECASE)
 REST_SHARE = 0.01
-"""Of the largest current: less may flow in a row that rests, as an instrument's zero or a slow discharge; for more, the
-word is asked about. A convention."""
+"""Largest current in a row at rest, as a share of the record's largest: an instrument's zero or a slow discharge. A
+larger current makes the word for rest doubtful, which a note says. A convention."""
 
 
 def signs(
     words: Sequence[str], current_a: Array, given: Mapping[str, Direction], file: str, column: str
 ) -> tuple[Array, str]:
-    """(n,) 1 on discharge, -1 on charge, 0 at rest, and a note that says which word was taken for what.
+    """(n,) 1 on discharge, -1 on charge, 0 at rest, and a note on the meaning that each word was given.
 
-    words : (n,) the column's.  current_a : (n,) A, of any sign.  given : word -> direction, as the user says.
-    Raises DataError for a word beside a current whose direction is not known.
+    words : (n,) cells of the column.  current_a : (n,) A, of any sign.  given : word -> direction, as the user states.
+    Raises DataError for a word of unknown meaning in a row with a current.
     """
     for word, said in given.items():
         if said not in get_args(Direction):
@@ -55,13 +55,14 @@ def signs(
 
 
 def turned(current_a: Array, way: Array, time_s: Array, signed: bool) -> tuple[Array, list[str]]:
-    """(n,) A, discharge positive: the sizes of a current with the directions of a column, and notes on what that
-    changes beyond a sign.
+    """(n,) A, discharge positive: the magnitudes of a current with the directions of a column. Also notes on changes
+    beyond a sign.
 
-    current_a : (n,) A, magnitudes, or with a sign of its own where `signed`.  way : (n,) as `signs` gives it.
-    time_s : (n,) s.  A current with a sign keeps it at rest, turned as it is elsewhere; magnitudes at rest become 0.
+    current_a : (n,) A, magnitudes, or with its own sign where `signed`.  way : (n,) directions from `signs`.
+    time_s : (n,) s.  A signed current keeps its value at rest, with its sign changed as elsewhere; magnitudes at rest
+    become 0.
     """
-    result = way * np.abs(current_a)  # an empty cell stays one, at rest too
+    result = way * np.abs(current_a)  # NaN (an empty cell) stays NaN, also at rest
     rest = way == 0
     flows = rest & (np.abs(current_a) > 0)
     notes = []
@@ -84,7 +85,7 @@ def turned(current_a: Array, way: Array, time_s: Array, signed: bool) -> tuple[A
 
 
 def _flow(rows: AnyArray, current_a: Array, time_s: Array) -> str:
-    """'In 1,200 rows up to 0.04 A (22.2 mAh in all)': what flows in some rows, each since the row before it."""
+    """'In 1,200 rows up to 0.04 A (22.2 mAh in all)': current and charge of some rows, each since the row before it."""
     sizes = np.abs(current_a[rows])
     spans_s = np.maximum(np.diff(time_s, prepend=time_s[0]), 0.0)[rows]
     charge_mah = MILLI * float(np.nansum(sizes * spans_s)) / SECONDS_PER_HOUR
@@ -93,9 +94,9 @@ def _flow(rows: AnyArray, current_a: Array, time_s: Array) -> str:
 
 
 def both_ways(words: Sequence[str], current_a: Array) -> bool:
-    """Whether words that are known say charge beside some of the currents and discharge beside others.
+    """True where known words state charge in some rows with a current, and discharge in others.
 
-    words : (n,) a column's.  current_a : (n,) A, of any sign.
+    words : (n,) cells of a column.  current_a : (n,) A, of any sign.
     """
     sizes = np.abs(current_a)
     flows = sizes > REST_SHARE * float(np.nanmax(sizes, initial=0.0))

@@ -1,7 +1,7 @@
-"""Fewer rows for fits: charge is kept, and a pulse stays a pulse at any rate of sampling.
+"""Thinning of records for fits: the charge is kept, and pulses are resolved at any sampling rate.
 
-Drives are averaged over centred windows. Tests of steady currents, pulses and rests, and records with uneven times,
-keep rows that are dense after each step of the current and ever sparser with the time since it.
+Drives are averaged over centred windows. Tests of constant currents, pulses and rests, and records with uneven times,
+keep rows that are dense after each step of the current and sparser with increasing time since it.
 """
 
 from __future__ import annotations
@@ -16,29 +16,29 @@ from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.records import Hold, Measurement
 
 STEP_C_RATE = 0.01
-"""A change of the current by more than this is a step."""
+"""A change of the current between rows by more than this C-rate is a step."""
 STEADY_SHARE = 0.01
-"""Of the rows of a record: one with fewer steps is one of steady currents."""
+"""Share of rows with a step of the current below which a record is one of constant currents."""
 UNEVEN_SHARE = 0.01
-"""Of the rows: averages over equal numbers of rows need equal times between them."""
+"""Share of uneven intervals above which a record is not averaged over equal numbers of rows."""
 
 
 @dataclass(frozen=True)
 class Spacing:
-    """How rows of a steady record thin out: `first_s` s apart after a step of the current, and further on `growth`
-    of the time since that step."""
+    """Distance of the rows of a record of constant currents: `first_s` s directly after a step of the current, later
+    `growth` times the time since that step."""
 
     first_s: float
     growth: float
 
 
 def current_steps(data: Measurement, capacity_ah: float) -> BoolArray:
-    """(n - 1,) True where the current of a row is another than that of the row before."""
+    """(n - 1,) True where the current differs from that of the row before by more than STEP_C_RATE."""
     return np.abs(np.diff(data.current_a)) > STEP_C_RATE * capacity_ah
 
 
 def _steady(data: Measurement, steps: BoolArray) -> bool:
-    """True for a record of steady currents, or of uneven times; False for a drive."""
+    """True for a record of constant currents or of uneven times; False for a drive."""
     gaps = np.diff(data.time_s)
     typical = float(np.median(gaps))
     uneven = float(np.mean(np.abs(gaps - typical) > 0.5 * typical)) > UNEVEN_SHARE
@@ -46,29 +46,26 @@ def _steady(data: Measurement, steps: BoolArray) -> bool:
 
 
 class Averages(Protocol):
-    """Which rows of a finer record one row stands for.
-
-    hold : how the current runs between those rows.
-    """
+    """A rule that averages the n rows of a finer record to m rows."""
 
     @property
     def hold(self) -> Hold:
-        """Of the finer record."""
+        """How the current of the finer record runs between its rows."""
 
     def averages(self, column: Array) -> Array:
-        """(m,) of a column (n,)."""
+        """(m,) averages of a column (n,)."""
 
     def record(self, time_s: Array, current_a: Array) -> tuple[Array, Array]:
-        """(m,) s, A of a time and a current (n,)."""
+        """(time (m,) s, current (m,) A) of a finer time and current (n,)."""
 
 
 @dataclass(frozen=True)
 class Window:
-    """Centred averages over `factor` rows, one every `factor` rows, within each stretch of a record; its first row
-    stays as it is, and its last where another follows.
+    """Centred averages over `factor` rows, one every `factor` rows, within each stretch of a record. The first row of a
+    stretch is kept, and its last row where another stretch follows.
 
-    ends : row at which each stretch ends; those of fewer rows stay as they are.  hold : how the current runs between
-    the rows of the record, also from one stretch to the next.
+    ends : row at which each stretch ends; stretches of at most `factor` rows are kept unchanged.  hold : how the
+    current runs between the rows of the record, also from one stretch to the next.
     """
 
     factor: int
@@ -76,7 +73,7 @@ class Window:
     hold: Hold
 
     def averages(self, column: Array) -> Array:
-        """(m,) of a column (n,)."""
+        """(m,) averages of a column (n,)."""
         weights = np.ones(2 * self._half + 1)
         weights[[0, -1]] = 0.5 if self.factor % 2 == 0 else 1.0
 
@@ -88,7 +85,8 @@ class Window:
         return np.concatenate(self._by_stretch(column, averaged))
 
     def record(self, time_s: Array, current_a: Array) -> tuple[Array, Array]:
-        """(m,) s, A of a time and a current (n,), in straight lines that move its charge from stretch to stretch."""
+        """(time (m,) s, current (m,) A) of a finer time and current (n,); linear between rows, with the charge kept
+        from stretch to stretch."""
         times = self._by_stretch(time_s, lambda stretch: stretch[self._centres(stretch)])
         current = self.averages(current_a)
         if self.hold == "backward":
@@ -118,28 +116,28 @@ class Window:
 class Runs:
     """Averages over successive rows.
 
-    rows : (m,) how many each stands for.  hold : how the current runs between the rows, then and afterwards.
+    rows : (m,) number of rows in each average.  hold : how the current runs between the rows, before and after.
     """
 
     rows: Array
     hold: Hold
 
     def averages(self, column: Array) -> Array:
-        """(m,) of a column (n,)."""
+        """(m,) averages of a column (n,)."""
         return means_of_rows(column, self.rows)
 
     def record(self, time_s: Array, current_a: Array) -> tuple[Array, Array]:
-        """(m,) s, A of a time and a current (n,): one that its logger held since the row before moves the same
-        charge."""
+        """(time (m,) s, current (m,) A) of a finer time and current (n,); the charge of a current with hold "backward"
+        is kept."""
         time = self.averages(time_s)
         return time, _held(time_s, current_a, time) if self.hold == "backward" else self.averages(current_a)
 
 
 @dataclass(frozen=True, eq=False)
 class Averaged(Measurement):
-    """A record whose rows are averages of those of a finer one.
+    """A record whose rows are averages of rows of a finer record.
 
-    finer : that.  window : what was averaged over.  rows : which of the averages these are.
+    finer : the finer record.  window : the averaging rule.  rows : indices of these rows among all averages.
     """
 
     finer: Measurement = field(kw_only=True)
@@ -147,20 +145,20 @@ class Averaged(Measurement):
     rows: IntArray = field(kw_only=True)
 
     def take(self, rows: slice | Array) -> Averaged:
-        """The given rows, of the same finer record."""
+        """The given rows, with the same finer record."""
         return replace(cast(Averaged, super().take(rows)), rows=self.rows[rows])
 
     def with_record(self, time_s: Array, current_a: Array) -> Averaged:
-        """The averages of another time and current of the finer record."""
+        """This record with the averages of another time (s) and current (A) of the finer record."""
         time, current = self.window.record(time_s, current_a)
         return replace(self, time_s=time[self.rows], current_a=current[self.rows])
 
 
 def averaged_over(data: Measurement, step_s: float) -> Measurement:
-    """About one sample in `step_s`: centred averages of current, voltage and temperature over so many rows as are
-    nearest to it at the median interval. None reaches over an interval longer than itself, where rows are missing.
+    """About one row in `step_s`: centred averages of current, voltage and temperature over step_s / (median interval)
+    rows, rounded. No average spans an interval longer than its window, where rows are missing.
 
-    Records of which that is less than two rows, and those no longer than one window, are returned as they are.
+    A record is returned unchanged where that is fewer than two rows, or where it is no longer than one window.
     """
     if len(data) < 2:
         return data
@@ -176,14 +174,15 @@ def averaged_over(data: Measurement, step_s: float) -> Measurement:
 def condensed(
     data: Measurement, capacity_ah: float, longest_s: float, spacing: Spacing, hold: Hold = "backward"
 ) -> tuple[Measurement, Array] | None:
-    """A record of steady currents and rests with few rows where little happens, and how many each stands for.
+    """A record of constant currents and rests with few rows where little changes, and the number of original rows in
+    each. None for a drive, which `averaged_over` thins.
 
-    None for a drive, which `averaged_over` thins.  capacity_ah : what a step of the current is measured by.
-    longest_s : the most that a row may stand for.  hold : how the current runs between the rows, then and afterwards.
-    Rows are dense after a step of the current and ever sparser with the time since it: a pulse stays a pulse, at any
-    rate of sampling. Voltage, temperature and time are averages of the rows that one stands for. So is a current that
-    runs in straight lines ("linear"), as rows at a step stand for themselves; one that its logger held since the row
-    before ("backward") is what moves the charge of the record.
+    capacity_ah : converts STEP_C_RATE to A.  longest_s : longest time that a row may cover.  hold : how the current
+    runs between the rows, before and after.
+    Rows are dense after a step of the current and sparser with increasing time since it, so pulses are resolved at any
+    sampling rate. Voltage, temperature and time are averages over the original rows. So is a current that is linear
+    between rows, since rows at a step are kept; a current held since the row before ("backward") is the one that moves
+    the charge of the record.
     """
     steps = current_steps(data, capacity_ah)
     if not _steady(data, steps):
@@ -198,7 +197,7 @@ def condensed(
     place = np.floor(place + np.maximum(since - even, 0.0) / longest_s)
     opens = first | np.concatenate([[True], np.diff(place) != 0.0])
     opens[[1, -1]] = True
-    # The first row of a current by itself, and the last: between them the steps are exact.
+    # The first and the last row of each current are kept unaveraged, so that the steps between them are exact.
     opens[1:] |= first[:-1]
     opens[:-1] |= first[1:]
     starts = np.flatnonzero(opens)
@@ -226,14 +225,14 @@ def _averaged(data: Measurement, window: Averages) -> Averaged:
 
 
 def _held(time_s: Array, current_a: Array, at_s: Array) -> Array:
-    """(m,) A, held since the time before, that moves the charge of a current (n,) that was held since the row
-    before."""
+    """(m,) A at the times at_s (m,), held since the time before, with the charge of a current (n,) that was held since
+    the row before."""
     charge = np.concatenate([[0.0], np.cumsum(current_a[1:] * np.diff(time_s))])
     current = np.diff(np.interp(at_s, time_s, charge)) / np.diff(at_s)
     return np.concatenate([current_a[:1], current])
 
 
 def means_of_rows(column: Array, rows: Array) -> Array:
-    """(m,) means of a column (n,) over as many successive rows each as `rows` (m,) says."""
+    """(m,) means of a column (n,) over successive runs of `rows` (m,) rows."""
     starts = np.concatenate([[0], np.cumsum(rows[:-1])]).astype(int)
     return np.add.reduceat(column, starts) / rows

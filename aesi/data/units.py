@@ -1,7 +1,7 @@
-"""Units in which files hold the four quantities, and the way from there to s, A, V and degC.
+"""Units of the four quantities in files, and their conversion to s, A, V and degC.
 
 A unit comes from a maker's format, which writes it beside the name, or from the user (`--unit current_a=mA`).
-It is never told from the numbers.
+It is never guessed from the numbers.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ CLOCK_TIME = re.compile(
 
 
 def spelt(quantity: str, text: str) -> str | None:
-    """The unit that a header or a user means by `text`; None where it is none of the quantity's."""
+    """The unit that a header or a user means by `text`; None where it is not a unit of the quantity."""
     plain = text.strip().lower()
     for unit, ways in SPELLINGS.get(quantity, {}).items():
         if plain in ways:
@@ -77,7 +77,7 @@ def spelt(quantity: str, text: str) -> str | None:
 
 
 def declared(quantity: str, text: str) -> str:
-    """A user's unit.  Raises DataError, with those that there are, for an unknown one."""
+    """The unit that a user stated.  Raises DataError, with the known units, for an unknown one."""
     if quantity not in SI:
         raise DataError(f"{quantity!r} has no unit to declare; those that have one: {', '.join(SI)}.")
     if quantity == "time_s" and ("%" in text or text.strip().lower() == DATE):
@@ -90,7 +90,7 @@ def declared(quantity: str, text: str) -> str:
 
 
 def is_text(unit: str) -> bool:
-    """Whether cells in this unit are words (clock times, dates), not numbers."""
+    """True where cells in this unit are text (clock times, dates), not numbers."""
     return unit in (CLOCK, DATE) or "%" in unit
 
 
@@ -102,7 +102,7 @@ def to_si(quantity: str, values: Array, unit: str) -> Array:
 
 
 def clock_to_s(cells: Sequence[str]) -> Array:
-    """(n,) s of '12:34:56.7' or '3d 12:34:56'; empty cells, and what is no such time, become NaN."""
+    """(n,) s of cells such as '12:34:56.7' or '3d 12:34:56'; NaN for empty cells and for other text."""
     seconds = np.full(len(cells), np.nan)
     for row, cell in enumerate(cells):
         found = CLOCK_TIME.fullmatch(cell.strip())
@@ -118,9 +118,9 @@ def clock_to_s(cells: Sequence[str]) -> Array:
 
 
 def dates_to_s(cells: Sequence[str], pattern: str) -> Array:
-    """(n,) s since the first date; pattern : 'date' (ISO 8601) or one of strptime.  NaN for what is no date.
+    """(n,) s since the first date; NaN for a cell that is not a date.
 
-    Raises DataError for what is no pattern.
+    pattern : 'date' (ISO 8601) or a strptime pattern.  Raises DataError for an invalid pattern.
     """
     import pandas as pd
 
@@ -128,7 +128,10 @@ def dates_to_s(cells: Sequence[str], pattern: str) -> Array:
     try:
         # In UTC: a record that runs over a change to summer time holds two offsets, which pandas refuses otherwise.
         stamps = pd.to_datetime(pd.Series(cells).str.strip(), format=form, errors="coerce", utc=True)
-    except (ValueError, re.error) as error:  # of the pattern: a cell that does not follow it is none of these
+    except (
+        ValueError,
+        re.error,
+    ) as error:  # an invalid pattern; a cell that does not match it raises nothing
         raise DataError(
             f"{pattern!r} is no pattern of a date: {error}; give one such as '%d.%m.%Y %H:%M:%S', or date (ISO 8601)."
         ) from None

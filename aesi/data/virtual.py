@@ -1,7 +1,7 @@
-"""The virtual laboratory: measurements of a cell that exists only as PyBaMM's porous-electrode model.
+"""The virtual laboratory: simulated measurements of a cell, by PyBaMM's porous-electrode model.
 
-It stands in where measurements are not public. The cell has all that a DFN has and, on top, effects that an
-extended single-particle model does not know; `DEFAULT_MIX` is what it has unless told otherwise.
+It replaces measurements that are not public. The cell is a DFN with additional effects that an extended
+single-particle model does not contain; `DEFAULT_MIX` are the default ones.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ DEFAULT_MIX = ("ocv_hysteresis", "series_resistance")
 """8 mV of hysteresis on the negative electrode, and contacts that drop 8 mV at 1C."""
 
 DROP_AT_1C_V = 0.008
-"""Of a contact or a film at magnitude 1: of the size of the voltage error of a calibrated model."""
+"""Voltage drop at 1C of a contact or a film at magnitude 1: similar to the voltage error of a calibrated model."""
 PARASITIC_SHARE = 0.005
-"""Of the capacity an hour, at magnitude 1."""
+"""Charge of a parasitic current per hour at magnitude 1, as a share of the capacity."""
 INSTRUMENT = Instrument()
 
 STRENGTHS: dict[str, Callable[[float, float], dict[str, float]]] = {
@@ -48,15 +48,15 @@ STRENGTHS: dict[str, Callable[[float, float], dict[str, float]]] = {
     "particle_size_distribution": lambda m, q: {"negative_spread": 0.3 * m, "positive_spread": 0.3 * m},
     "leakage_current": lambda m, q: {"leak_a": m * PARASITIC_SHARE * q},
 }
-"""Values of a change at a magnitude (1 is typical) in a cell of q ampere-hours."""
+"""Change -> function from magnitude (1 is typical) and capacity q in Ah to the values of the change."""
 
 
 @dataclass(frozen=True)
 class Laboratory:
-    """A cell file, what is changed in it, and the instruments on it.
+    """A cell file, changes to its cell, and the instruments that measure it.
 
-    effects : ids of changes at `magnitude` times their typical strength.  values : of a change, by its id and their
-    names, in place of those.  seed : of the instruments' noise.
+    effects : ids of changes, at `magnitude` times their typical strength.  values : change id -> value name -> value,
+    which replaces the typical one.  seed : seed of the instruments' noise.
     """
 
     bpx: Path
@@ -77,7 +77,7 @@ class Laboratory:
         return Setup(self.bpx, self.model, tuple(self._apply(name) for name in self.effects))
 
     def measure(self, profile: Profile) -> Measurement:
-        """One record: the profile run and written down. The noise depends on the seed and the profile's name.
+        """One record: the simulated profile as the instruments write it. The noise depends on seed and profile name.
 
         Raises DataError or SimulationError as `laboratory.simulator.run` does.
         """
@@ -90,7 +90,7 @@ class Laboratory:
         return self.instrument.write(trace, profile.name, rng, warm, notes)
 
     def _outside(self, name: str, voltage_v: Array) -> tuple[str, ...]:
-        """A note where the voltage leaves the declared window, which a cycler would not let happen."""
+        """A note where the voltage leaves the declared window; a cycler would stop there."""
         low, high = voltage_window_v(self.bpx)
         least, most = float(voltage_v.min()), float(voltage_v.max())
         if low <= least and most <= high:
@@ -144,8 +144,8 @@ def voltage_window_v(bpx: Path) -> tuple[float, float]:
 
 
 def stoichiometry_span(bpx: Path, electrode: str) -> float:
-    """Between the limits that a BPX file states of "Negative electrode" or "Positive electrode". Raises DataError where
-    they cannot be read."""
+    """Maximum minus minimum stoichiometry that a BPX file states for "Negative electrode" or "Positive electrode".
+    Raises DataError where they cannot be read."""
     low, high = (_declared(bpx, f"{end} stoichiometry", electrode) for end in ("Minimum", "Maximum"))
     return high - low
 

@@ -1,1 +1,1 @@
-"""Columns of a file and what they mean: names, units, directions, and what cannot be true of them."""
+"""Columns of a file: their quantities, units and signs, and checks of their values."""

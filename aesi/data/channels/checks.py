@@ -1,7 +1,7 @@
 """Checks of a measurement. Nothing is repaired: each passes, or raises a DataError naming file, column and first row.
 
-The limits are those of one lithium cell, wide enough for anything sold: 0 to 6 V, -60 to 150 degC. Gaps are in
-`aesi.data.channels.gaps`; what only the columns together tell (a unit, a sign) in `aesi.data.channels.implausible`.
+The limits are those of one lithium cell, wide enough for anything sold: 0 to 6 V, -60 to 150 degC. Gaps are checked in
+`aesi.data.channels.gaps`, and units and signs, which need several columns, in `aesi.data.channels.implausible`.
 """
 
 from __future__ import annotations
@@ -18,29 +18,32 @@ from aesi.numerics.typing import Array, BoolArray
 HIGHEST_VOLTAGE_V = 6.0
 """No lithium cell reaches it, and two in series exceed it."""
 LOWEST_TYPICAL_V = 0.5
-"""In the median, of one cell: those of lithium titanate rest at 2 V, and below 1 V nothing is sold."""
+"""Lowest median voltage of one cell: lithium titanate cells rest at 2 V, and no cell below 1 V is sold."""
 HIGHEST_PLAIN_VOLT = 1000.0
-"""A typical voltage above it is one in millivolts."""
+"""A median voltage above this is in millivolts."""
 HIGHEST_CURRENT_A = 20_000.0
-"""Above what any single cell takes; a smaller current in mA is told by `check_scale`."""
+"""More than any single cell takes; a smaller current in mA is found by `check_scale`."""
 ENOUGH_ROWS = 10
-"""From which a voltage that never changes is one that does not answer."""
+"""Number of rows from which a voltage that never changes counts as not measured."""
 ROUNDED_SHARE = 0.2
-"""Of the rows: more that share a stamp with the one before, and differ from it, are a time that was rounded. Cyclers
-write the end of a step and the start of the next with one stamp: 0.4 % of the rows at most in 212 of their files."""
+"""Share of rows above which the time counts as rounded: rows with the stamp of the row before but other values. Cyclers
+write the end of a step and the start of the next with one stamp: at most 0.4 % of the rows in 212 of their files."""
 CLOCK_JUMPS_S = (SECONDS_PER_HOUR, 24 * SECONDS_PER_HOUR)
-"""By which a time of day runs back: the end of daylight saving, and midnight."""
+"""Steps by which a time of day runs back: at the end of daylight saving time, and at midnight."""
 FEW_TURNS = 0.05
-"""Of the steps between rows, those that run back where pieces in order were written one after the other; where the rows
-themselves are out of order it is about half of them. A convention: pieces of twenty rows and more."""
+"""Largest share of intervals that run back in a file of ordered pieces written one after the other. Where the rows
+themselves are unordered it is about half of them. A convention: pieces of twenty rows and more."""
 MOST_RELAXED_V = 0.5
-"""No cell's voltage moves by more without a current: relaxation after a load is some 0.3 V at most."""
+"""No cell's voltage changes by more than this without a current: relaxation after a load is about 0.3 V at most."""
 
 
 @dataclass(frozen=True)
 class Context:
-    """Names for the sentences: the file, each quantity's column there, where a row is, and what unit a column was taken
-    in, SI where none is there."""
+    """Names for messages.
+
+    file : file name.  header : quantity -> column name in the file.  where : row index -> its place in the file.
+    unit : quantity -> unit in which its column was read; SI where absent.
+    """
 
     file: str
     header: Mapping[str, str]
@@ -49,7 +52,7 @@ class Context:
 
     def at(self, quantity: str, row: int) -> str:
         """'drive.csv, row 5 (line 6), column voltage_v'."""
-        name = self.header.get(quantity, quantity)  # a temperature that was stated has no column
+        name = self.header.get(quantity, quantity)  # a stated temperature has no column
         column = quantity if name == quantity else f"{quantity} ({name!r})"
         return f"{self.file}, {self.where(row)}, column {column}"
 
@@ -57,17 +60,17 @@ class Context:
 Columns = dict[str, Array]
 
 OF_MEDIAN = 1.4826
-"""Deviations in the median size of what is normally distributed."""
+"""Standard deviation of a normal distribution over its median absolute deviation."""
 
 
 def scatter_v(voltage_v: Array) -> float:
-    """V, one deviation of what single rows of a voltage (n,) scatter by: of a smooth one, second differences are noise
-    alone, and of one that moves they are more."""
+    """V, standard deviation of the noise of a voltage (n,), from its second differences: they are noise alone where the
+    voltage is smooth, so this overestimates where it moves."""
     return float(np.median(np.abs(np.diff(voltage_v, 2)))) * OF_MEDIAN / np.sqrt(6.0)
 
 
 def check_finite(columns: Columns, context: Context) -> None:
-    """No empty cell, NaN or infinity in any column in use; the first row at fault is named."""
+    """Refuse an empty cell, NaN or infinity in any column in use, naming the first such row."""
     faults = {q: int(np.argmin(np.isfinite(v))) for q, v in columns.items() if not np.all(np.isfinite(v))}
     if not faults:
         return
@@ -82,7 +85,7 @@ def check_finite(columns: Columns, context: Context) -> None:
 
 
 def check_time(time_s: Array, context: Context) -> None:
-    """Time runs forward, and no stamp is there twice."""
+    """Refuse a time that does not increase from row to row."""
     step = np.diff(time_s)
     if np.all(step > 0):
         return
@@ -100,8 +103,7 @@ def check_time(time_s: Array, context: Context) -> None:
 
 
 def check_resolution(columns: Columns, context: Context) -> None:
-    """Refuse stamps that stand for several rows each all along: the time was rounded, and one row of each is a part of
-    what was measured."""
+    """Refuse a time rounded so that several rows share each stamp; one row of each would lose measured data."""
     time_s = columns["time_s"]
     same = np.diff(time_s) == 0
     others = [np.diff(column) != 0 for name, column in columns.items() if name in ("current_a", "voltage_v")]
@@ -119,15 +121,15 @@ def check_resolution(columns: Columns, context: Context) -> None:
 
 
 def _disorder(time_s: Array, step: Array) -> str:
-    """What kind of times run back, and what to do about it, from '; ' on.
+    """The end of a message, with its leading punctuation: why the time runs back, and what to do about it.
 
-    step : (n - 1,) s between the rows of `time_s`, (n,) s.
+    step : (n - 1,) s, intervals of `time_s` (n,) s.
     """
     first = time_s[1:][step < 0]
     back = -float(np.min(step))
     anew = abs(
         float(first[0]) - float(time_s[0])
-    )  # a second test starts where the first did, whatever it lasted
+    )  # a second test starts at the same time as the first, whatever its length
     if len(first) == 1 and any(abs(back - jump) < 0.01 * jump < anew for jump in CLOCK_JUMPS_S):
         return (
             "; it is a clock that was put back, or that starts anew at midnight: give the time since the start of the "
@@ -156,7 +158,7 @@ def _disorder(time_s: Array, step: Array) -> str:
 
 
 def check_ranges(columns: Columns, context: Context) -> None:
-    """Voltage, current and temperature are those of one cell, in V, A and degC."""
+    """Refuse voltages, currents and temperatures that one cell cannot have in V, A and degC."""
     voltage, current = columns["voltage_v"], columns["current_a"]
     typical = float(np.median(voltage))
     if typical > HIGHEST_PLAIN_VOLT:
@@ -202,8 +204,8 @@ def check_ranges(columns: Columns, context: Context) -> None:
 
 
 def _without_an_end(time_s: Array, bad: BoolArray) -> str:
-    """How to read all but the rows at fault, where these are the first or the last ones: a cell that was not, or no
-    longer, connected; from ', ' on."""
+    """The end of a message, from ', ' on: options that leave out bad rows at the beginning or end, where the cell was
+    not connected; '' where bad rows are elsewhere too."""
     good = np.flatnonzero(~bad)
     if good.size < 2 or bad[good[0] : good[-1]].any():
         return ""
@@ -214,7 +216,7 @@ def _without_an_end(time_s: Array, bad: BoolArray) -> str:
 
 
 def check_alive(columns: Columns, context: Context) -> None:
-    """The voltage answers to the current: neither is one value throughout while the other moves."""
+    """Refuse a current of 0 A under a moving voltage, and a constant voltage under a moving current."""
     voltage, current = columns["voltage_v"], columns["current_a"]
     if not current.any() and np.ptp(voltage) > MOST_RELAXED_V:
         raise DataError(

@@ -1,4 +1,4 @@
-"""Which column of a file is which quantity, in what unit and with what sign.
+"""Assignment of a file's columns to quantities, with their units and signs.
 
 Four conventions are known: names given by the user, this project's names, the makers' (`readers.formats`), and the
 battery data format (BDF), https://github.com/battery-data-alliance/battery-data-format, table of required quantities,
@@ -24,7 +24,7 @@ from aesi.errors import DataError
 REQUIRED = ("time_s", "current_a", "voltage_v")
 QUANTITIES = (*REQUIRED, "temperature_degc")
 SELECTORS = ("state", "cycle", "step")
-"""Columns that tell rows apart; they are no part of a measurement."""
+"""Columns by which rows are chosen or signed; they are not part of a measurement."""
 
 BDF = {
     "time_s": ("Test Time / s", "test_time_second"),
@@ -46,16 +46,16 @@ STRANGE_UNITS = {
     "voltage_v": ("kv",),
     "temperature_degc": (),
 }
-"""Units in names that no option converts."""
+"""Units in column names that no option converts."""
 
 
 @dataclass(frozen=True)
 class Mapped:
-    """Position, name and unit of each quantity (and selector) that is there.
+    """Position, name and unit of each quantity (and selector) that was found.
 
-    bdf_current : the current came from a BDF column, so it is positive on charge by definition.
-    maker, maker_sign : of a known export; its sign holds where the user gives none.
-    stated_degc : of every row, where the user gave a number for the temperature and no column.
+    bdf_current : True where the current is a BDF column, so it is positive on charge by definition.
+    maker, maker_sign : maker and current sign of a known export; the sign holds where the user gives none.
+    stated_degc : temperature of every row, where the user gave a number in place of a column.
     """
 
     position: dict[str, int]
@@ -77,14 +77,14 @@ def map_columns(
 ) -> Mapped:
     """Find the quantities among the names of a table's columns.
 
-    columns : quantity or selector -> name, or None to leave it out; goes before the known names. For the temperature
-    also a number, of every row, in degC or the declared unit, where no column is called so.
-    declared : quantity -> unit, as the user says; goes before what names and formats say, but may not contradict a
-    name's unit that is not SI.
-    required : what has to be there; the rest is found where it is.
-    selectors : of `state`, `cycle`, `step`, those that rows are told apart by; a maker's `state` is always found.
-    Raises DataError for an unknown quantity, a name that is missing or there twice, a unit that is not SI and
-    was neither declared nor is a maker's, and one that was declared for a column in another that is not SI.
+    columns : quantity or selector -> name, or None to leave it out; takes precedence over the known names. For the
+    temperature also a number for every row, in degC or the declared unit, where no column has that name.
+    declared : quantity -> unit, as the user states; takes precedence over names and formats, but may not contradict a
+    unit in a name that is not SI.
+    required : quantities that must exist; the others are optional.
+    selectors : those of `state`, `cycle`, `step` by which rows are chosen; a maker's `state` is always looked up.
+    Raises DataError for an unknown quantity, a name that is missing or exists twice, a unit that is not SI and is
+    neither declared nor a maker's, and a declared unit that contradicts one in the name that is not SI.
     """
     told = {q: units.declared(q, u) for q, u in (declared or {}).items()}
     finder = _Finder(table, dict(columns or {}), told, required)
@@ -102,7 +102,7 @@ def map_columns(
 
 
 class _Finder:
-    """Looks quantities up in one table and keeps what it found."""
+    """Looks up quantities in one table and stores the columns found."""
 
     def __init__(
         self,
@@ -126,7 +126,7 @@ class _Finder:
         self._stated_degc: float | None = None
 
     def take(self, quantity: str) -> bool:
-        """Whether the quantity is there; it is taken then. True also where it is left out as asked."""
+        """Find and store the quantity. True where it was found, or where the user left it out."""
         if quantity in self.given:
             name = self.given[quantity]
             if name is None:
@@ -150,7 +150,7 @@ class _Finder:
         return self.of_maker(quantity) or self._of_bdf(quantity)
 
     def _state(self, temperature: float, name: str) -> None:
-        """Take a temperature for all rows, in the unit that was declared."""
+        """Store a temperature for all rows, given in the declared unit."""
         si = units.SI["temperature_degc"]
         unit = self.unit["temperature_degc"] = self._declared.get("temperature_degc", si)
         self._stated_degc = float(units.to_si("temperature_degc", np.array([temperature]), unit)[0])
@@ -158,7 +158,7 @@ class _Finder:
         self.notes.append(f"temperature_degc is {name}{converted} in every row, as stated.")
 
     def missing(self, quantities: list[str]) -> DataError:
-        """The sentence that says what is not there, and the options that would map it."""
+        """The error for missing quantities, with the options that would map them."""
         header = self._table.header
         likely = [name for name in (headers.nearest(q, header) for q in quantities) if name]
         found = f"; the nearest: {', '.join(repr(name) for name in likely)}" if likely else ""
@@ -179,7 +179,7 @@ class _Finder:
         )
 
     def check(self) -> None:
-        """Every column is one quantity's, and a voltage or a temperature that is not used is told of."""
+        """Refuse a column that is used for two quantities; note a voltage or temperature column that is not used."""
         seen: dict[int, str] = {}
         for quantity, place in self.position.items():
             if place in seen and not {quantity, seen[place]} & set(SELECTORS):
@@ -208,12 +208,12 @@ class _Finder:
                 self.notes.append(f"The temperature was taken from column {taken!r}, and not from {others}.")
 
     def _other_temperatures(self, name: str) -> str:
-        """The columns that look like a temperature beside this one, and are not the same in another unit, in words."""
+        """Text that lists the other temperature columns, except this one in another unit."""
         every = headers.temperatures(self._table.header)
         return names_listed(other for other in every if headers.stem(other) != headers.stem(name))
 
     def mapped(self) -> Mapped:
-        """What was found."""
+        """The columns found so far."""
         form = self._table.format
         names = {quantity: self._table.header[place] for quantity, place in self.position.items()}
         if form is not None and self._of_export:
@@ -244,7 +244,7 @@ class _Finder:
         return self._only([i for i, name in enumerate(self._table.header) if name.lower() == quantity])
 
     def of_maker(self, quantity: str) -> bool:
-        """Whether a known export has the quantity; it is taken then."""
+        """Find and store the quantity under its name in a known export; False where it has none."""
         form = self._table.format
         found = form.find(quantity, self._table.header) if form else None
         if found is None:
@@ -282,7 +282,7 @@ class _Finder:
         return self._of_bdf_in_other_units(quantity)
 
     def _of_bdf_in_other_units(self, quantity: str) -> bool:
-        """BDF's own names with another of a quantity's units: 'Test Time / h', 'Current / mA'."""
+        """As `_of_bdf`, under BDF's names with another unit of the quantity: 'Test Time / h', 'Current / mA'."""
         stems = {_plain(label.rpartition("/")[0]) for label in BDF.get(quantity, ()) if "/" in label}
         places = [
             i
@@ -302,7 +302,8 @@ class _Finder:
         return True
 
     def _set_unit(self, quantity: str, known: str) -> None:
-        """The user's unit, that of the line of units, the maker's, or SI; a name that says another is refused."""
+        """Set the unit: the user's, else that of the line of units, the maker's, or SI. Refuse one that contradicts the
+        name."""
         if quantity not in units.SI:
             return
         name = self._table.header[self.position[quantity]]
@@ -324,11 +325,11 @@ class _Finder:
         self.unit[quantity] = unit
 
     def _take_declared(self, quantity: str, said: str | None, known: str) -> None:
-        """A unit that the user declares; one of a column in another by its header is a slip, and refused.
+        """Set a unit that the user declares; refuse one that contradicts the header.
 
-        said : by the header.  SI there is what exports and this project's own names have by default, whatever the
-        column holds, and what checks of the values may find wrong: a note says that it was overruled, as of what is
-        `known` of a maker. Of clock times and dates the cells themselves tell.
+        said : unit in the header. Where that is SI, which exports and this project's own names state by default and
+        checks of the values may find wrong, the declaration holds and a note says so; likewise against a maker's
+        `known` unit. Clock times and dates are recognised by their cells.
         """
         name, unit = self._table.header[self.position[quantity]], self._declared[quantity]
         numbers, though = units.FACTORS[quantity], ""

@@ -1,5 +1,5 @@
-"""Rows that seem to be missing: a sparsely logged rest and a lone row before or after the test are passed over with a
-note, any other gap is refused."""
+"""Missing rows: a sparsely logged rest and a single row long before or after the test get a note, any other gap is
+refused."""
 
 from __future__ import annotations
 
@@ -15,31 +15,33 @@ from aesi.errors import DataError
 from aesi.numerics.typing import Array
 
 GAP_FLOOR_S = 5.0
-"""A gap is an interval longer than this, and than GAP_RATIO times the usual ones of NEIGHBOURS either side and both
-beside it. Loggers that write by change of voltage have intervals of all lengths, the longest two or more in a row."""
+"""A gap is an interval longer than this, than GAP_RATIO times both adjacent intervals, and than GAP_RATIO times the
+usual ones among NEIGHBOURS on either side. Loggers that write on a change of voltage have intervals of all lengths, the
+longest two or more in a row."""
 GAP_RATIO = 10.0
 NEIGHBOURS = 10
 BUNCH_SHARE = 0.25
-"""Of the neighbours, so many may be gaps themselves. A logger that writes a pair of rows at each step, and else slowly,
-has every other one long. Of 322 measured and virtual records, and of 720 that were thinned to rows at a change of
-voltage, only two are refused that the longest neighbour let pass, both thinned of one with an hour missing."""
+"""Share of the neighbouring intervals that may be gaps themselves. In a logger that writes a pair of rows at each step,
+and else slowly, every other interval is long. Of 322 measured and virtual records, and of 720 thinned to rows at a
+change of voltage, only two more are refused than with the longest neighbour as limit, both thinned from one record with
+an hour missing."""
 REST_GAP_S = SECONDS_PER_HOUR
 REST_CURRENT_SHARE = 0.02
-"""A gap is a rest where the current beside it is below this share of the largest and the voltage moved by less than
-REST_VOLTAGE_V."""
+"""A gap is a rest where the currents on both sides are at most this share of the largest and the voltage changes by at
+most REST_VOLTAGE_V."""
 REST_VOLTAGE_V = 0.005
 SUMMER_TIME_S = SECONDS_PER_HOUR
-"""By which clocks are put forward in spring, in a row."""
+"""Step by which clocks are put forward in spring, which looks like a gap."""
 UNTOLD_SHARE = 0.05
-"""Of the charge moved either way: by more may it not depend on how the current runs between the rows. 0.003 at most of
-94 measured records, 0.015 of 19 public exports of six makers; 0.25 where cycles were logged at the ends of their steps
-alone, 0.87 where pulses were logged at theirs."""
+"""Largest share of the charge moved, in both directions, that may depend on how the current runs between the rows. It
+is at most 0.003 in 94 measured records and 0.015 in 19 public exports of six makers, but 0.25 where cycles were logged
+only at the ends of their steps, and 0.87 where pulses were."""
 FEW_RESTS = 3
-"""Told one by one; more are told by their number."""
+"""Up to this number, sparsely logged rests get a note each; more get one note together."""
 
 
 def without_gaps(data: Columns, context: Context, notes: list[str]) -> tuple[Columns, Context]:
-    """Refuse gaps; pass over a rest logged sparsely and a lone row long before or after the test, with a note."""
+    """Refuse gaps; keep a sparsely logged rest and drop a single row long before or after the test, with a note."""
     n = len(data["time_s"])
     kept = np.arange(n)
     rests: list[tuple[float, float]] = []
@@ -64,7 +66,7 @@ def without_gaps(data: Columns, context: Context, notes: list[str]) -> tuple[Col
 
 
 def _rests_told(rests: Sequence[tuple[float, float]]) -> list[str]:
-    """A note on each of few sparsely logged rests (start, length in s), one on many."""
+    """A note on each of up to FEW_RESTS sparsely logged rests (start s, length s), or one note on more of them."""
     if len(rests) <= FEW_RESTS:
         return [
             f"No rows for {length:.6g} s from {start:.10g} s on; the cell rested." for start, length in rests
@@ -77,20 +79,22 @@ def _rests_told(rests: Sequence[tuple[float, float]]) -> list[str]:
 
 
 def find_gaps(columns: Columns) -> list[int]:
-    """Rows k after which rows seem to be missing: an interval much longer than the usual ones around it, also where
-    there are others of the kind among them."""
+    """Rows k after which rows seem to be missing: the interval after k is much longer than the usual ones around it,
+    even where a few of those are gaps too."""
     step = np.diff(columns["time_s"])
     padded = np.pad(step, NEIGHBOURS, constant_values=np.nan)
     around = sliding_window_view(padded, 2 * NEIGHBOURS + 1)
-    beside = np.fmax(around[:, NEIGHBOURS - 1], around[:, NEIGHBOURS + 1])  # NaN of a lone interval
+    beside = np.fmax(
+        around[:, NEIGHBOURS - 1], around[:, NEIGHBOURS + 1]
+    )  # NaN where there is only one interval
     long = np.flatnonzero((step > GAP_FLOOR_S) & (step > GAP_RATIO * beside))
     usual = [_longest_usual(np.delete(around[k], NEIGHBOURS)) for k in long]
     return long[step[long] > GAP_RATIO * np.asarray(usual)].tolist()
 
 
 def _longest_usual(neighbours: Array) -> float:
-    """The longest of the intervals (n,) but for a few that lie beyond GAP_RATIO times the next shorter one; NaN is
-    none."""
+    """The longest of the intervals (n,), without up to BUNCH_SHARE of them that are beyond GAP_RATIO times the next
+    shorter one; NaN is ignored."""
     ordered = np.sort(neighbours[np.isfinite(neighbours)])
     few = int(BUNCH_SHARE * len(ordered))
     leaps = ordered[1:] > GAP_RATIO * ordered[:-1]
@@ -99,13 +103,13 @@ def _longest_usual(neighbours: Array) -> float:
 
 
 def untold_charge(columns: Columns) -> list[str]:
-    """A sentence where the rows lie too far apart for the changes of the current to tell what charge has moved; none of
-    so few rows that its first and last currents alone make such a difference."""
+    """A note where the rows are too far apart around changes of the current to determine the charge moved; none for a
+    record of so few rows that its first and last currents alone make that difference."""
     size, step = np.abs(columns["current_a"]), np.diff(columns["time_s"]) / SECONDS_PER_HOUR
     until, since = float(np.sum(size[:-1] * step)), float(np.sum(size[1:] * step))
     straight = 0.5 * (until + since)
     few = len(size) <= 1.0 / UNTOLD_SHARE
-    if few or abs(since - straight) <= UNTOLD_SHARE * straight:  # either way as far
+    if few or abs(since - straight) <= UNTOLD_SHARE * straight:  # |until - straight| is the same
         return []
     return [
         f"Its rows do not tell the charge that moved: {straight:.3g} Ah either way with the current in straight lines "
@@ -115,7 +119,7 @@ def untold_charge(columns: Columns) -> list[str]:
 
 
 def is_rest(columns: Columns, k: int) -> bool:
-    """Whether the cell simply rested between rows k and k + 1, so that nothing is lost without rows there."""
+    """True where the cell rested between rows k and k + 1, so that missing rows lose nothing."""
     pair = slice(k, k + 2)
     current = columns["current_a"]
     small = REST_CURRENT_SHARE * float(np.max(np.abs(current)))
@@ -127,7 +131,7 @@ def is_rest(columns: Columns, k: int) -> bool:
 
 
 def gap_error(columns: Columns, k: int, context: Context) -> DataError:
-    """The sentence for a gap between rows k and k + 1."""
+    """The error for a gap between rows k and k + 1."""
     time = columns["time_s"]
     last, first = float(time[k]), float(time[k + 1])
     row_s = float(np.median(np.diff(time)))

@@ -1,8 +1,9 @@
-"""Rows that contradict their neighbours: one value that leaps and comes back, or a voltage that goes on elsewhere.
+"""Rows that contradict their neighbours: a single value that jumps and returns (a leap), or a voltage that jumps and
+stays (a jump).
 
-What the current explains is a multiple of what its steps do elsewhere in the record, over the rows beside: it answers
-by more near empty, and loggers write current and voltage a row apart. The figures are of 137 measured and virtual
-records of 5 cells, -20 to 40 degC, at 0.1 to 300 s a row.
+The change of voltage that a current explains is a multiple of (its change over the adjacent rows) x (the resistance at
+steps of the current in the whole record): the response is larger near empty, and loggers write current and voltage a
+row apart. The figures are from 137 measured and virtual records of 5 cells, -20 to 40 degC, at 0.1 to 300 s a row.
 """
 
 from __future__ import annotations
@@ -17,35 +18,37 @@ from aesi.data.channels.implausible import ENOUGH_STEPS, STEP_SHARE
 from aesi.numerics.typing import Array, BoolArray, IntArray
 
 EXPLAINED = 5.0
-"""Times what the steps of the current do elsewhere, that a voltage may answer by. Near empty in the cold it does 8."""
+"""Largest response of the voltage, in multiples of that to steps elsewhere; near empty in the cold it reaches 8."""
 ONE_WAY = 2.0
-"""Times that, of a current that does not come back, and so hardly explains a voltage that does."""
+"""As EXPLAINED, for a current that does not return and so hardly explains a voltage that does."""
 ROWS_BESIDE = 2
-"""Either side of a row, whose currents may explain its voltage."""
+"""Number of rows on either side of a row whose currents may explain its voltage."""
 LEAP_V = 0.1
-"""For one row, beyond what is explained: 0.013 V at most on those records."""
+"""Smallest leap of the voltage for one row beyond the explained change: at most 0.013 V in those records."""
 SLIDES = 2.0
-"""Times the step to the row before, which a voltage may slide by to the next: a knee in rows of 60 s falls by 0.21 V,
-then by 0.35, and rises by 0.68 as the load ends (a virtual LFP cell)."""
+"""Largest ratio of successive steps of a sliding voltage: at a knee in rows of 60 s it falls by 0.21 V, then by 0.35,
+and rises by 0.68 as the load ends (a virtual LFP cell)."""
 UNANSWERED_V = 0.02
-"""Of what the leap of a current would move, beyond EXPLAINED times what the voltage does: 0.0015 V at most there."""
+"""Smallest (leap of the current x resistance) beyond EXPLAINED times the measured response: at most 0.0015 V there."""
 LIKE = 0.5
-"""Share by which a step comes back in the next row, of a current that leaps."""
+"""Smallest ratio of the two steps of a leap of the current, the smaller over the larger."""
 RESOLUTIONS = 3.0
-"""Of the smallest change of the voltage, which may be lost in it."""
+"""Multiple of the voltage's smallest change below which a change may be lost in its resolution."""
 JUMP_V, JUMP_S = 0.8, 60.0
-"""Between two rows no further apart, beyond what is explained: 0.44 V at most where the steps tell a resistance."""
+"""Smallest jump of the voltage between two rows at most JUMP_S apart, beyond the explained change: at most 0.44 V where
+the steps show a resistance."""
 BARE_JUMP_V, BARE_EXPLAINED = 0.35, 20.0
-"""As JUMP_V, where the current hardly moves: 0.16 V at most, within the first 0.1 s of a load."""
+"""As JUMP_V and EXPLAINED, where the current hardly changes: at most 0.16 V, within the first 0.1 s of a load."""
 STILL_JUMP_V, NOISES = 0.04, 10.0
-"""As JUMP_V, where the current stands still over ROWS_BESIDE either side, within STILL_SHARE of its largest: beyond
-STEPS_BESIDE times the steps before and after it, and NOISES deviations of the noise: 0.005 V at most of 128 records."""
+"""As JUMP_V, where the current is constant over ROWS_BESIDE rows on either side, within STILL_SHARE of its largest:
+beyond STEPS_BESIDE times the adjacent steps and NOISES standard deviations of the noise. At most 0.005 V in 128
+records."""
 STILL_SHARE, STEPS_BESIDE = 0.002, 3.0
 
 
 @dataclass(frozen=True, eq=False)
 class Glitches:
-    """Rows, from 0: where the voltage or the current leaps for one row, and before which the voltage jumps."""
+    """Row numbers, from 0.  voltage, current : rows where it leaps.  jumps : rows to which the voltage jumps."""
 
     voltage: IntArray
     current: IntArray
@@ -53,12 +56,12 @@ class Glitches:
 
     @property
     def leaps(self) -> IntArray:
-        """Rows of which a value is not of the cell."""
+        """Rows where the voltage or the current leaps."""
         return np.union1d(self.voltage, self.current)
 
 
 def glitches(columns: Columns) -> Glitches:
-    """The rows of a record that its neighbours contradict."""
+    """The rows of a record that contradict their neighbours."""
     time, current, voltage = columns["time_s"], columns["current_a"], columns["voltage_v"]
     none = np.empty(0, dtype=int)
     if len(time) <= 2 * ROWS_BESIDE:
@@ -69,7 +72,7 @@ def glitches(columns: Columns) -> Glitches:
     rows = _leaping_voltage(current, voltage, ohm, lost)
     if not ohm:
         return Glitches(rows, none, none)
-    # What is left is of the record as it is without a voltage that leaps, whose two steps are no jumps.
+    # Jumps are looked for without the rows where the voltage leaps: the two steps of a leap are no jumps.
     answer = 0.5 * np.abs(voltage[:-2] - 2.0 * voltage[1:-1] + voltage[2:])
     answered = maximum_filter1d(answer, 3, mode="nearest")
     leaping = ohm * _leap(current) > UNANSWERED_V + lost + EXPLAINED * answered
@@ -79,7 +82,7 @@ def glitches(columns: Columns) -> Glitches:
 
 
 def glitch_doubts(found: Glitches, columns: Columns, context: Context) -> list[str]:
-    """A sentence on each kind of glitch, at the first of them."""
+    """A note on each kind of glitch, naming the first one."""
     said = []
     voltage, current, time = columns["voltage_v"], columns["current_a"], columns["time_s"]
     for rows, name, values, unit, words in (
@@ -106,8 +109,8 @@ def glitch_doubts(found: Glitches, columns: Columns, context: Context) -> list[s
 
 
 def _ohm(current: Array, voltage: Array) -> float | None:
-    """By which the voltage answers to the steps of the current, in the median, which a few rows at fault do not move;
-    0 where it does not, None without enough of them."""
+    """Resistance, ohm, >= 0: median over the clear steps of the current, which a few bad rows do not change; None for
+    fewer than ENOUGH_STEPS."""
     rise, answer = np.diff(current), np.diff(voltage)
     size = np.abs(rise)
     small, large = np.minimum(size[:-1], size[1:]), np.maximum(size[:-1], size[1:])
@@ -121,7 +124,7 @@ def _ohm(current: Array, voltage: Array) -> float | None:
 
 
 def _leaping_voltage(current: Array, voltage: Array, ohm: float | None, lost_v: float) -> IntArray:
-    """Rows of a voltage that leaps; where the steps tell no resistance, beside a current that stands still."""
+    """Rows where the voltage leaps; where the steps show no resistance, only those with a constant current."""
     beside = 2 * ROWS_BESIDE + 1
     moved = maximum_filter1d(current, beside, mode="nearest") - minimum_filter1d(
         current, beside, mode="nearest"
@@ -134,9 +137,9 @@ def _leaping_voltage(current: Array, voltage: Array, ohm: float | None, lost_v: 
 
 
 def _jumps(time: Array, current: Array, voltage: Array, ohm: float, lost_v: float) -> IntArray:
-    """Rows after which the voltage goes on elsewhere."""
+    """Rows after which the voltage jumps."""
     padded = np.pad(current, 1, mode="edge")
-    low, high = np.minimum(padded[:-1], padded[1:]), np.maximum(padded[:-1], padded[1:])  # of two rows each
+    low, high = np.minimum(padded[:-1], padded[1:]), np.maximum(padded[:-1], padded[1:])  # of row k - 1 and k
     fall, rise = np.maximum(high[:-2] - low[2:], 0.0), np.maximum(high[2:] - low[:-2], 0.0)
     moved = np.diff(voltage)
     explained = ohm * np.where(moved > 0, fall, rise)
@@ -149,19 +152,19 @@ def _jumps(time: Array, current: Array, voltage: Array, ohm: float, lost_v: floa
 
 
 def _still(current: Array) -> BoolArray:
-    """(n - 1,) between which rows the current stands still, ROWS_BESIDE either side of them included."""
+    """(n - 1,) True for intervals in and around which, ROWS_BESIDE rows on either side, the current is constant."""
     steps = maximum_filter1d(np.abs(np.diff(current)), 2 * ROWS_BESIDE + 1, mode="nearest")
     return np.asarray(steps <= STILL_SHARE * float(np.max(np.abs(current))))
 
 
 def _beside(steps: Array) -> Array:
-    """(n,) the larger of the steps before and after each; infinite at both ends, where one of them is not known."""
+    """(n,) the larger of the magnitudes of the previous and the next step; infinite for the first and the last."""
     size = np.abs(steps)
     return np.maximum(np.append(np.inf, size[:-1]), np.append(size[1:], np.inf))
 
 
 def _there_and_back(current: Array) -> Array:
-    """(n,) A by which the current goes one way and comes back, within ROWS_BESIDE either side of each row."""
+    """(n,) A, largest change of the current that is taken back within ROWS_BESIDE rows on either side of each row."""
     padded, n = np.pad(current, ROWS_BESIDE, mode="edge"), len(current)
     rows = np.stack([padded[k : k + n] for k in range(2 * ROWS_BESIDE + 1)])
     out = np.zeros(n)
@@ -174,9 +177,10 @@ def _there_and_back(current: Array) -> Array:
 
 
 def _leap(values: Array, slides: float = 0.0) -> Array:
-    """(n - 2,) how far each but the first and the last is from both its neighbours, on one side of them.
+    """(n - 2,) distance of each inner value to the nearer of its two neighbours, where both are on the same side; else
+    0.
 
-    slides : times the step before a row, and the one after it, that go the same way and are no leap.
+    slides : multiple of the adjacent steps in the same direction that is subtracted as a slide.
     """
     steps = np.diff(values)
     there, back = steps[:-1], -steps[1:]

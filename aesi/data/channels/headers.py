@@ -1,4 +1,4 @@
-"""Guesses from the names of columns, for the options that error messages propose; no file is read by them."""
+"""Guesses from column names, used only for the options that messages propose."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ UNLIKELY = {
     "state": r"time|of charge|soc",
 }
 WHOLE_TIME = r"total|test|cumul|elapsed"
-"""Of the names of a time: beside one of these a bare 'Time' begins anew with each step."""
+"""Pattern of names of the whole test's time; beside such a column, a plain 'Time' restarts with each step."""
 NO_TEMPERATURE = r"time|/dt|set\b|limit|circuit"
-"""Of the names of what only looks like a temperature."""
+"""Pattern of names that only look like a temperature."""
 RATE_OR_POWER = r"\bc[-_ ]?rate\b|\bpower\b|\bleistung\b"
-"""Of the names of multiples of a current, which is none of them."""
+"""Pattern of names of a C-rate or a power, which are multiples of a current."""
 UNIT = re.compile(
     r"[\[(<]\s*([^\])>]+?)\s*[\])>]\s*$|[/#]\s*([^/#\[\](){}]+?)\s*$|[_ ]\s*([^/_ \[\](){}]+)\s*$"
 )
@@ -37,7 +37,7 @@ UNIT = re.compile(
 def nearest(quantity: str, header: Sequence[str], doubtful: bool = False) -> str | None:
     """The column of the header that most likely holds the quantity, or None.
 
-    doubtful : also one that more likely holds something near it (a step's time, a limit).
+    doubtful : also accept a column that more likely holds a related quantity (a step's time, a limit).
     """
     likely = [name for name in header if quantity in LIKELY and re.search(LIKELY[quantity], plain(name))]
     best = min(likely, key=lambda name: _doubt(quantity, name), default=None)
@@ -45,8 +45,7 @@ def nearest(quantity: str, header: Sequence[str], doubtful: bool = False) -> str
 
 
 def temperatures(header: Sequence[str]) -> list[str]:
-    """The columns that look like temperatures, of the cell or of what is around it, the likeliest of the cell's
-    first."""
+    """The columns that look like temperatures, of cell or surroundings; the most likely cell temperature first."""
     like = [name for name in header if re.search(LIKELY["temperature_degc"], plain(name))]
     return sorted(
         (name for name in like if not re.search(NO_TEMPERATURE, plain(name))),
@@ -57,7 +56,7 @@ def temperatures(header: Sequence[str]) -> list[str]:
 def stem(name: str) -> str:
     """A column's name without its unit."""
     found = UNIT.search(name)
-    # A last word is a unit only where it is one: T_chamber is not T.
+    # The last word is removed only where it is a unit: T_chamber is not T.
     is_unit = found is not None and (found.group(3) is None or _spelt_anywhere(found.group(3)))
     return plain(name[: found.start()] if found is not None and is_unit else name)
 
@@ -67,23 +66,23 @@ def _spelt_anywhere(text: str) -> bool:
 
 
 def unit_in(name: str) -> str:
-    """The unit in a column's name: 'I[mA]', 'Current (mA)', 'Voltage / mV', 'time_ms'; '' without one."""
+    """The unit in a column's name, such as 'I[mA]', 'Current (mA)', 'Voltage / mV', 'time_ms'; '' without one."""
     found = UNIT.search(name)
     return next((text for text in found.groups() if text), "") if found else ""
 
 
 def is_rate_or_power(name: str) -> bool:
-    """Is a column, by its name, what looks like a current and is a multiple of one?"""
+    """True for the name of a column that looks like a current but is a C-rate or a power."""
     return re.search(RATE_OR_POWER, plain(name)) is not None
 
 
 def unit_of(quantity: str, name: str) -> str | None:
-    """The unit of the quantity that a column's name says, as `--unit` takes it; None where it says none."""
+    """The unit of the quantity in a column's name, as `--unit` takes it; None where the name has none."""
     return units.spelt(quantity, unit_in(name))
 
 
 def options(quantities: Iterable[str], header: Sequence[str]) -> str:
-    """The options that map the quantities to the likeliest columns, with their units where these are not SI."""
+    """The options that map the quantities to the most likely columns, with their units where these are not SI."""
     return " ".join(of_column(quantity, nearest(quantity, header) or "NAME") for quantity in quantities)
 
 
@@ -95,7 +94,7 @@ def of_column(quantity: str, name: str) -> str:
 
 
 def _doubt(quantity: str, name: str) -> tuple[bool, bool, int]:
-    """Sorts the likeliest column first."""
+    """Sort key: the most likely column first."""
     text, unit = plain(name), unit_of(quantity, name)
     unlikely = bool(re.search(UNLIKELY[quantity], text))
     of_step = quantity == "time_s" and not re.search(WHOLE_TIME, text)

@@ -1,9 +1,10 @@
-"""What only current, voltage and time together tell: a unit or a sign that was lost on the way.
+"""Checks of units and signs that need current, voltage and time together.
 
-The limits hold for one lithium cell. Shares and volts were set on 342 measured and virtual records, or parts of them,
-as they are and with their signs taken off: those of one direction show at most 1.4 % of contradicting steps and a rise
-of 0.20 V under a held current. With their signs taken off, 52 of the 75 of both directions show 4 % of such steps or
-more and ten others a rise of 1.0 V or more; the rest, nearly all drives in the cold with little braking, are not told.
+The limits hold for one lithium cell. Shares and voltages were set on 342 measured and virtual records, or parts of
+them, with and without the sign of their current. Records of one direction show at most 1.4 % of contradicting steps and
+a rise of 0.20 V under a constant current. Of the 75 records of both directions without their sign, 52 show 4 % of such
+steps or more, and ten others a rise of 1.0 V or more; the rest, nearly all cold drives with little braking, are not
+detected.
 """
 
 from __future__ import annotations
@@ -24,63 +25,68 @@ from aesi.errors import DataError
 from aesi.numerics.typing import Array
 
 HIGHEST_CHARGE_AH = 1_500.0
-"""The largest cells sold hold about 1,000 Ah: more that flows one way is a current in mA."""
+"""More charge in one direction means a current in mA: the largest cells sold hold about 1,000 Ah."""
 LOWEST_RESISTANCE_OHM = 30e-6
-"""Cells of 1,000 Ah have some 150 microohm."""
+"""A smaller resistance at steps means a current in mA: cells of 1,000 Ah have about 150 microohm."""
 HIGHEST_CHARGE_RESISTANCE_OHM_AH = 10.0
-"""Capacity times resistance is 0.05 to 0.8 ohm Ah for 46 of those records: a thousand times more is time in ms."""
+"""A larger charge moved x resistance means time in ms, which makes it a thousand times too large: capacity x resistance
+is 0.05 to 0.8 ohm Ah for 46 of those records."""
 LEAST_CHARGE_RESISTANCE_AH_A = 3e-3
-"""Charge that moved over the current that the resistance would need for the slide of the voltage beyond it: 0.042 and
-more for the 140 of 210 measured records that tell both, and 0.0018 and more for 210 pieces of them of 5 and 10 min, two
-of which are below; with time in hours it is 3,600 times less."""
+"""Least charge moved x resistance over the slide of the voltage (its range without the ohmic drop). It is 0.042 or more
+for the 140 of 210 measured records that show both, and 0.0018 or more for 210 pieces of them of 5 and 10 min, two of
+which are below this limit; with time in hours it is 3,600 times less."""
 MOST_CHARGE_RESISTANCE_AH_A = 20.0
-"""Charge that moved times the resistance, over the slide of the voltage beyond its drop (FLAT_V at the least): 0.022 to
-0.62 on the 34 measured and virtual records whose steps tell a resistance, and a thousand times that with time in ms. A
-potential that is flat all along, of a cell of 0.8 ohm Ah, makes 16."""
+"""Most charge moved x resistance over the slide of the voltage (at least FLAT_V). It is 0.022 to 0.62 in the 34
+measured and virtual records whose steps show a resistance, and a thousand times that with time in ms. A completely flat
+potential of a cell of 0.8 ohm Ah makes 16."""
 FLAT_V = 0.05
-"""The slide that a flat potential is taken to have."""
+"""Slide that is assumed at least, for flat potentials."""
 USUAL_RESISTANCE_OHM_AH = (0.02, 0.9)
-"""Resistance at the steps of the current times the capacity of the cell: 0.024 to 0.85 on those records."""
+"""Range of (resistance at steps of the current) x (capacity of the cell): 0.024 to 0.85 in those records."""
 CLEAR_SLIDE_V = 0.15
-"""Of the voltage without its drop at the resistance, between its 2 % and 98 % quantiles; 0.22 V and more there."""
+"""Smallest slide that is used: range of the voltage without its ohmic drop, between its 2 % and 98 % quantiles. It is
+0.22 V or more in those records."""
 CONTRADICTING_SHARE = 0.04
-"""Above the 1.4 % of right ones; fewer than CONTRADICTING_STEPS say nothing."""
+"""Share of contradicting steps above which the sign is missing: correct records have at most 1.4 %. Fewer than
+CONTRADICTING_STEPS of them are ignored."""
 CONTRADICTING_STEPS = 5
 RISE_V = 0.5
-"""Between the 0.20 V and the 1.0 V above."""
+"""Rise under a constant current from which the sign is missing: between the 0.20 V and the 1.0 V above."""
 RELAXED_S = 30.0
-"""From the beginning of a held current: after a larger one the voltage comes back, by up to 0.45 V within 5 s."""
+"""Time ignored at the beginning of a constant current: after a larger one the voltage recovers by up to 0.45 V in 5
+s."""
 ENOUGH_ROWS = 10
-"""Of a stretch of one current, to tell a trend from noise."""
+"""Rows that a stretch of constant current needs to distinguish a trend from noise."""
 SMALL_SHARE = 0.02
-"""Of the largest current: below, the cell rests."""
+"""Share of the largest current below which the cell rests."""
 FASTEST_SLIDE_S = 30.0
-"""No cell slides by more than SLIDE_V faster than this under a held current: time is then in minutes or hours. Only
-records shorter than SHORT_RECORD_S are asked."""
+"""No cell's voltage slides by more than SLIDE_V faster than this under a constant current: time is then in minutes or
+hours. Only records of at most SHORT_RECORD_S are checked."""
 SLIDE_V = 0.5
 SHORT_RECORD_S = 200.0
 STEP_SHARE = 0.05
-"""A step of the current counts where it is above this share of the largest step; ENOUGH_STEPS of them have to."""
+"""A step of the current counts where it is above this share of the largest step; ENOUGH_STEPS of them are needed."""
 ENOUGH_STEPS = 5
 CLEAR_CORRELATION = 0.5
-"""Of current and voltage steps: beyond it they say which sign the current has. Voltage falls with the current, so
-that measured records lie near -1."""
+"""Magnitude of the correlation of current and voltage steps above which they determine the sign of the current. The
+voltage falls with the current, so measured records are near -1."""
 STRIDES = (1, 3, 10)
-"""Of rows. Where loggers write the two a row apart, what the voltage slides by is all that it does at a step."""
+"""Distances in rows over which steps are taken. Where a logger writes current and voltage a row apart, the step from
+row to row shows only the slide of the voltage."""
 VOLTAGE_TREND_V = 0.05
-"""A voltage that moves by less than this along the test has no trend."""
+"""A voltage that changes by less than this over the test has no trend."""
 TREND_POINTS = 200
-"""Strides that a record is cut into, over which noise averages out."""
+"""Number of strides into which a record is divided, so that noise averages out over each."""
 EXPLAINED_SHARE, UNEXPLAINED_SHARE = 0.25, 0.1
-"""Of what the voltage moves between the means of these strides: explained as by the other sign of the current at least,
-and by the declared one at most. Of 296 measured and virtual records, and 440 simulated ones of smooth currents written
-to 0.1 to 10 mV, none has both; with the other sign 329 of the latter do, the rest are currents that only fall, and some
-that move the voltage by less than its noise."""
+"""Shares of the change of voltage between the means of these strides. The sign is wrong where the opposite sign
+explains more than the first and the declared sign less than the second. Both hold for none of 296 measured and virtual
+records and 440 simulated ones of smooth currents written to 0.1 to 10 mV. With the opposite sign they hold for 329 of
+the latter; the rest are currents that only fall, and some that change the voltage by less than its noise."""
 
 
 def check_scale(columns: Columns, context: Context) -> None:
-    """Refuse a current in mA and a time in ms, hours or minutes: the charge that would have moved, the resistance and
-    the rate of change of the voltage would be those of no cell."""
+    """Refuse a current in mA and a time in ms, hours or minutes: read as A and s, no cell has such a charge, resistance
+    or rate of change of the voltage."""
     time, current = columns["time_s"], columns["current_a"]
     charge = np.concatenate([[0.0], np.cumsum(current[1:] * np.diff(time))]) / SECONDS_PER_HOUR
     moved = float(np.ptp(charge))
@@ -113,11 +119,11 @@ def check_scale(columns: Columns, context: Context) -> None:
 
 
 def _check_slide(columns: Columns, context: Context, moved_ah: float, resistance_ohm: float) -> None:
-    """Refuse a charge that is far too little for the slide of the voltage of a cell of that resistance, or so much that
-    it would have emptied it many times over.
+    """Refuse a charge moved that is far too small for the slide of the voltage and the resistance of the cell, or so
+    large that it would have emptied the cell many times.
 
-    What is too little is judged by the largest resistance over STRIDES: of quick rows, or of a current and a voltage
-    some rows apart, that from row to row holds a part of the drop alone, and the rest looks like a slide.
+    Too small is judged with the largest resistance over STRIDES. In dense rows, or where current and voltage are some
+    rows apart, the resistance from row to row is only a part of it, and the rest of the drop looks like a slide.
     """
     slower = max(filter(None, (step_resistance_ohm(each) for each in _strides(columns))))
     slide, last = _slide_v(columns, slower), len(columns["time_s"]) - 1
@@ -137,16 +143,16 @@ def _check_slide(columns: Columns, context: Context, moved_ah: float, resistance
 
 
 def _slide_v(columns: Columns, resistance_ohm: float) -> float:
-    """V, by which the voltage slides beyond its drop at a resistance."""
+    """Slide of the voltage, V: its range without the ohmic drop, between the 2 % and 98 % quantiles."""
     low, high = np.quantile(columns["voltage_v"] + resistance_ohm * columns["current_a"], [0.02, 0.98])
     return float(high - low)
 
 
 def in_another_unit(context: Context, claim: str, **units_of: str) -> str:
-    """What is wrong with numbers that are no cell's: `claim`, and how to say so; of columns that were not taken in SI,
-    that they were not.
+    """The end of a message on implausible numbers: `claim` and the options that declare the unit; where a column was
+    not read as SI, its declared unit in place of the claim.
 
-    units_of : quantity -> the unit that its numbers rather are in.
+    units_of : quantity -> the unit that its numbers more likely have.
     """
     taken = {quantity: context.unit.get(quantity, units.SI[quantity]) for quantity in units_of}
     other = [
@@ -164,14 +170,14 @@ def _longer_unit(columns: Columns, context: Context) -> str:
 
 
 def step_resistance_ohm(columns: Columns) -> float | None:
-    """ohm, by which the voltage answers to the steps of the current; None where it does not, clearly."""
+    """Resistance at the steps of the current, ohm, > 0; None where their correlation with the voltage is not clear."""
     found = answer_to_steps(columns)
     return -found[0] if found is not None and found[1] < -CLEAR_CORRELATION else None
 
 
 def check_signed(columns: Columns, context: Context, header: Sequence[str]) -> None:
-    """Refuse a current without its sign: one that only discharges (or charges), while the voltage also answers as to
-    the other direction."""
+    """Refuse a current without its sign: it only discharges (or charges), but the voltage also responds as to the other
+    direction."""
     current = columns["current_a"]
     largest = float(np.max(np.abs(current)))
     if largest == 0 or (np.min(current) < -SMALL_SHARE * largest and np.max(current) > SMALL_SHARE * largest):
@@ -190,9 +196,10 @@ def check_signed(columns: Columns, context: Context, header: Sequence[str]) -> N
 
 
 def check_sign(columns: Columns, context: Context, advice: str) -> None:
-    """Discharge lowers the voltage: at steps of the current, or else along the test, or over its strides.
+    """Refuse a current of the wrong sign: the voltage rises on discharge, at steps of the current, or else along the
+    test, or over its strides.
 
-    advice : what the user can do about it, from '; ' on.
+    advice : end of the message, from '; ' on, on what the user can do.
     """
     found = clearest_answer(columns)
     right, other = _explained(columns, -1.0), _explained(columns, 1.0)
@@ -212,11 +219,10 @@ def check_sign(columns: Columns, context: Context, advice: str) -> None:
 
 
 def _tells(answer: tuple[float, float], right: float, other: float) -> bool:
-    """Whether an answer to the steps of the current says which sign it has: clearly, and not against what resistance
-    and capacity together explain. While a charge holds its voltage the current falls by steps of its own, and it is the
-    charge that has moved the voltage.
+    """True where the response to steps of the current determines its sign: it is clear, and agrees with what resistance
+    and capacity together explain. (At constant voltage the current falls in steps, though charge moved the voltage.)
 
-    right, other : as `_explained` gives them, of the sign that was declared and of the other; 0 of too few rows.
+    right, other : `_explained` for the declared and for the opposite sign; 0 where there are too few rows.
     """
     clear = abs(answer[1]) > CLEAR_CORRELATION
     return clear and (right == other or (answer[1] > 0) == (other > right))
@@ -236,7 +242,7 @@ def _check_pace(columns: Columns, context: Context) -> None:
 
 
 def _contradicting_steps(columns: Columns) -> str:
-    """Steps of a larger current to a higher voltage, by their weight; '' where there are none to speak of."""
+    """Text on steps where the voltage moves against the current, by their weight; '' where their share is small."""
     size = np.abs(columns["current_a"])
     rise, answer = np.diff(size), np.diff(columns["voltage_v"])
     clear = np.abs(rise) > STEP_SHARE * np.max(size)
@@ -247,12 +253,12 @@ def _contradicting_steps(columns: Columns) -> str:
         return ""
     share = float(np.sum(weight[wrong])) / total
     if not CONTRADICTING_SHARE < share < 1 - CONTRADICTING_SHARE:
-        return ""  # beyond, the whole record has the other sign, which is another sentence
+        return ""  # above 1 - share, the whole record has the opposite sign, which `check_sign` reports
     return f"{int(np.sum(wrong)):,} of its {int(np.sum(clear)):,} steps move the voltage the other way"
 
 
 def _rise(columns: Columns, context: Context) -> str:
-    """A held current under which the voltage moves the wrong way by more than any cell's warming does."""
+    """Text on a constant current under which the voltage moves the wrong way by more than RISE_V; '' without one."""
     voltage = columns["voltage_v"] * np.sign(np.sum(columns["current_a"]) or 1.0)
     right, wrong, last = 0.0, 0.0, 0
     for rows in _held(columns):
@@ -271,8 +277,8 @@ def _rise(columns: Columns, context: Context) -> str:
 
 
 def _held(columns: Columns) -> list[slice]:
-    """Stretches of rows with one current that is not small, without gaps, long enough to tell: it stays within
-    STEP_SHARE of the largest of what it is at the first of them, so that a slow fall of it is none."""
+    """Stretches of more than ENOUGH_ROWS rows, without gaps, of a constant current that is not small: within STEP_SHARE
+    of the largest current from that of their first row, which excludes a slowly falling current."""
     size = np.abs(columns["current_a"])
     largest = float(np.max(size))
     same = (np.abs(np.diff(size)) <= STEP_SHARE * largest) & (size[1:] > SMALL_SHARE * largest)
@@ -284,7 +290,7 @@ def _held(columns: Columns) -> list[slice]:
 
 
 def _cuts(size: Array, first: int, last: int, band: float) -> list[int]:
-    """Where rows `first` to `last` are cut so that no current is further than `band` from that of its first row."""
+    """Limits of pieces of rows `first` to `last`; in each the current is within `band` of that of its first row."""
     cuts, begun = [first], float(size[first])
     for row, here in enumerate(size[first:last].tolist(), first):
         if abs(here - begun) > band:
@@ -294,7 +300,7 @@ def _cuts(size: Array, first: int, last: int, band: float) -> list[int]:
 
 
 def answer_to_steps(columns: Columns) -> tuple[float, float] | None:
-    """Slope dV/dI in ohm and its correlation over the clear steps of the current; None without enough."""
+    """(slope dV/dI in ohm, correlation) over the clear steps of the current; None for fewer than ENOUGH_STEPS."""
     rise = np.diff(columns["current_a"])
     answer = np.diff(columns["voltage_v"])
     clear = np.abs(rise) > STEP_SHARE * np.max(np.abs(rise), initial=0.0)
@@ -306,21 +312,22 @@ def answer_to_steps(columns: Columns) -> tuple[float, float] | None:
 
 
 def clearest_answer(columns: Columns) -> tuple[float, float] | None:
-    """As `answer_to_steps`, of those of the rows, each of STRIDES apart, that show it best: loggers may write current
-    and voltage some rows apart."""
+    """`answer_to_steps` for the one of STRIDES with the strongest correlation: loggers may write current and voltage
+    some rows apart."""
     found = [answer for answer in map(answer_to_steps, _strides(columns)) if answer is not None]
     return max(found, key=lambda answer: abs(answer[1]), default=None)
 
 
 def _strides(columns: Columns) -> list[Columns]:
-    """The rows each of STRIDES apart."""
+    """The columns with every 1st, 3rd and 10th row (STRIDES)."""
     return [{name: column[::stride] for name, column in columns.items()} for stride in STRIDES]
 
 
 def _trend(columns: Columns) -> float:
-    """How one-sidedly the voltage follows a held current: -1 as it must, 1 as it cannot.
+    """Direction in which the voltage moves under a constant current: -1 always as it must, 1 always the wrong way.
 
-    Looked at row by row and in strides of a two-hundredth, over which noise averages out. 0 without evidence.
+    Computed from row to row and over strides of a two-hundredth of the record, where noise averages out. 0 without
+    evidence.
     """
     stride = max(1, len(columns["time_s"]) // TREND_POINTS)
     both = (_following(columns, slice(None)), _following(columns, slice(None, None, stride)))
@@ -328,7 +335,7 @@ def _trend(columns: Columns) -> float:
 
 
 def _following(columns: Columns, rows: slice) -> float:
-    """Steps and rests do not count: after a pulse the voltage comes back."""
+    """`_trend` over these rows, without steps and rests: after a pulse the voltage recovers."""
     current, voltage = columns["current_a"][rows], columns["voltage_v"][rows]
     size = STEP_SHARE * float(np.max(np.abs(current)))
     held = (np.abs(np.diff(current)) <= size) & (np.abs(current[1:]) > size)
@@ -340,10 +347,10 @@ def _following(columns: Columns, rows: slice) -> float:
 
 
 def _explained(columns: Columns, sign: float) -> float:
-    """Share of what the voltage moves between the means of strides that a resistance and a capacity explain, neither
-    below nought, by which it follows a current of this sign (-1 as declared).
+    """Share of the change of voltage between means of strides that a resistance and a capacity >= 0 explain, with the
+    current in this sign (-1 as declared).
 
-    Of currents without steps: from row to row they move the voltage by less than its last digit.
+    For currents without steps: from row to row they change the voltage by less than its last digit.
     """
     time, current, voltage = columns["time_s"], columns["current_a"], columns["voltage_v"]
     stride = max(1, len(time) // TREND_POINTS)

@@ -1,4 +1,4 @@
-"""From a table to columns in SI, discharge positive, of the rows that were asked for; nothing is checked yet."""
+"""Columns of a table in SI, discharge positive, for the requested rows; their values are not checked here."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from aesi.errors import DataError
 from aesi.numerics.typing import AnyArray, Array
 
 ZERO_SHARE = 0.01
-"""Of the largest current: less below nought is a cycler's zero, no direction."""
+"""Share of the largest current up to which a negative current is the offset of a cycler, not a direction."""
 
 
 def load_columns(
     table: TableFile, reading: Reading, required: tuple[str, ...]
 ) -> tuple[Columns, Context, Mapped, list[str]]:
-    """The quantities of a table, where their rows are, how they were found, and what was done to them."""
+    """(columns, context for messages, mapping of the columns, notes on what was changed)."""
     mapped = map_columns(table, reading.columns, reading.units, required, reading.selectors)
     data = _numbers(table, mapped)
     if len(data["time_s"]) < 2:
@@ -48,7 +48,7 @@ def load_columns(
 
 
 def _numbers(table: TableFile, mapped: Mapped) -> Columns:
-    """All mapped columns but the state, in SI."""
+    """All mapped columns except the state, in SI."""
     wanted = [name for name in mapped.position if name != "state"]
     as_text = [name for name in wanted if units.is_text(mapped.unit.get(name, ""))]
     plain = [name for name in wanted if name not in as_text]
@@ -82,7 +82,7 @@ def _times(table: TableFile, mapped: Mapped, name: str) -> Array:
 
 
 def _orient(table: TableFile, data: Columns, mapped: Mapped, reading: Reading, notes: list[str]) -> None:
-    """Turn the current of `data` discharge-positive, in place, and say where that took a turn."""
+    """Make the current of `data` discharge-positive, in place, and note a change of sign."""
     if reading.state_words and "state" not in mapped.position:
         raise DataError(
             f"{table.path.name}: --state-word says what words of a column mean, and no column is known to say which "
@@ -100,8 +100,8 @@ def _orient(table: TableFile, data: Columns, mapped: Mapped, reading: Reading, n
 def _turned_by_words(
     table: TableFile, data: Columns, mapped: Mapped, reading: Reading, notes: list[str]
 ) -> bool:
-    """Has a column of words, such as `charge`, told which way the current flows? It does where it was asked for, or
-    where the current has no sign of its own."""
+    """Take the direction of the current from a column of words such as `charge`, where the user named one or the
+    current has no sign. True where that was done."""
     current = data["current_a"]
     asked = "state" in reading.columns
     signed = np.nanmin(current, initial=0.0) < -ZERO_SHARE * np.nanmax(np.abs(current), initial=0.0)
@@ -121,7 +121,7 @@ def _turned_by_words(
 
 
 def _turn_by_declaration(data: Columns, mapped: Mapped, reading: Reading, notes: list[str]) -> None:
-    """By what the user declares of the current's sign, or else by what the format or its maker writes."""
+    """Make the current discharge-positive by the sign that the user declares, else by that of the format or maker."""
     if mapped.bdf_current and reading.sign == "discharge-positive":
         notes.append("The current was declared positive on discharge, which BDF's is not; its sign was left.")
         return
@@ -137,7 +137,7 @@ def _turn_by_declaration(data: Columns, mapped: Mapped, reading: Reading, notes:
 
 
 def _check_words(table: TableFile, current: Array, mapped: Mapped, reading: Reading) -> None:
-    """Refuse magnitudes beside words that say both directions, in a column that nobody named or left out."""
+    """Refuse magnitudes where a column of words states both directions and the user neither named nor left it out."""
     name = None if "state" in reading.columns else headers.nearest("state", table.header)
     if name is None or not both_ways(table.read_text((table.header.index(name),))[0], current):
         return
@@ -149,7 +149,7 @@ def _check_words(table: TableFile, current: Array, mapped: Mapped, reading: Read
 
 
 def keep_rows(columns: Columns, context: Context, keep: AnyArray) -> tuple[Columns, Context]:
-    """The rows of an index array, with the file's own row numbers kept for later sentences."""
+    """The rows of an index array; messages keep the row numbers of the file."""
     where = partial(_where_kept, context, keep)
     return {q: v[keep] for q, v in columns.items()}, replace(context, where=where)
 
@@ -184,7 +184,7 @@ def _of_number(
 
 
 def _between_ah(data: Columns, keep: AnyArray) -> float:
-    """Ah that flowed, either way, in rows that are left out between the first and the last one kept."""
+    """Charge, Ah, in both directions, of rows that are left out between the first and the last row kept."""
     hours = np.diff(data["time_s"], prepend=np.nan) / SECONDS_PER_HOUR
     left_out = np.ones(len(hours), dtype=bool)
     left_out[keep] = False
@@ -194,12 +194,12 @@ def _between_ah(data: Columns, keep: AnyArray) -> float:
 
 def _window(data: Columns, context: Context, reading: Reading, notes: list[str]) -> tuple[Columns, Context]:
     if (reading.start_s is None and reading.stop_s is None) or np.isnan(data["time_s"]).all():
-        return data, context  # a row without a time is refused later, by its number
+        return data, context  # a row without a time is refused later, with its number
     low = -np.inf if reading.start_s is None else reading.start_s
     high = np.inf if reading.stop_s is None else reading.stop_s
     time = data["time_s"]
-    keep = np.flatnonzero(~((time < low) | (time > high)))  # a row without a time is not asked away
-    # The times, not an option: options of several names ask for them, and experiment files and Python do.
+    keep = np.flatnonzero(~((time < low) | (time > high)))  # keeps rows without a time
+    # The note names times, not options: they differ between commands, experiment files and Python.
     asked = " ".join(
         [f"from {low:.10g} s on"] * (reading.start_s is not None)
         + [f"up to {high:.10g} s"] * (reading.stop_s is not None)

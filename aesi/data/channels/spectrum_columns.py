@@ -1,5 +1,5 @@
-"""Which column of a file holds frequency, impedance and temperature: under this project's name, or under one that says
-its unit."""
+"""The columns of a file with frequency, impedance and temperature: under this project's names, or under names with
+units."""
 
 from __future__ import annotations
 
@@ -19,34 +19,34 @@ STEMS = {
     "z_real_ohm": r"re ?\(z\)|real ?\(z\)|z ?re(al)?\d?|z'",
     "z_imag_ohm": r"-? ?(im(ag)? ?\(z\)|z ?im?(a?g)?\d?|z'')",
 }
-"""What instruments call them, without the unit; behind a minus it is the negative."""
+"""Instruments' names of the quantities, without units; a leading minus means the negative."""
 UNITS = {
     "frequency_hz": {"hz": 1.0, "khz": 1e3, "mhz": 1e-3},
     "z_real_ohm": {"ohm": 1.0, "ohms": 1.0, "ω": 1.0, "mohm": 1e-3, "mω": 1e-3, "kohm": 1e3, "kω": 1e3},
 }
 UNITS["z_imag_ohm"] = UNITS["z_real_ohm"]
-"""In lower case, and what a value in it is multiplied by; none that begins with a capital M, for mega."""
+"""Unit in lower case -> factor to Hz or ohm; no unit starts with a capital M, for mega."""
 EXAMPLE = "freq/Hz, Re(Z)/Ohm, -Im(Z)/Ohm"
 
 
 def find_impedance(table: TableFile) -> dict[str, tuple[int, float]]:
-    """Position of each of NEEDED that is there, and the factor to Hz or ohm.
+    """Column of NEEDED -> (position, factor to Hz or ohm), for those that exist.
 
-    Raises DataError for one that is there twice, and for one under another name that says no unit.
+    Raises DataError for one that exists twice, and for one under an instrument's name without a unit.
     """
     return _with_factors(table, NEEDED)
 
 
 def find_frequency(table: TableFile) -> tuple[int, float] | None:
-    """Position and factor to Hz of the frequency alone; raises as `find_impedance`."""
+    """(position, factor to Hz) of the frequency, None where there is none; raises as `find_impedance`."""
     return _with_factors(table, NEEDED[:1]).get("frequency_hz")
 
 
 def find_temperature(table: TableFile) -> tuple[int, str] | None:
-    """Position and unit of the cell's temperature; None where no column looks like one.
+    """(position, unit) of the cell's temperature; None where no column looks like one.
 
-    Raises DataError where it cannot be told which is the cell's, or in what unit it is: nothing else says at what
-    temperature a spectrum was taken, and a model at another is off by tens of per cent.
+    Raises DataError where the column or its unit is ambiguous: nothing else shows the temperature of a spectrum, and a
+    model at another one is wrong by tens of per cent.
     """
     if "temperature_degc" in table.header:
         own = [place for place, name in enumerate(table.header) if name == "temperature_degc"]
@@ -99,7 +99,7 @@ def _found(table: TableFile, quantity: str) -> tuple[int, float | None] | None:
 
 
 def _stem_and_unit(table: TableFile, place: int) -> tuple[str, str]:
-    """A column's name without its unit, in lower case, and the unit that stands in it or in the line of units."""
+    """(name of a column without its unit, in lower case; the unit in the name or in the line of units)."""
     name = table.header[place]
     at = UNIT.search(name)
     inside = next((text for text in at.groups() if text), "") if at else ""
@@ -109,7 +109,7 @@ def _stem_and_unit(table: TableFile, place: int) -> tuple[str, str]:
 
 
 def _lower(text: str) -> str:
-    """In lower case, underscores as blanks; unlike `plain` with the primes of Z' and Z''."""
+    """Text in lower case with blanks for underscores; unlike `plain` it keeps the primes of Z' and Z''."""
     return re.sub(r"[\s_]+", " ", unicodedata.normalize("NFKC", text)).strip().lower()
 
 

@@ -1,4 +1,4 @@
-"""Stamps that a record may have and that more likely are in another unit."""
+"""Times that are possible in s but more likely in another unit."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from aesi.data.channels.checks import Columns
 from aesi.numerics.typing import Array
 
 QUICKEST_S = 5e-3
-"""Between rows, in the median: the measured records come at 10 rows a second at most. Rows a second apart whose time is
-in hours come every 0.28 ms, rows ten seconds apart every 2.8 ms."""
+"""Median interval below which a note is given: measured records have at most 10 rows a second. With time in hours, rows
+one second apart seem 0.28 ms apart, and rows ten seconds apart 2.8 ms."""
 SERIAL_DAYS = (20_000.0, 80_000.0)
-"""Since 1900, in which spreadsheets write dates: of 1954 to 2119. A convention."""
+"""Dates as spreadsheets write them, in days since 1900: 1954 to 2119. A convention."""
 LONGEST_TEST_D = 1000.0
-"""No test of stamps in such days is longer."""
+"""Longest test with times in such days."""
 
 
 def longer_unit(time_s: Array) -> str:
-    """Of stamps that are too close for seconds, the unit that they rather are in, as `--unit time_s=` takes it."""
+    """The more likely unit of times (n,) that are too close for seconds, as `--unit time_s=` takes it."""
     if _of_a_spreadsheet(time_s):
         return "d"
     return "h, min or d"
 
 
 def time_doubts(data: Columns) -> list[str]:
-    """A sentence on rows that come quicker than cyclers write them; none of others."""
+    """A note where rows are closer in time than cyclers write them; else empty."""
     step_s = float(np.median(np.diff(data["time_s"]))) if len(data["time_s"]) > 1 else np.inf
     if step_s >= QUICKEST_S:
         return []

@@ -1,5 +1,5 @@
-"""A voltage that stands still while the current moves, or a current while the voltage does: a sensor that failed, or
-what a cycler holds."""
+"""A voltage that is constant while the current changes, or the reverse: a failed sensor, or a cycler's constant
+voltage."""
 
 from __future__ import annotations
 
@@ -11,41 +11,41 @@ from aesi.errors import DataError
 from aesi.numerics.typing import Array
 
 CLEAR_RESOLUTIONS = 3.0
-"""Of the smallest change of the voltage, and of the current where that is below STEP_SHARE of the largest: less may be
-lost in it. With ENOUGH_STEPS each way a voltage stands still. In 342 measured and virtual records, or parts of them, at
-most four steps each way have no answer at any multiple from 2 to 10, seven at 1. Of voltages of their 96 drives that
-were made to stand still for 60 rows 2, 3 and 5 find 34, 27 and 20 %, for 600 rows 91 %: the cell rests in most of the
-others."""
+"""Multiple of the smallest change of the voltage, and of the current where that is below STEP_SHARE of the largest,
+below which a change may be lost in the resolution. ENOUGH_STEPS unanswered steps in each direction are a stuck voltage.
+In 342 measured and virtual records, or parts of them, at most four steps in each direction are unanswered at any
+multiple from 2 to 10, seven at 1. In their 96 drives, with the voltage held constant for 60 rows, 2, 3 and 5 find 34,
+27 and 20 % of the cases; for 600 rows 91 %: in most of the others the cell rests."""
 HOLD_V = 0.005
-"""Below the highest voltage of a charge (above the lowest of a discharge) a cycler may hold it: the 84 of those charges
-that end so do at most 1.5 mV below."""
+"""Largest distance of a voltage that a cycler holds from the highest of the charge (lowest of the discharge): at most
+1.5 mV in the 84 charges of those records that end at constant voltage."""
 HOLD_SHARE = 0.1
-"""By which share of its largest the current may come back while the voltage is held: by 0.034 in a chamber that sways
-by 3.5 K at -20 degC, and by 0.19 and more in long stretches of braking whose voltage stays within 10 mV."""
+"""Largest increase of the current while a cycler holds the voltage, as a share of its largest value: 0.034 in a chamber
+that varies by 3.5 K at -20 degC, but 0.19 or more in long stretches of braking whose voltage stays within 10 mV."""
 TURN_V = 0.05
-"""By which a voltage rises and falls for a turn to count. Under one current it goes one way: in 137 records no stretch
-of one value of the current has a single turn by 0.01 V. A drive whose current was set to 0 for 1000 s turns 37 times by
-this."""
+"""Rise and fall of the voltage for a turn to count. Under a constant current it is monotonic: in 137 records no stretch
+of one value of the current has a single turn by 0.01 V. A drive whose current was set to 0 for 1000 s has 37 turns by
+TURN_V."""
 STILL_SHARE = 0.01
-"""Of the largest current, within which one stands still, noise and all."""
+"""Range, as a share of the largest current, within which a current counts as constant, with its noise."""
 FOLLOWS = 0.2
-"""Correlation of the steps of current and voltage, over the clearest of three strides, below which one is not the
-other's. Of 99 measured and virtual records whose voltage turns so often it is 0.85 and more; with noise of a dead
-sensor for their current 0.04 at most."""
+"""Correlation of the steps of current and voltage, at the clearest of three strides, below which they do not belong
+together. It is 0.85 or more in 99 measured and virtual records whose voltage turns that often; with the noise of a dead
+sensor as current, at most 0.04."""
 UNANSWERED_SHARE = 0.2
-"""Of the steps of the current that move the voltage elsewhere, at which it has the value of the row before: 0.026 at
-most of those 99 records, and 0.64 and more where every third voltage of them is held for three rows."""
+"""Largest share of clear steps of the current at which the voltage keeps the value of the row before: at most 0.026 in
+those 99 records, and 0.64 or more where every third of their voltages is held for three rows."""
 FAR_ROWS = 3.0
-"""Times the median interval: what the cell did between rows further apart, as those of the rests of a test alone, is
-not known."""
+"""Multiple of the median interval beyond which the current between two rows is not known, as where a file holds only
+the rests of a test."""
 NOISES = 10.0
-"""Times the noise of the voltage, which a turn is beyond."""
+"""Multiple of the noise of the voltage that a turn has to exceed."""
 
 
 def check_dead(columns: Columns, context: Context) -> None:
-    """Refuse a current that stands still, but for noise, throughout a stretch of rows in which the voltage goes up and
-    down: after a load it relaxes, and under a held current slides, one way. And one whose steps do not move a voltage
-    that does: of a sensor that is dead from end to end the noise is all there is."""
+    """Refuse a current that is constant, except for noise, over a stretch of rows in which the voltage rises and falls:
+    after a load and under a constant current it is monotonic. Also refuse a current whose steps are not correlated with
+    those of such a voltage: the noise of a dead sensor."""
     current, voltage, time = columns["current_a"], columns["voltage_v"], columns["time_s"]
     if len(voltage) < ENOUGH_STEPS:
         return
@@ -70,7 +70,7 @@ def check_dead(columns: Columns, context: Context) -> None:
 
 
 def _stands_still(columns: Columns, context: Context, rows: slice, turns: int, least_v: float) -> DataError:
-    """The sentence on a current that stands still while the voltage turns so often by so much."""
+    """The error for a current that is constant while the voltage turns `turns` times by `least_v` V."""
     current, time = columns["current_a"], columns["time_s"]
     begin, end = rows.start, rows.stop - 1
     count = end - begin + 1
@@ -90,7 +90,7 @@ def _stands_still(columns: Columns, context: Context, rows: slice, turns: int, l
 
 
 def _turns(voltage: Array, least_v: float) -> int:
-    """How often a voltage (n,) that has risen by so much falls by so much again, or the other way round."""
+    """Number of times that a voltage (n,) falls by `least_v` after a rise by `least_v`, or the reverse."""
     if np.ptp(voltage) < least_v:
         return 0
     turns, way, low, high = 0, 0, float(voltage[0]), float(voltage[0])
@@ -109,9 +109,9 @@ def _resolution_v(voltage: Array) -> float:
 
 
 def check_stuck(columns: Columns, context: Context) -> None:
-    """Refuse a voltage that stands still while the current goes up and down by what moves it elsewhere.
+    """Refuse a voltage that is constant while the current rises and falls by steps that change it elsewhere.
 
-    A voltage that a cycler holds is one value too: the current is then what answers.
+    A voltage that a cycler holds is accepted.
     """
     voltage, time = columns["voltage_v"], columns["time_s"]
     found, answer = answer_to_steps(columns), np.abs(np.diff(voltage))
@@ -136,7 +136,7 @@ def check_stuck(columns: Columns, context: Context) -> None:
 
 
 def held_doubts(columns: Columns) -> list[str]:
-    """A sentence on a voltage that is written less often than the current; none of others."""
+    """A note on a voltage that is written less often than the current; else empty."""
     clearest, answer = clearest_answer(columns), np.abs(np.diff(columns["voltage_v"]))
     if clearest is None or clearest[0] >= 0 or not answer.any():
         return []
@@ -154,13 +154,13 @@ def held_doubts(columns: Columns) -> list[str]:
 
 
 def _smallest(moves: Array) -> float:
-    """The smallest of (n,) moves, none below 0, that is none of 0."""
+    """The smallest positive one of changes (n,) >= 0."""
     return float(np.min(moves[moves > 0]))
 
 
 def _is_hold(columns: Columns, rows: slice) -> bool:
-    """Whether a cycler holds the voltage that stands still over these rows: a current of one direction has brought it
-    as far as it came that way, and falls, but for what a chamber that warms and cools the cell makes of it."""
+    """True where a cycler holds the constant voltage of these rows: a current of one direction brought the voltage to
+    its extreme value, and then decreases, except by HOLD_SHARE for changes of the chamber's temperature."""
     current, voltage = columns["current_a"][: rows.stop], columns["voltage_v"]
     way = float(np.sign(current[rows.start]))
     others = np.flatnonzero(way * current <= 0)

@@ -1,4 +1,4 @@
-"""Temperatures that a cell may have and that more likely are those of a sensor at fault, or in another unit."""
+"""Temperatures that are possible but more likely from a faulty sensor or in another unit."""
 
 from __future__ import annotations
 
@@ -9,16 +9,17 @@ from aesi.data import units
 from aesi.data.channels.checks import Columns, Context
 
 WARMEST_START_DEGC = 62.0
-"""Tests of cells are at most at 60 degC; a room is at 68 to 77 degF."""
+"""Initial temperature above which a note is given: cells are tested up to 60 degC; a room has 68 to 77 degF."""
 JUMP_K, JUMP_S = 5.0, 60.0
-"""Between two rows no further apart: the measured records have 3.4 K in 60 s and 0.6 K in a second at most."""
+"""Change between two rows at most JUMP_S apart above which a note is given: measured records change by at most 3.4 K in
+60 s and 0.6 K in a second."""
 
 WORDS = {"degF": "Fahrenheit", "degC": "degC", "K": "kelvin"}
-"""Units of a temperature in words, the one that is mistaken most first."""
+"""Names of the units of temperature, in the order in which they are tried."""
 
 
 def temperature_doubts(data: Columns, context: Context) -> list[str]:
-    """A sentence on a temperature that may be, and is more likely something else; none without a column of it."""
+    """Notes on temperatures that are possible but more likely wrong; empty without a temperature column."""
     if "temperature_degc" not in data or "temperature_degc" not in context.header:
         return []
     temperature_degc, time_s = data["temperature_degc"], data["time_s"]
@@ -50,7 +51,7 @@ def temperature_doubts(data: Columns, context: Context) -> list[str]:
 
 
 def _likely_unit(degc: float, unit: str) -> str | None:
-    """Another unit than that in which a temperature was taken, in which it would be a test's; None without one."""
+    """A unit other than `unit` in which the number would be a usual temperature of a test; None without one."""
     temperature = units.FACTORS["temperature_degc"]
     number = degc / temperature[unit] - units.OFFSETS.get(unit, 0.0)
     for other in WORDS:
