@@ -1,4 +1,4 @@
-"""The catalogue of effects: one file an effect, registered in `catalogue.py`, found by name in `by_name.py`."""
+"""The catalogue of effects: one file per effect, registered in `catalogue.py`, looked up by name in `by_name.py`."""
 
 from aesi.physics.effect import ActiveEffect, Effect
 from aesi.physics.effects.by_name import (

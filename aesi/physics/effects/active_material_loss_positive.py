@@ -2,9 +2,9 @@
 
     a = (1 - loss) a_declared        a reactive area per volume, at the declared particle radius
 
-The material goes with the lithium that it holds at one state of charge, whose stoichiometries stay; full and empty
-follow from their declared rest voltages and the lithium left. A simulation starts from the rest voltage that soc0
-declares.
+The material is lost with the lithium that it holds at one state of charge; the stoichiometries at that state do not
+change. Those of the full and the empty cell follow from their declared rest voltages and the remaining lithium. A
+simulation starts from the rest voltage that the declared cell has at soc0.
 
 Leaves out the change of porosity and conductivity. Holds for isolated or cracked-off particles.
 

@@ -1,9 +1,9 @@
-"""The cell and its surroundings are at another temperature than declared.
+"""Cell and surroundings are at a temperature other than the declared one.
 
     T = T_declared + dT;   D, K, kappa scale with exp(E_a/R (1/T_ref - 1/T)),   U = U_ref + dU/dT (T - T_ref)
 
 Leaves out gradients within the cell. Holds where the cell file declares activation energies, and is refused where it
-declares none. A measured temperature is taken as it is.
+declares none. A measured temperature is used unchanged.
 
 Source: Arrhenius' law as BPX defines it, bpxstandard.com.
 """

@@ -2,8 +2,8 @@
 
     j = j0 (exp(a F eta / R T) - exp(-(1 - a) F eta / R T))      eta = phi_s - phi_e - U, j > 0 delithiates
 
-Leaves out another dependence of j0 on concentrations, which keeps its square roots. Holds for large overpotentials;
-below R T / F the kinetics are linear, and the rate constant alone shows.
+Leaves out the change of j0's dependence on concentrations, which keeps its square roots. Holds for large
+overpotentials; below R T / F the kinetics are linear, and only the rate constant has an effect.
 
 Source: Newman & Thomas-Alyea, Electrochemical Systems, 3rd ed., Wiley 2004, ch. 8.
 """

@@ -1,4 +1,4 @@
-"""Effects by their name: from the catalogue, or from a file of the user's own."""
+"""Look-up of effects by id, in the catalogue and in the user's own files."""
 
 from __future__ import annotations
 
@@ -47,9 +47,10 @@ def known_effects(files: Iterable[str | PathLike[str]] = ()) -> dict[str, Effect
 def selected(
     known: Mapping[str, Effect], only: Iterable[str] = (), without: Iterable[str] = ()
 ) -> dict[str, Effect]:
-    """Of `known` those named, or all but those named; a name may be several with commas between them.
+    """The effects of `known` in `only` (all where it is empty), minus those in `without`; a name may be several ids
+    with commas between them.
 
-    Raises InputError with the nearest match for an unknown id, and for one that is named to be tried and left out.
+    Raises InputError with the nearest match for an unknown id, and for an id in both.
     """
     kept, left_out = (
         {named_effect(name.strip(), known).id for names in given for name in names.split(",")}
@@ -64,9 +65,9 @@ def selected(
 def activated(
     effects: Iterable[tuple[str, Mapping[str, float]]], files: Iterable[str | PathLike[str]] = ()
 ) -> tuple[ActiveEffect, ...]:
-    """Effects by id with their values, in the order given; `files` hold the user's own.
+    """Effects by id with their parameter values, in the order given; `files` hold the user's own.
 
-    Raises InputError for an unknown effect and for one that is named twice, ParameterError for its values.
+    Raises InputError for an unknown effect and for one that is named twice, ParameterError for inadmissible values.
     """
     known = known_effects(files)
     active = tuple(named_effect(name, known).activate(**values) for name, values in effects)
@@ -79,18 +80,18 @@ def activated(
 
 
 def named_effect(name: str, known: Mapping[str, Effect]) -> Effect:
-    """One of `known`.  Raises InputError with the nearest match for an unknown id."""
+    """The effect of that id in `known`.  Raises InputError with the nearest match for an unknown id."""
     if name in known:
         return known[name]
     raise InputError(no_such_effect(name, known))
 
 
 def load_effect(path: str | PathLike[str]) -> Effect:
-    """An effect of the user's own: runs the Python file at `path`, which has to define `EFFECT`.
+    """The user's own effect: runs the Python file at `path`, which has to define `EFFECT`.
 
-    The file is code and is run as such; name only files that you trust. As long as it holds the same, the effect is the
-    same object.
-    Raises InputError where there is no such file, no Effect in it, or one that could not be named, shown or called.
+    The file is executed as code; name only files that you trust. While its content is unchanged, the same object is
+    returned.
+    Raises InputError where there is no such file, no Effect in it, or an Effect that fails `check_own`.
     """
     file = Path(path).resolve()
     if not file.is_file():
@@ -109,9 +110,9 @@ def _load(path: str, content: bytes) -> Effect:
         raise InputError(f"{path} is not a Python file; an effect file ends in .py.")
     module = importlib.util.module_from_spec(spec)
     try:
-        # Not by the loader, whose kept byte code is told by a time in whole seconds and a size.
+        # Not by the loader: it identifies its cached byte code only by a time in whole seconds and a size.
         exec(spec.loader.source_to_code(content, path), module.__dict__)
-    except (Exception, SystemExit) as error:  # an exit would end the command as if all were done
+    except (Exception, SystemExit) as error:  # SystemExit would end the command as if it had succeeded
         raise InputError(load_failure(path, content, error)) from error
     effect = getattr(module, "EFFECT", None)
     if not isinstance(effect, Effect):
@@ -123,7 +124,7 @@ def _load(path: str, content: bytes) -> Effect:
 
 
 def listing(effects: Iterable[Effect]) -> str:
-    """A line an effect: id, kind, what it is."""
+    """One line per effect: id, kind, summary."""
     return "\n".join(f"{e.id:36s} {e.kind_told:11s} {e.summary}" for e in effects)
 
 
@@ -141,8 +142,8 @@ def describe(effect: Effect) -> str:
 
 
 def saved_effect(active: ActiveEffect) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """An effect as JSON, and the files that have to lie in its folder: a copy of a user's own, which may be edited
-    where it was read, or not be there where the folder is copied to."""
+    """(effect as JSON, file name -> content to store beside it). A user's own effect is stored as a copy: its original
+    may be edited, or be missing where the folder is copied to."""
     content, code = active.to_dict(), active.effect.code
     if code is None:
         return content, {}
@@ -157,7 +158,7 @@ def active_effect(content: Mapping[str, Any], folder: Path | None = None) -> Act
     """
     file = content.get("file")
     if file is not None and folder is not None:
-        file = str(folder / file)  # one that was saved before copies were is an absolute path, which stays
+        file = str(folder / file)  # an absolute path, as saved before copies were kept, stays as it is
     effect = find_effect(str(content["effect"]), file)
     said = content.get("sha256")
     if said is not None and sha256(effect.code or b"").hexdigest() != said:
@@ -169,8 +170,8 @@ def active_effect(content: Mapping[str, Any], folder: Path | None = None) -> Act
 
 
 def _reduced(effect: Effect) -> tuple[Any, ...]:
-    """How an effect travels between processes: by its name, so that what arrives is the catalogue's own; by value
-    where it has no name to be found by."""
+    """How an effect is pickled: by id where it can be looked up, so that unpickling gives the catalogue's object; else
+    by value."""
     if effect.file is None and CATALOGUE.get(effect.id) is not effect:
         by_value = object.__reduce_ex__(effect, 2)
         assert isinstance(by_value, tuple)

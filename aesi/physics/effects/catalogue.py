@@ -1,4 +1,4 @@
-"""The catalogue of effects: one file an effect, registered here."""
+"""The catalogue of effects: one file per effect, registered here."""
 
 from collections.abc import Iterable
 
@@ -36,14 +36,14 @@ from aesi.physics.effects import (
 
 
 class Catalogue(dict[str, Effect]):
-    """Effects by id.  Raises EffectError, with the nearest match, where one is asked for that is not there."""
+    """Effects by id.  Raises EffectError, with the nearest match, for an unknown id."""
 
     def __missing__(self, name: str) -> Effect:
         raise EffectError(no_such_effect(name, self))
 
 
 def no_such_effect(name: object, known: Iterable[str]) -> str:
-    """The sentence on an id that none of the known effects has: which is spelt most like it, else which speak of it."""
+    """The message for an unknown id: the most similar known id, else the effects whose text mentions it."""
     meant = did_you_mean(str(name), known)
     word = str(name).replace("_", " ").lower()
     speaking = [id for id, effect in CATALOGUE.items() if word in effect.summary.lower()]

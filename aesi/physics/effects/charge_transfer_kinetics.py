@@ -2,8 +2,8 @@
 
     j0_i = f_i F K_i,declared sqrt(c_e/c_e0 x (1 - x))        i negative or positive
 
-Leaves out another form of the rate law (asymmetric_kinetics) and its dependence on temperature. Holds at any
-rate; at small currents it cannot be told from a resistance.
+Leaves out a different rate law (asymmetric_kinetics) and its dependence on temperature. Holds at any rate; at small
+currents it cannot be distinguished from a resistance.
 
 Source: scatter of published values, Wang et al., Prog. Energy 4 (2022) 032004, doi:10.1088/2516-1083/ac692c.
 """

@@ -2,9 +2,9 @@
 
     t_true = t_first + (t_logged - t_first) / (1 + skew),   V_read(t) = V_true(t - lag)
 
-Leaves out jitter of single stamps. Holds for a lag that is short against the record; before the first sample and
-behind the last the current is taken as constant. The current stays what it is in its own rows, held or in straight
-lines, and moves the same charge; the voltage is that of instants between them.
+Leaves out jitter of single stamps. Holds for a lag that is short compared with the record; before the first and after
+the last sample the current is taken as constant. The current keeps its rows, held or linear between them, and moves the
+same charge; the voltage is evaluated at instants between the rows.
 
 Source: definition; range from quartz oscillators (100 ppm) to two unsynchronised loggers.
 """
@@ -41,7 +41,7 @@ PARAMETERS = {
 
 
 def true_record(record: Record, *, skew: float, lag_s: float) -> Record:
-    """The record on the cell's own clock, with the instants at which its voltages were in truth there."""
+    """The record on the cell's own clock, with the true instants of its voltages."""
     first = record.time_s[0]
 
     def true_s(logged_s: Array) -> Array:

@@ -2,10 +2,10 @@
 
     D(x) = D_declared(x) exp(b1 (s - 1/2) + b2 ((2 s - 1)**2 - 1/3)),   s = (x - x_min) / (x_max - x_min)
 
-so that b1 is the natural logarithm of D full of lithium over D empty of it, b2 that of the ends over the middle.
+so that b1 is the natural logarithm of D at x_max over D at x_min, and b2 that of D at the ends over D in the middle.
 
-Leaves out staging, hysteresis of D and the thermodynamic factor's own fine structure. Holds within the declared
-stoichiometry limits; a tenth of their span beyond, D stays constant.
+Leaves out staging, hysteresis of D and the fine structure of the thermodynamic factor. Holds within the declared
+stoichiometry limits; further than a tenth of their span beyond them, D is constant.
 
 Source: measured D(x): Ecker et al., J. Electrochem. Soc. 162 (2015) A1836, doi:10.1149/2.0551509jes.
 """
@@ -21,12 +21,12 @@ from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel
 
 POINTS = 129
-"""Of the table that the diffusivity becomes; between them it is linear."""
+"""Number of points of the table of the diffusivity, which is linear between them."""
 BEYOND_LIMITS = 0.1
-"""Of the stoichiometry window: surfaces leave it under load."""
+"""Extension of the table beyond the stoichiometry limits, as a share of their span: surfaces exceed them under load."""
 RANGE = "measured curves span some two orders of magnitude; the slope may go to e**10, so that no steep one is cut off"
 SLOPE, CURVATURE = 10.0, 4.0
-"""Largest size of b1, by RANGE, and of b2, a convention."""
+"""Largest |b1|, by RANGE, and largest |b2|, a convention."""
 
 
 def _parameter(default: float, reach: float, side: str, what: str) -> Parameter:

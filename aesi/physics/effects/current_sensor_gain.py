@@ -27,7 +27,7 @@ PARAMETERS = {
 
 
 def undo_gain(record: Record, *, gain: float) -> Record:
-    """The true current behind the reading."""
+    """The record with the true current, from the reading."""
     return replace(record, current_a=record.current_a / gain)
 
 

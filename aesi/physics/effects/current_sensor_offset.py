@@ -1,9 +1,9 @@
-"""The current sensor reads a constant on top of the true current.
+"""The current sensor reads the true current plus a constant.
 
     I_read = I_true + offset        I > 0 on discharge
 
-Leaves out drift. Holds for a Hall sensor after a change of magnetisation or temperature. The cell
-answers as to a leakage_current of the opposite sign; only the ohmic drop of the leads tells the two apart.
+Leaves out drift. Holds for a Hall sensor after a change of magnetisation or temperature. The cell responds as to a
+leakage_current of the opposite sign; only the ohmic drop of the leads distinguishes the two.
 
 Source: definition; range from zero-current errors of automotive Hall sensors.
 """
@@ -28,7 +28,7 @@ PARAMETERS = {
 
 
 def undo_offset(record: Record, *, offset_a: float) -> Record:
-    """The true current behind the reading."""
+    """The record with the true current, from the reading."""
     return replace(record, current_a=record.current_a - offset_a)
 
 

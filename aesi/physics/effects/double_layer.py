@@ -1,4 +1,4 @@
-"""The double layer at the particles is charged before the reaction takes the current over.
+"""The double layer at the particles carries part of the current until it is charged.
 
     i = i_reaction + C d(phi_s - phi_e)/dt        C per reactive area, each electrode
 
@@ -22,7 +22,7 @@ PARAMETERS = {
 
 
 def add_capacity(model: EspmModel, *, negative_f_m2: float, positive_f_m2: float) -> EspmModel:
-    """The model with double layers beside those of its cell file."""
+    """The model with these double layers added to those of its cell file."""
     return replace(
         model,
         negative=replace(model.negative, double_layer_f_m2=negative_f_m2),

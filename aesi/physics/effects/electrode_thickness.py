@@ -2,12 +2,12 @@
 
     L_i = f_i L_i,declared        i negative or positive; a, porosity and active fraction as declared
 
-A thicker coating holds more (as active_material_loss with a loss of 1 - f, lost at full charge, which has the same
-balance and surface) and has a longer way through solid and electrolyte. The stoichiometries of the full cell stay;
-empty is at the declared rest voltage again.
+A thicker coating holds more lithium (as active_material_loss with a loss of 1 - f at full charge, which has the same
+balance and surface) and has longer paths through solid and electrolyte. The stoichiometries of the full cell do not
+change; the empty cell has the declared rest voltage.
 
-Leaves out the swelling of a running cell. Holds at any rate; below 1C the way through the electrolyte costs too little
-to tell it from active material.
+Leaves out the swelling of a cell in operation. Holds at any rate; below 1C the drop in the electrolyte is too small to
+distinguish it from a change of active material.
 
 Source: definition; teardown thicknesses, Chen et al., J. Electrochem. Soc. 167 (2020) 080534,
 doi:10.1149/1945-7111/ab9050.
@@ -33,7 +33,7 @@ PARAMETERS = {
 
 
 def scale_thicknesses(model: EspmModel, *, negative_factor: float, positive_factor: float) -> EspmModel:
-    """The model with both coatings scaled: the balance of more material, its surface per volume as before."""
+    """The model with both coatings scaled: the balance follows, the surface per volume is unchanged."""
     n, p = model.cell.negative, model.cell.positive
     cell = with_active_material(model.cell, negative_factor, positive_factor)
     cell = cell.with_negative(

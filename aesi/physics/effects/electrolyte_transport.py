@@ -2,8 +2,8 @@
 
     kappa = f_kappa kappa_declared(c),   D_e = f_D D_e,declared(c)
 
-Leaves out a wrong dependence on concentration, transference number and tortuosity of a single layer; a
-tortuosity that is wrong everywhere scales both alike. Holds at any rate; below 1C it looks like a resistance.
+Leaves out a wrong dependence on concentration, transference number and tortuosity of a single layer. A wrong
+tortuosity of all layers scales both by the same factor. Holds at any rate; below 1C it looks like a resistance.
 
 Source: scatter of tortuosities, Landesfeind et al., J. Electrochem. Soc. 163 (2016) A1373,
 doi:10.1149/2.1141607jes.

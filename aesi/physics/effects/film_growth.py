@@ -1,9 +1,10 @@
-"""Film resistance that grows with charge throughput and with time, as a surface film does.
+"""Resistance of a surface film that grows with charge throughput and with time.
 
     V = V_cell - I R_f,   R_f = a Q + b sqrt(t)     Q = integral |I| dt since the start, I > 0 on discharge
 
-Leaves out the charge that growth consumes (see lithium_inventory_loss), its dependence on temperature and voltage, and
-the heat of its drop. Holds for growth that is slow against the record, limited by diffusion (b) or cracking (a).
+Leaves out the charge that growth consumes (see lithium_inventory_loss), the dependence of growth on temperature and
+voltage, and the heat of R_f. Holds for growth that is slow compared with the record, limited by diffusion (b) or
+cracking (a).
 
 Source: sqrt(t): Ploehn, Ramadass & White, J. Electrochem. Soc. 151 (2004) A456, doi:10.1149/1.1644601;
 throughput: Smith et al., Appl. Energy 2012, NREL/CP-5400-53817.
@@ -41,7 +42,7 @@ PARAMETERS = {
 
 
 def film_drop(trace: Trace, *, per_throughput_ohm_ah: float, per_root_time_ohm: float) -> Contribution:
-    """Drop over the film, and its resistance (ohm) as the state `film_ohm`."""
+    """-I R_f (n,) V, and the resistance (n,) ohm as the state `film_ohm`."""
     hours = (trace.time_s - trace.time_s[0]) / SECONDS_PER_HOUR
     resistance = per_throughput_ohm_ah * throughput_ah(trace) + per_root_time_ohm * np.sqrt(hours)
     return Contribution(-trace.current_a * resistance, {"film_ohm": resistance})

@@ -2,9 +2,9 @@
 
     I_reaction = I + I_leak        I_leak > 0 discharges the cell
 
-Leaves out its dependence on voltage and temperature, and its heat (I_leak V, beside self_heating). It is counted in the
-ohmic drop of the leads, which it does not flow through: an error of I_leak R. Holds over a record, where it is
-nearly constant.
+Leaves out its dependence on voltage and temperature, and its heat (I_leak V, in self_heating). I_leak is included in
+the ohmic drop of the leads, although it does not flow through them: an error of I_leak R. Holds over a record, where it
+is nearly constant.
 
 Source: Roth & Doughty, J. Power Sources 128 (2004) 308, doi:10.1016/j.jpowsour.2003.09.068, for
 self-discharge rates.
@@ -30,7 +30,7 @@ PARAMETERS = {
 
 
 def leak(record: Record, *, leakage_a: float) -> Record:
-    """The current that the electrodes carry."""
+    """The record with the current of the electrodes, I + I_leak."""
     return replace(record, current_a=record.current_a + leakage_a)
 
 

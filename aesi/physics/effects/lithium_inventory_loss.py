@@ -1,10 +1,10 @@
-"""Cyclable lithium is gone: the electrodes' windows have shifted against each other.
+"""Cyclable lithium is lost: the stoichiometry windows of the electrodes are shifted against each other.
 
     q_n x_n + q_p x_p = Q_Li - loss Q,   U_p(x_p) - U_n(x_n) = V_full, V_empty       q capacity of an electrode, Ah
 
-Q is the capacity of the cell as the effects named before leave it: the declared one, less what a loss of active
-material took. Stoichiometry windows follow from the declared rest voltages of full and empty; a simulation starts from
-the rest voltage that soc0 declares.
+Q is the capacity of the cell after the effects named before this one: the declared capacity minus that lost with active
+material. The stoichiometry windows follow from the declared rest voltages of the full and the empty cell. A simulation
+starts from the rest voltage that the declared cell has at soc0.
 
 Leaves out the film that consumed the lithium (film_growth). Holds for a cell that still reaches both voltages.
 

@@ -3,11 +3,11 @@
     j = F k (c_Li exp((1 - a) F phi / R T) - c_e exp(-a F phi / R T)),   dc_Li/dt = -area j / F
     phi = phi_s - phi_e against Li/Li+, j > 0 strips, a = 0.65, c_Li per volume of electrode
 
-Shares the electrode's current with intercalation: on charge near phi = 0 some of it plates, and strips on the next
-discharge or at rest, which shows as a plateau.
+Plating shares the electrode's current with intercalation: on charge near phi = 0 some lithium plates. It strips on the
+next discharge or at rest, which shows as a voltage plateau.
 
-Leaves out lithium that becomes inactive and the film it leaves (film_growth, lithium_inventory_loss). Holds for little
-lithium, which does not cover the particles.
+Leaves out lithium that becomes inactive and the film that it leaves (film_growth, lithium_inventory_loss). Holds for
+amounts of lithium that do not cover the particles.
 
 Source: O'Kane et al., J. Electrochem. Soc. 167 (2020) 090540, doi:10.1149/1945-7111/ab90ac.
 """
@@ -19,7 +19,7 @@ from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel, Plating
 
 TRANSFER_COEFFICIENT = 0.65
-"""Of plating; 1 less it of stripping. From the source."""
+"""a of plating, from the source; that of stripping is 1 - a."""
 PARAMETERS = {
     "rate_m_s": Parameter(
         1e-9,

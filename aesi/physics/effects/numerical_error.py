@@ -1,11 +1,11 @@
-"""The declared model's own discretisation: the same equations on a finer basis and with shorter steps.
+"""Discretisation error of the declared model: the same equations on a finer basis and with shorter steps.
 
     orders of projection times n, steps (a row, or the longest explicit step within it) divided by n
 
-Leaves out the error of how the current runs between samples, which is the caller's choice (`hold`). Holds
-always: what refining changes is numerics, not physics, and has to be known before any physics is sought.
+Leaves out the error of interpolating the current between samples, which is the caller's choice (`hold`). Holds always:
+a change under refinement is numerical, not physical, and has to be known before physical effects are sought.
 
-Source: the orders' effect is measured in the reference tests.
+Source: the effect of the orders is measured in the reference tests.
 """
 
 from dataclasses import replace

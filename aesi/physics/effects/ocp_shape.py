@@ -3,11 +3,11 @@
     U_p(z) = U_p,declared(z) + w d(z),   U_n(z) = U_n,declared(z) - (1 - w) d(z)
     d(z) = sum_k a_k sqrt(2) cos(k pi z),  k = 0 (without the sqrt(2)) to 8
 
-z is the state of charge that an electrode's stoichiometry stands for at rest, so that the rest voltage of the cell
-changes by d(z) whatever w is; under load each electrode answers with the z of its own surfaces.
+z is the state of charge at which the cell at rest has an electrode's stoichiometry, so that the rest voltage of the
+cell changes by d(z) for every w. Under load each electrode uses the z of its own surface stoichiometries.
 
 Leaves out features sharper than an eighth of the range. Holds within the declared stoichiometry limits; beyond them d
-stays what it is there.
+is constant.
 
 Source: smooth functions as cosine series of a Gaussian process, Solin & Sarkka, Stat. Comput. 30 (2020) 419,
 doi:10.1007/s11222-019-09886-w; sizes from half-cell to half-cell scatter, Chen et al., J. Electrochem. Soc. 167 (2020)
@@ -26,15 +26,15 @@ from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel
 
 ORDER = 8
-"""Highest wave: LENGTH leaves the next ones nothing to add."""
+"""Highest k: with LENGTH, the expected size of higher ones is negligible."""
 EXPECTED_V = 0.01
-"""Root mean square of d over the range that is expected, V."""
+"""Expected root mean square of d over the range, V."""
 LENGTH = 0.12
 """Share of the range over which d changes; it sets how fast the expected size of a_k falls with k."""
 BOUND_V = 0.06
-"""Of each wave; six times what is expected of all."""
+"""Largest |a_k|, V: six times EXPECTED_V."""
 POINTS = 129
-"""Of the table that the potential's correction becomes."""
+"""Number of points of the table of the potential's correction."""
 
 
 def _expected_v() -> Array:
@@ -77,7 +77,9 @@ def reshape(model: EspmModel, *, positive_share: float, **volts: float) -> EspmM
     p = cell.positive
     return model.with_cell(
         negative=_corrected(cell.negative, (positive_share - 1.0) * change),
-        positive=_corrected(p, positive_share * change[::-1]),  # lithium goes where the charge comes from
+        positive=_corrected(
+            p, positive_share * change[::-1]
+        ),  # its stoichiometry falls with the state of charge
     )
 
 

@@ -3,11 +3,11 @@
     V = V_cell + M(z) h,   dh/dt = -k |I| / Q (h + sign I)     -1 <= h <= 1, I > 0 on discharge, Q nominal capacity
     M(z) = magnitude (1 + low_soc_excess (1 - 2 z))            z state of charge
 
-On a long discharge h goes to -1, on a long charge to +1, at rest it stays.
+On a long discharge h tends to -1, on a long charge to +1; at rest it is constant.
 
-Leaves out minor loops that close faster than the state does, and self-discharge of the state. Holds where the
-open-circuit voltage depends on the direction from which it was reached. A fit may take a magnitude below nought, which
-no cell has, so that a cell without hysteresis is seen from both sides; a negative one that is sure of its sign has
+Leaves out minor loops that close faster than h, and a decay of h with time. Holds where the open-circuit voltage
+depends on the direction from which it was reached. A fit may make the magnitude negative, which is not physical, so
+that the estimate for a cell without hysteresis is not limited to one side; a significantly negative magnitude has
 another cause.
 
 Source: Plett, J. Power Sources 134 (2004) 262, doi:10.1016/j.jpowsour.2004.02.032; Axen et al., J. Energy
@@ -55,7 +55,7 @@ PARAMETERS = {
 def hysteresis(
     trace: Trace, *, magnitude_v: float, rate: float, low_soc_excess: float, start: float
 ) -> Contribution:
-    """Voltage of the state, and the state (n,) as `hysteresis`."""
+    """M(z) h (n,) V, and h (n,) as the state `hysteresis`."""
     from aesi.physics.relaxation import relax
 
     discharge, charge = step_throughput_ah(trace)

@@ -1,5 +1,5 @@
-"""What a user's own effect has to be, checked when its file is read and not in the middle of a search, and where in the
-file a mistake is."""
+"""Checks of a user's own effect, made when its file is read and not in the middle of a search, and messages that locate
+a mistake in the file."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from aesi.parameters import Parameter
 from aesi.physics.effect import Effect, Kind
 
 Place = tuple[int, int]
-"""Line, counted from one, and column of a source text."""
+"""(line, counted from 1; column) in a source text."""
 PLACES = ("on_model", "on_record", "on_voltage", "on_reading")
 
 
 def check_own(effect: Effect, path: str) -> None:
-    """Raises InputError, one sentence naming the file, for an effect that could not be named, shown or called."""
+    """Raises InputError, one sentence naming the file, for an effect that cannot be named, listed or called."""
     if not re.fullmatch(r"\w+", effect.id):
         raise InputError(f"{path}: the id {effect.id!r} has to be letters, digits and `_`: commands name it.")
     if effect.kind not in get_args(Kind):
@@ -45,15 +45,15 @@ def check_own(effect: Effect, path: str) -> None:
 
 
 def load_failure(path: str, content: bytes, error: BaseException) -> str:
-    """One sentence: in which line of the file and, where it is one that is declared there, at which parameter it
-    failed, and how."""
+    """One sentence with the error and the line of the file where it occurred, and the parameter where one is declared
+    there."""
     places = [
         (frame.lineno or 0, frame.colno or 0)
         for frame in traceback.extract_tb(error.__traceback__)
         if frame.filename == path
     ]
     where = f" in line {places[-1][0]}" if places else ""
-    if places:  # else it could not be read as Python, and the error says where
+    if places:  # else the file is not valid Python, and the error states the line
         for name, begin, end in _declared_parameters(content, path):
             if any(begin <= place < end for place in places):
                 where += f", parameter {name!r}"
@@ -63,7 +63,7 @@ def load_failure(path: str, content: bytes, error: BaseException) -> str:
 
 
 def _declared_parameters(content: bytes, path: str) -> Iterator[tuple[str, Place, Place]]:
-    """Names that dictionaries in the file give to parameters, and where each begins and ends."""
+    """(name, begin, end) of each parameter in the dictionaries of the file."""
     for node in ast.walk(ast.parse(content, path)):
         if not isinstance(node, ast.Dict):
             continue

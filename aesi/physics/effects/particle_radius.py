@@ -2,11 +2,11 @@
 
     R_i = f_i R_i,declared,   a_i = a_i,declared / f_i        i negative or positive
 
-Coarser particles have further to diffuse (R^2/D) and less surface to react on: a solid diffusivity off by 1/f^2
-and a rate constant off by 1/f together, one number instead of two.
+Larger particles have longer diffusion times (R^2/D) and less reactive surface: one factor changes what a solid
+diffusivity off by 1/f^2 and a rate constant off by 1/f change together.
 
 Leaves out a spread of radii (particle_size_distribution). Holds at any rate; at low rates, and where the cell's
-kinetics cost little, the data tell it from neither of the two.
+kinetic overpotentials are small, the data cannot distinguish it from either of the two.
 
 Source: definition; mean radii of one powder by number and by volume, Ecker et al., J. Electrochem. Soc. 162 (2015)
 A1836, doi:10.1149/2.0551509jes.

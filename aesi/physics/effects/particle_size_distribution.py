@@ -1,10 +1,10 @@
-"""Particles of more than one size in an electrode, all at one potential.
+"""Particles of several sizes in an electrode, all at one potential.
 
     Phi = U(x_u) + eta(i_u, x_u),  sum i_u = I        u particle sizes, lognormal by reactive area
-    mean radius as declared (so that the volume is), standard deviation sd times it
+    mean radius as declared, which keeps the declared volume; standard deviation sd times the mean
 
-Leaves out contact of particles with each other, and a distribution of anything but size. Holds where small and large
-particles see the same electrolyte.
+Leaves out contact of particles with each other, and a distribution of properties other than size. Holds where small and
+large particles are in the same electrolyte.
 
 Source: Kirk, Evans, Please & Chapman, J. Electrochem. Soc. 2022, arXiv:2006.12208 (many-particle model).
 """
@@ -19,7 +19,7 @@ from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel
 
 SIZES = 5
-"""Particles that stand for the distribution, of equal parts of it."""
+"""Number of particles that represent the distribution."""
 RANGE = "laser diffraction of battery powders gives none to 60 %; the rest, to 100 %, is room for a fit"
 PARAMETERS = {
     f"{side}_sd": Parameter(

@@ -2,10 +2,10 @@
 
     eps_i = f_i eps_i,declared,   B_i = f_i^1.5 B_i,declared        i negative or positive, B transport efficiency
 
-Less pore space conducts worse (Bruggeman's exponent) and holds less salt, so that it also depletes sooner.
+Less pore space conducts worse (Bruggeman's exponent) and holds less salt, which depletes sooner.
 
-Leaves out the separator and a tortuosity that is off at the right porosity (electrolyte_transport). Holds at any rate;
-below 1C it looks like a resistance, and while the salt is not far from even like a conductivity.
+Leaves out the separator and a wrong tortuosity at the right porosity (electrolyte_transport). Holds at any rate; below
+1C it looks like a resistance, and while the salt is nearly uniform like a conductivity.
 
 Source: Bruggeman's relation as used in Chen et al., J. Electrochem. Soc. 167 (2020) 080534,
 doi:10.1149/1945-7111/ab9050.
@@ -34,7 +34,7 @@ PARAMETERS = {
 
 
 def scale_porosities(model: EspmModel, *, negative_factor: float, positive_factor: float) -> EspmModel:
-    """The model with both porosities scaled.  Raises CellError where no solid would be left."""
+    """The model with both porosities scaled.  Raises CellError where that leaves no volume for the solid."""
     cell = model.cell
     cell = cell.with_negative(**_more_porous(cell.negative, negative_factor, cell.name))
     return model.of(cell.with_positive(**_more_porous(cell.positive, positive_factor, cell.name)))

@@ -1,12 +1,12 @@
-"""The reaction is not the same throughout an electrode, as a full porous-electrode model has it.
+"""The reaction is not uniform across an electrode, as in a full porous-electrode model.
 
     Phi = U(x_r) + eta(i_r, x_r, c_r) + ohmic_r(i) + chi ln(c_r / c_mean),   sum i_r = I        r = 1..4 regions
     ohmic_r : mean drop in solid and electrolyte between region r, the collector and the separator
 
-Each region has a particle of its own and reacts with the electrolyte there. The declared cell determines
-how uneven it is, so there is no parameter. `model="dfn"` resolves it fully, and takes its place where it matters.
+Each region has its own particle, which reacts with the electrolyte there. The declared cell determines how
+non-uniform the reaction is, so there is no parameter. `model="dfn"` resolves it fully and replaces this effect.
 
-Leaves out what happens within a quarter of an electrode. Holds for thick electrodes, high rates, poor electrolyte, and
+Leaves out differences within a quarter of an electrode. Holds for thick electrodes, high rates, poor electrolyte, and
 flat open-circuit potentials.
 
 Source: Doyle, Fuller & Newman, J. Electrochem. Soc. 140 (1993) 1526, doi:10.1149/1.2221597, on four regions.

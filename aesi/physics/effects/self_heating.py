@@ -1,19 +1,19 @@
-"""The cell warms itself: one lump, heated by its losses and by entropy, cooled by its surroundings.
+"""The cell heats up: a lumped heat balance of its losses, its entropy and the cooling by its surroundings.
 
     C dT/dt = sum_u i_u (T dU/dT - U)_u - I V - G (T - T_amb)      i_u > 0 delithiates, I > 0 on discharge
     U and dU/dT of particle u at its mean stoichiometry
     D, K, kappa scale with exp(E_a/R (1/T_ref - 1/T)),   U = U_ref + dU/dT (T - T_ref)
 
-Where the temperature of the case was measured that is used, with what the winding is warmer by where the cell file
-tells how it conducts (`aesi.physics.model.of_record`), and this balance is not needed.
+Where the temperature of the case was measured, that is used, plus the excess of the winding where the cell file states
+its thermal conductivity (`aesi.physics.model.of_record`), and this balance is not needed.
 
-Energy is kept from one rest to another: what diffusion within particles and electrolyte dissipates is heat, too, from
-when the voltage lacks it.
+Energy is conserved from one rest to another: heat includes what diffusion within particles and electrolyte dissipates,
+from the moment when it lowers the voltage.
 
-Leaves out what gradients of lithium and salt hold of it until they have levelled out, gradients of temperature within
-the cell, the casing's own heat capacity, and the heat of effects in series with the cell (film_growth, ocv_hysteresis)
-and of a leakage_current. Holds for cells whose Biot number is small. Needs density, specific heat and volume in the
-cell file.
+Leaves out the energy that gradients of lithium and salt store until they have relaxed, gradients of temperature within
+the cell, the heat capacity of the casing, and the heat of effects in series with the cell (film_growth, ocv_hysteresis)
+and of a leakage_current. Holds for cells with a small Biot number. Needs density, specific heat and volume in the cell
+file.
 
 Source: Bernardi, Pawlikowski & Newman, J. Electrochem. Soc. 132 (1985) 5, doi:10.1149/1.2113792.
 """
@@ -60,28 +60,28 @@ def warm(model: EspmModel, *, heat_transfer_w_k: float, heat_capacity_factor: fl
 
 
 TYPICAL_W_M2_K = 10.0
-"""Heat transfer from a case whose file declares none: what the shipped files of the LG M50, Prada's LFP and Kim's NCA
-cell have, after the parameter sets of PyBaMM, air that hardly moves. Fitted to measured temperatures the Panasonic
-NCR18650PF and LG 18650HG2 in their chambers have 27 to 110 W/(m2 K)."""
+"""Heat transfer coefficient of a case whose file declares none, as in nearly still air: that of the shipped files of
+the LG M50, Prada's LFP and Kim's NCA cell, after the parameter sets of PyBaMM. Fitted to measured temperatures, the
+Panasonic NCR18650PF and LG 18650HG2 in their chambers have 27 to 110 W/(m2 K)."""
 CUBE = 6.0
-"""Surface of a cube over its volume to the two thirds: no box has less. Cells of the shipped files have 6.0 to 17."""
+"""Surface of a cube over (its volume)^(2/3), the minimum for a box. Cells of the shipped files have 6.0 to 17."""
 
 
 def of_file(cell: Cell) -> ActiveEffect:
-    """The effect with the thermal data of the cell's file; a conductance that it does not declare is typical of a cell
-    of its surface, or of its volume, see `assumed`.
+    """The effect with the thermal data of the cell's file; a conductance that the file does not declare is typical of a
+    cell with that surface, or volume, see `assumed`.
 
     Raises CellError where the file has no heat capacity.
     """
     active = EFFECT.activate()
-    warm(EspmModel(cell), **active.parameters)  # refused before anything is made of its volume
+    warm(EspmModel(cell), **active.parameters)  # raises for missing thermal data before the volume is used
     conductance = _with_typical(cell).conductance_w_k
     assert conductance is not None
     return EFFECT.activate(heat_transfer_w_k=conductance)
 
 
 def assumed(cell: Cell) -> tuple[str, ...]:
-    """A sentence on what `of_file` takes for a cell whose file does not tell how it is cooled."""
+    """A sentence on the cooling that `of_file` assumes for a cell whose file does not state it; else empty."""
     if cell.conductance_w_k is not None:
         return ()
     missing = [
@@ -102,10 +102,10 @@ def assumed(cell: Cell) -> tuple[str, ...]:
 
 
 def _with_typical(cell: Cell) -> Cell:
-    """The cell with a heat transfer and a surface where its file has none; it has a volume."""
+    """The cell, which has a volume, with a typical heat transfer and surface where its file has none."""
     if cell.surface_area_m2 is None:
         assert cell.volume_m3 is not None
-        # Without a surface the winding has no resistance to its case in a simulation either.
+        # Without a surface, a simulation too has no thermal resistance between winding and case.
         surface = CUBE * cell.volume_m3 ** (2.0 / 3.0)
         cell = replace(cell, surface_area_m2=surface, thermal_conductivity_w_m_k=None)
     if cell.heat_transfer_w_m2_k is None:

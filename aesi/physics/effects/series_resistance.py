@@ -2,7 +2,7 @@
 
     V = V_cell - I R        I > 0 on discharge
 
-Leaves out its dependence on temperature. Holds wherever the drop follows the current without delay.
+Leaves out its dependence on temperature. Holds where the drop follows the current without delay.
 
 Source: Ohm's law; the size from Taheri et al., J. Power Sources 196 (2011) 6525,
 doi:10.1016/j.jpowsour.2011.03.056.

@@ -1,9 +1,8 @@
-"""The voltmeter reads a constant on top of the true voltage.
+"""The voltmeter reads the true voltage plus a constant.
 
     V_read = V_true + offset
 
-Leaves out gain and drift. Holds for any voltmeter. A constant shift of an open-circuit potential looks the
-same.
+Leaves out gain and drift. Holds for any voltmeter. Its effect equals a constant shift of an open-circuit potential.
 
 Source: definition; range from accuracy classes of battery test channels, 0.02 to 1 % of 5 V.
 """
@@ -26,7 +25,7 @@ PARAMETERS = {
 
 
 def add_offset(trace: Trace, *, offset_v: float) -> Array:
-    """(n,) V, the reading."""
+    """The reading, (n,) V."""
     return trace.voltage_v + offset_v
 
 
