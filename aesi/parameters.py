@@ -77,7 +77,7 @@ class Parameter:
             )
         if self.even and (self.log or low < 0):
             raise ParameterError(
-                f"a fit moves the square of what is even: give linear bounds from nought on, not [{low:g}, {high:g}] "
+                f"a fit moves the square of what is even: give linear bounds from zero on, not [{low:g}, {high:g}] "
                 f"{self.unit}{' on a logarithmic scale' if self.log else ''}."
             )
         if self.log and self.capacity_power:

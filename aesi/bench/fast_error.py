@@ -75,7 +75,7 @@ def fast_error(case: RealCase, cells: str = "experiments/cells") -> dict[str, An
 
 
 def lasts_s(time_s: Array, error: Array) -> float:
-    """Integral correlation time of an error (n,) at times in s: of every second, up to where it is first nought."""
+    """Integral correlation time of an error (n,) at times in s: of every second, up to where it is first zero."""
     every_s = np.arange(time_s[0], time_s[-1])
     e = np.interp(every_s, time_s, error)
     lags = [float(np.mean(e[k:] * e[: len(e) - k])) for k in range(min(len(e), 120))]

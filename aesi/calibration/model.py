@@ -196,7 +196,7 @@ class Model:
         from the voltage.
         """
         out = x.copy()
-        out[self.layout.zero] = self.zero.nought
+        out[self.layout.zero] = self.zero.z_at_zero
         for index, record in enumerate(self.records):
             first = 0 if record.start.basis == "full charge" else 1
             out[self.layout.own(index)[first:]] = 0.0

@@ -206,7 +206,7 @@ def intervals(model: Model, x: Array, covariance: Array) -> dict[str, Interval]:
     for j, free in enumerate(model.free):
         reach = NINETY_FIVE * float(np.sqrt(covariance[j, j]))
         value, low, high = (free.value(float(x[j]) + away) for away in (0.0, -reach, reach))
-        if abs(value) < ROUND_OFF * (high - low):  # on a bound of nought
+        if abs(value) < ROUND_OFF * (high - low):  # on a bound of zero
             value = 0.0
         out[free.name] = Interval(value, low, high, free.unit, free.source)
     return out
@@ -244,9 +244,9 @@ def at_bounds(model: Model, x: Array) -> tuple[str, ...]:
         f.name
         for j, f in enumerate(model.free)
         if model.high[j] - x[j] < width[j]
-        or (x[j] - model.low[j] < width[j] and not _nought(f, model.low[j]))
+        or (x[j] - model.low[j] < width[j] and not _is_zero(f, model.low[j]))
     )
 
 
-def _nought(free: Free, z: float) -> bool:
+def _is_zero(free: Free, z: float) -> bool:
     return abs(free.value(z)) < ROUND_OFF * free.sd

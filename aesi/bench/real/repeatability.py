@@ -77,7 +77,7 @@ def scatter(cell: str, good: str, other: str, cells: str = "experiments/cells") 
 
 
 def ratio(one: Grown) -> tuple[str, float]:
-    """Of the amplitude of the effect that was grown which is furthest from nought; nought where all ended there."""
+    """Of the amplitude of the effect that was grown which is furthest from zero; zero where all ended there."""
     effect = one.hypothesis[-1]
     sds = np.sqrt(np.diagonal(one.score.covariance))
     x = one.point.x + one.score.shift

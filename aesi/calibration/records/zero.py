@@ -65,7 +65,7 @@ class Zero:
         return self.mean_a + self.sd_a * z
 
     @property
-    def nought(self) -> float:
+    def z_at_zero(self) -> float:
         """The working coordinate at which currents stay as they were measured."""
         return -self.mean_a / self.sd_a
 

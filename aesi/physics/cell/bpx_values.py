@@ -229,7 +229,7 @@ def _energies(cell: CellParameters) -> dict[str, float]:
 
 def _check_thermal(cell: CellParameters, where: str) -> None:
     """What is there of mass, heat capacity and surface is positive, and together that of a cell; nothing cools by less
-    than nought."""
+    than zero."""
     declared = {
         "Density [kg.m-3]": cell.density_kg_m3,
         "Specific heat capacity [J.K-1.kg-1]": cell.specific_heat_j_kg_k,

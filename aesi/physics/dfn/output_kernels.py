@@ -5,7 +5,7 @@ from numba import njit
 from aesi.physics.espm.kernels import FASTMATH, compiled
 
 UNDERSHOOT = 0.02
-"""Of the rest concentration. The reaction leaves a place that runs dry, and the salt there stays at nought; its
+"""Of the rest concentration. The reaction leaves a place that runs dry, and the salt there stays at zero; its
 polynomial passes below by 0.8 % at worst before the cut-off (LG HG2 at -2 degC and 3.2C, 0.2 % with 20 points)."""
 
 

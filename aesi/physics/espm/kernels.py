@@ -16,7 +16,7 @@ compiled: Callable[[Any], Any] = kept_njit(
 )
 """Of every function that numba does not inline itself. It counts the references to each array that it takes out of a
 named tuple, one atomic instruction at each use: without (nothing here allocates) a sample of the porous electrode takes
-2.5 us instead of 8.4. What is divided by nought is infinite, as in numpy: past the end of a cell a trial may underflow,
+2.5 us instead of 8.4. What is divided by zero is infinite, as in numpy: past the end of a cell a trial may underflow,
 and what has to be told is the fault before it.
 
 LLVM takes each function into its caller. As calls they are weak symbols, of which a process uses the first that it
@@ -29,7 +29,7 @@ BEYOND_RANGE_V = 10.0
 SMALLEST_OCCUPANCY = 1e-9
 NEARLY_DRY = 0.1
 """Of the salt at rest: below this the reaction withdraws to where there is salt, which one particle an electrode does
-not see. A porous electrode's salt tends to nought where that of a uniform reaction passes it (an LG 18650HG2 under US06
+not see. A porous electrode's salt tends to zero where that of a uniform reaction passes it (an LG 18650HG2 under US06
 at 10 degC: 56 mol/m3 against -104 at the wall)."""
 SMALLEST_EXPONENT = -10.0
 """Of the salt that is left: products of its powers stay above what a number can hold."""

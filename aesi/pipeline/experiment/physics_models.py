@@ -69,7 +69,7 @@ class PhysicsModels:
 
     def begin(self, name: str, record: FitRecord, hold: Hold) -> tuple[float, float]:
         """State of charge at the first row, in the windows of the named physics, and its standard deviation where it
-        was read from a voltage, else nought."""
+        was read from a voltage, else zero."""
         if (read := self.own_reading(name, record, hold)) is not None:
             return read.soc, read.read_sd
         return self.by_name[name].soc0(record.soc0), record.soc0_sd

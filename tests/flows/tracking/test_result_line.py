@@ -28,7 +28,7 @@ def test_what_was_not_judged_is_not_told():
     )
 
 
-def test_a_reduction_below_nought_is_more_and_not_a_negative_less():
+def test_a_reduction_below_zero_is_more_and_not_a_negative_less():
     worse = {"test_mser_pct": -1.72, "test_rmse_mv": 8.54, "test_mser_recalibrated_pct": 26.47}
     assert result_line({"name": "ESPM + AESI II", "free_run": worse, "intervals": None}) == (
         "ESPM + AESI II: 1.7 % more squared error on test in free run (8.54 mV), 26.5 % less than recalibrated."

@@ -351,7 +351,7 @@ def test_a_double_layer_that_no_cell_has_was_written_without_a_word(found):
     assert set(replace(absurd, model=told).warnings) == set(found.warnings)
 
 
-def test_a_resistance_of_nought_was_written_as_what_round_off_left(found):
+def test_a_resistance_of_zero_was_written_as_what_round_off_left(found):
     at = [free.name for free in found.model.free].index("contact.resistance")
     x = found.x.copy()
     x[at] = found.model.free[at].bounds[0] * (1.0 - 1e-15)
@@ -360,7 +360,7 @@ def test_a_resistance_of_nought_was_written_as_what_round_off_left(found):
     assert told.low == 0.0 < told.high
 
 
-def test_a_parameter_on_a_lower_bound_was_passed_over_where_its_kind_may_be_nought():
+def test_a_parameter_on_a_lower_bound_was_passed_over_where_its_kind_may_be_zero():
     energy = Free("negative.rate_energy", 55e3, 12e3, "J/mol", "", low=0.0)
     full = Free("negative.full_stoichiometry", 0.9, 0.015, "1", "", low=0.0)
     contact = Free("contact.resistance", 0.01, 0.007, "ohm", "", low=0.0)

@@ -126,7 +126,7 @@ def test_a_file_of_a_cell_that_gives_off_no_heat_was_refused(model):
     assert np.diff(kelvin[250:]).min() > -1e-9  # through 1 mW/K, the bound, it would lose 9e-6 K a row
 
 
-def test_no_other_value_below_a_lower_bound_that_stands_for_nought_is_taken():
+def test_no_other_value_below_a_lower_bound_that_stands_for_zero_is_taken():
     with pytest.raises(ParameterError, match=r"heat_transfer_w_k = 0\.0001"):
         CATALOGUE["self_heating"].activate(heat_transfer_w_k=1e-4)
     with pytest.raises(ParameterError, match="heat_capacity_factor = 0 "):

@@ -283,7 +283,7 @@ def test_pieces_of_the_same_rows_alone_ended_in_an_empty_array() -> None:
         FreeRunBands.fit({1.0: [np.ones(40)] * 3}, DT, records=["a"] * 3)
 
 
-def test_the_band_of_errors_that_are_mostly_nought_was_no_number() -> None:
+def test_the_band_of_errors_that_are_mostly_zero_was_no_number() -> None:
     error = np.where(np.arange(3000) % 20 == 0, 1e-3, 0.0)
     bands = FreeRunBands.fit({1.0: [error]}, DT)
     np.testing.assert_array_equal(bands.at(1.0, np.zeros(2))[1], 0.0)

@@ -321,7 +321,7 @@ def test_many_sparsely_logged_rests_are_one_note(tmp_path):
     assert notes == ["rests.csv: No rows for 901 to 901 s at 5 places, the first at 99 s; the cell rested."]
 
 
-def test_a_temperature_of_nought_everywhere_is_told_of(tmp_path):
+def test_a_temperature_of_zero_everywhere_is_told_of(tmp_path):
     path = tmp_path / "cold.csv"
     lines = rows(TIME, CURRENT, VOLTAGE, TIME * 0)
     path.write_text("\n".join(["time_s,current_a,voltage_v,temperature_degc", *lines, ""]))

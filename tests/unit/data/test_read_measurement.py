@@ -492,7 +492,7 @@ def test_a_refused_file_is_closed_while_its_error_lives(tmp_path, monkeypatch, l
     assert all(stream.closed for stream in opened)
 
 
-def test_a_current_of_nought_under_a_moving_voltage_is_refused(tmp_path):
+def test_a_current_of_zero_under_a_moving_voltage_is_refused(tmp_path):
     falling = np.linspace(4.1, 3.2, N)
     said = refusal(tmp_path, text(current=0.0 * CURRENT, voltage=falling))
     assert "current_a: the current is 0 A in all 200 rows while the voltage moves by 0.90 V" in said

@@ -159,7 +159,7 @@ def test_bounds_without_room_between_them_gave_a_slope_of_no_number():
 
 @pytest.mark.parametrize("beyond", [lambda x: np.array([1e3, x[0], x[1]]), lambda x: None])
 def test_a_descent_stayed_where_it_began_beside_a_jump_of_one_coordinate(beyond):
-    # What one coordinate would gain below nought, where the residual jumps or has no value, is not to be had; the other
+    # What one coordinate would gain below zero, where the residual jumps or has no value, is not to be had; the other
     # one's minimum is.
     slopes = np.array([[1.0, 1.0], [1.0, 0.0], [0.0, 2.0]])
     target = np.array([2.0, -1.0, 6.0])

@@ -425,10 +425,10 @@ def test_a_rest_on_which_a_testers_zero_is_read_stays_that_rest():
     time = np.arange(0.0, 12.0 * SECONDS_PER_HOUR, 30.0)
     after = simulate(LG_M50, time, np.where(time < 1200.0, 2.5, 0.0), 0.6, hold="backward")
     rests = time >= 1200.0
-    nought = record(time[rests], np.zeros(rests.sum()), after.voltage_v[rests])
+    zero_current = record(time[rests], np.zeros(rests.sum()), after.voltage_v[rests])
     true, offset_a = float(after.series["soc"][-1]), 1e-3 * LG_M50.capacity_ah
     plain, off = (
-        initial_state(LG_M50, replace(nought, current_a=nought.current_a + a)) for a in (0, offset_a)
+        initial_state(LG_M50, replace(zero_current, current_a=zero_current.current_a + a)) for a in (0, offset_a)
     )
     assert plain.soc == pytest.approx(true, abs=2e-3)
     assert off.soc == pytest.approx(true, abs=2e-3)

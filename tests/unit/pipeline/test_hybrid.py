@@ -80,7 +80,7 @@ def test_a_free_run_of_a_record_with_a_voltage_began_where_the_training_did(mode
     assert model.predict_record(unmeasured).soc[0] == pytest.approx(model.soc0)
 
 
-def test_a_free_run_without_a_measurement_began_as_if_the_error_were_measured_to_be_nought(model, data):
+def test_a_free_run_without_a_measurement_began_as_if_the_error_were_measured_to_be_zero(model, data):
     correction = replace(model.correction, memory=0.999)  # what it begins with lasts
     lasting = replace(model, correction=correction)
     under_load = data.take(slice(100, None))  # at rest the correction says nothing
@@ -90,8 +90,8 @@ def test_a_free_run_without_a_measurement_began_as_if_the_error_were_measured_to
     # By the inputs alone, from the first row on: an error that is measured to be that moves nothing.
     told = lasting.predict(*drive, error0_v=float(given[0]))
     np.testing.assert_allclose(told.voltage_v, free.voltage_v, atol=1e-12)
-    nought = lasting.predict(*drive, error0_v=0.0)
-    assert np.abs(nought.voltage_v - free.voltage_v).max() > 5e-3
+    from_zero = lasting.predict(*drive, error0_v=0.0)
+    assert np.abs(from_zero.voltage_v - free.voltage_v).max() > 5e-3
     # The first row has the band of a whole drive, as where a measurement lies long before.
     width, known = (each.upper_v - each.lower_v for each in (free, told))
     assert width[0] > 1.1 * known[0]
@@ -296,10 +296,10 @@ def fading(model, data):
 def test_a_record_without_a_temperature_counted_as_of_the_trained_one(fading, data):
     region = fading.correction.fade.region
     cold = replace(region, visited=replace(region.visited, temperature_degc=(0.0, 0.0)))
-    at_nought = replace(fading, correction=replace(fading.correction, fade=Fade(1.0, cold)))
+    at_zero = replace(fading, correction=replace(fading.correction, fade=Fade(1.0, cold)))
     assert data.temperature_degc is None  # the physics takes it at the 25 degC of the cell's file
     stated = replace(data, temperature_degc=np.full(len(data), 25.0))
-    runs = [at_nought.predict_record(one, SOC0) for one in (data, stated)]
+    runs = [at_zero.predict_record(one, SOC0) for one in (data, stated)]
     assert all(run.outside.all() for run in runs)
     np.testing.assert_allclose(runs[0].weight, runs[1].weight)
     assert runs[0].weight.max() < 0.01

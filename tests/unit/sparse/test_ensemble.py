@@ -7,7 +7,7 @@ from aesi.sparse.stridge import STRidge
 
 
 def test_members_are_summed_up_by_mean_share_and_the_middle_nine_tenths():
-    first = np.linspace(0.0, 1.0, 101)  # nought in one of them
+    first = np.linspace(0.0, 1.0, 101)  # zero in one of them
     second = np.where(np.arange(101) < 40, 2.0, 0.0)
     theta = np.column_stack([np.arange(5.0), np.ones(5)])
     factor = np.column_stack([theta, 3.0 * theta[:, 0]])

@@ -138,7 +138,7 @@ def test_nothing_is_to_be_reached_inside_the_range_or_where_nothing_is_held():
 
 
 @pytest.mark.parametrize("errors_v", [(-0.03, 0.01), (-0.01, 0.03)])
-def test_no_error_is_nought_when_scaled_whichever_way_errors_were_larger(errors_v):
+def test_no_error_is_zero_when_scaled_whichever_way_errors_were_larger(errors_v):
     block = np.column_stack([errors_v, (0.0, 5.0)])
     scaling = Scaling.of([block])
     assert scaling.error_to_scaled(np.zeros(1)) == pytest.approx(0.0, abs=1e-15)

@@ -55,7 +55,7 @@ def test_on_a_bound_an_interval_begins_there_and_holds_its_share_of_the_density(
     assert inward == pytest.approx(np.interp(0.9, share, d), rel=5e-3, abs=5e-4)
 
 
-def test_a_parameter_that_ended_at_nought_has_an_interval_with_a_width_and_a_unit(cell, few, make):
+def test_a_parameter_that_ended_at_zero_has_an_interval_with_a_width_and_a_unit(cell, few, make):
     data = make((CATALOGUE["ocv_hysteresis"].activate(magnitude_v=0.006),))
     problem = InverseProblem(cell, prepare_all(cell, [data], 0.9, 0.3), few)
     path = searched(problem, 2, Archive(None, ""))

@@ -55,7 +55,7 @@ def test_what_stood_on_its_bound_was_told_as_what_round_off_left():
 
 
 def test_what_is_even_has_no_negative_values():
-    with pytest.raises(ParameterError, match="bounds from nought"):
+    with pytest.raises(ParameterError, match="bounds from zero"):
         Parameter(0.3, "1", bounds=(-0.1, 0.8), source="test", even=True)
     with pytest.raises(ParameterError, match="logarithmic"):
         Parameter(0.3, "1", bounds=(0.1, 0.8), source="test", log=True, even=True)

@@ -158,7 +158,7 @@ def test_a_slope_is_that_of_where_it_is_taken(cell, few, make):
 
 
 def test_a_lag_that_may_not_become_negative_held_all_that_the_file_declares(cell, few):
-    """A row of a held current is read under the next one's as soon as the lag is below nought, by however little: the
+    """A row of a held current is read under the next one's as soon as the lag is below zero, by however little: the
     26 mV of a contact stayed with the declared parameters, of which others take up a quarter."""
     contact = (CATALOGUE["series_resistance"].activate(resistance_ohm=1e-3),)
     rng, time = np.random.default_rng(1), np.arange(1200.0)
@@ -174,7 +174,7 @@ def test_a_lag_that_may_not_become_negative_held_all_that_the_file_declares(cell
 
 
 def test_a_gain_on_a_surrogate_is_what_its_score_gains():
-    # One of three parameters is the effect; surrogates are whitened residuals about the point at nought.
+    # One of three parameters is the effect; surrogates are whitened residuals about the point at zero.
     table = RNG.normal(size=(N, M)) * [3.0, 2.0, 4.0]
     white = RNG.normal(size=(N, 5))
     folds = FOLDS | {"charge": ((0, 2), (1, 3))}

@@ -17,8 +17,8 @@ def outcome(after_v, part="test", before_v=9e-3, recalibrated_v=5e-3):
     time_s = np.arange(400.0)
     sign = np.where(time_s % 2, 1.0, -1.0)
     voltages = {"before": -before_v * sign, "recalibrated": -recalibrated_v * sign, "after": -after_v * sign}
-    nought = np.zeros(400)
-    return FileOutcome("drive", part, time_s, nought, nought, nought, NOISE_V, voltages, (0.0, 0.0, 0.0))
+    zeros = np.zeros(400)
+    return FileOutcome("drive", part, time_s, zeros, zeros, zeros, NOISE_V, voltages, (0.0, 0.0, 0.0))
 
 
 def verdict(word, *effects):

@@ -77,7 +77,7 @@ def _drives(loaded: Loaded, problem: Problem, candidates: Sequence[Candidate]) -
 def _without(
     problem: Problem, candidates: Sequence[Candidate], ensemble: int, out: HeldOutDrive, span: Span
 ) -> Array:
-    """(n,) V in free run by the model that the other drives choose, fitted to them; nought where they cannot choose
+    """(n,) V in free run by the model that the other drives choose, fitted to them; zero where they cannot choose
     one."""
     apart = np.array([not span[0] <= a < span[1] for a, _ in problem.folds])
     pick = picked(problem, candidates, ensemble, apart)
