@@ -1,6 +1,6 @@
 """Labelled measurements with an effect that the declared cell file does not contain.
 
-Made by PyBaMM alone, so that whoever looks for the effect cannot meet its own code. `plan` lists the cases,
+They are simulated by PyBaMM alone, so that a finder of the effect shares no code with them. `plan` lists the cases,
 `generate` makes one.
 """
 

@@ -1,4 +1,4 @@
-"""What a blind case is asked to be, and what it is once made."""
+"""The specification of a blind case, and the generated case."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ Warmth = Literal["none", "ambient", "course"]
 
 @dataclass(frozen=True)
 class CaseSpec:
-    """One case to make.
+    """Specification of one case.
 
     cell : name of one of `cells.CELLS`.
     recipes : names in `recipes.RECIPES` or `strangers.STRANGERS`; none for a cell that lacks nothing.
     target_mv : RMS change of the voltage that each recipe is scaled to.
-    records : what was run, each from a rest.  rate : of the currents, times those of the default vehicle.
-    spread : whether the own parameters are off by `spread.SPREADS` (as declared otherwise).
-    warmth : 'none': no temperature column, and the cell is at its reference; 'ambient': the column of a cell in a
-    chamber at another temperature; 'course': of one that warms up.
-    soc0_given : whether the finder is told the state of charge.  dt_s : rows of drives and pulses.
+    records : names of the tests, each from a rest.  rate : factor on the currents of the default vehicle.
+    spread : True where the cell's parameters deviate by `spread.SPREADS`; else they are as declared.
+    warmth : 'none': no temperature column, cell at its reference; 'ambient': column of a cell in a chamber at another
+    temperature; 'course': column of a cell that warms up.
+    soc0_given : True where the finder is told the state of charge.  dt_s : interval of rows of drives and pulses, s.
     """
 
     name: str
@@ -56,13 +56,13 @@ class CaseSpec:
 
 @dataclass(frozen=True, eq=False)
 class BlindCase:
-    """A case made.
+    """A generated case.
 
     label : 'none', 'unknown', or the ids of the effects joined by '+'.  also : answers that a lenient judge takes.
     neutral : names that are neither right nor wrong here (what the reduction of a porous electrode leaves).
     soc0 : state of charge at the first sample of every record, None where the finder is not told.
-    declared : the cell file the finder is given.  truth : what was changed and by how much, units in the names;
-    `rms_mv` in it is the RMS of what the model without effects leaves of the noise-free voltage.
+    declared : the cell file that the finder is given.  truth : name with unit -> size of each change; `rms_mv` in it is
+    the RMS error of the model without effects for the noise-free voltage.
     """
 
     spec: CaseSpec

@@ -11,8 +11,11 @@ from aesi.errors import DataError
 
 @dataclass(frozen=True)
 class BlindCell:
-    """rate : of the drive's currents, for a cell of this power.  soc0 : range of the first state of charge, from which
-    charge pulses stay near the window of voltage."""
+    """A cell of the blind set.
+
+    rate : factor on the drive's currents, for the power of this cell.  soc0 : range of the initial state of charge, in
+    which charge pulses stay near the voltage window.
+    """
 
     file: str
     rate: float

@@ -1,4 +1,4 @@
-"""The tests of a case: a drive, pulses, a slow discharge, each from a rest and 20 to 60 minutes or a discharge long."""
+"""The tests of a case: drives, pulses, a slow discharge, each from a rest, of 20 to 60 minutes or one discharge."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from aesi.numerics.typing import Array
 
 SCHEDULES = ("udds", "hwfet", "us06", "wltc_3b", "artemis_urban", "sc03", "nedc")
 FIRST_REST_S = 120.0
-"""Every test begins with it, so that a first voltage is one of rest."""
+"""Rest at the beginning of every test, so that the first voltage is a rest voltage."""
 SHORTEST_S = 1500.0
-"""Tests run from here to LONGEST_S: long enough for salt and heat to follow, short enough for a PyBaMM run of
+"""Tests last from this to LONGEST_S: long enough for salt and heat to respond, short enough for a PyBaMM run of
 seconds."""
 LONGEST_S = 3600.0
 PULSE_C = 2.0
-"""Of a charge pulse."""
+"""C-rate of a charge pulse."""
 SLOW_DT_S = 10.0
 """Seconds a row of a slow discharge, as loggers write it."""
 SLOW_C = 0.2
@@ -30,7 +30,10 @@ LEAST_SOC = 0.1
 
 @dataclass(frozen=True)
 class Asked:
-    """capacity_ah, rate : of the cell and of the currents.  soc0 : at the first row.  dt_s : seconds a row."""
+    """Conditions of a test.
+
+    capacity_ah : of the cell.  rate : factor on the currents.  soc0 : at the first row.  dt_s : interval of rows, s.
+    """
 
     capacity_ah: float
     rate: float
@@ -39,7 +42,7 @@ class Asked:
 
     @property
     def bench(self) -> Bench:
-        """What turns pieces into currents."""
+        """The converter of pieces to currents."""
         return Bench(self.capacity_ah, dt_s=self.dt_s, scale=self.rate)
 
 
@@ -61,7 +64,7 @@ def drive(asked: Asked, rng: np.random.Generator) -> Profile:
 
 
 def fast_charge(asked: Asked, rng: np.random.Generator) -> Profile:
-    """Drive pieces with long 3C charges at a high state of charge, where lithium plates."""
+    """Drive pieces with long 3C charges at a high state of charge, at which lithium plates."""
     bench = asked.bench
     pieces: list[Array] = [bench.rest(FIRST_REST_S)]
     while _seconds(pieces, asked) < SHORTEST_S:

@@ -1,4 +1,4 @@
-"""Make one blind case: base runs, effects scaled to the size asked for, instruments, label."""
+"""Generation of one blind case: base runs, effects scaled to the target size, instruments, label."""
 
 from __future__ import annotations
 
@@ -24,28 +24,28 @@ from aesi.numerics.typing import Array
 from aesi.records import Measurement
 
 COARSE_POINTS = 15
-"""Radial points of the runs that find the size of an effect, always with the single particle: the error of mesh and
-model cancels in a difference to within what `CLOSE_ENOUGH` allows."""
+"""Radial points of the runs that determine the size of an effect, always with the single particle: the error of mesh
+and model cancels in a difference to within `CLOSE_ENOUGH`."""
 CLOSE_ENOUGH = 0.2
-"""An effect is scaled until it moves the voltage by the size asked for, to within this share of it, in MOST_TRIES at
-most."""
+"""An effect is scaled until it changes the voltage by the target size, to within this share of it, in at most
+MOST_TRIES."""
 MOST_TRIES = 4
 SHOWN = 0.6
-"""Of the target, that an effect has to move the voltage by at least."""
+"""Least change of the voltage by an effect, as a share of the target."""
 CHAMBER_K = 15.0
-"""A chamber stands at most so far from the reference of the cell file, either way."""
+"""Largest distance of the chamber's temperature from the reference of the cell file, in both directions."""
 RISE_K, RISE_S = (2.0, 8.0), (300.0, 1500.0)
-"""A cell that warms up: by so much, at such time constants. Prescribed, since a heat balance makes a porous electrode
-four times as slow to solve."""
+"""Ranges of the temperature rise of a cell that warms up, K, and of its time constant, s. They are prescribed, since a
+heat balance makes a porous electrode four times slower to solve."""
 OTHER_SOC = (-0.1, 0.05)
-"""Where the finder is not told, further records start so far from the first."""
+"""Range of the initial state of charge of further records minus the first one's, where the finder is not told it."""
 REDUCTION = "reaction_nonuniformity"
-"""What the single particle leaves out of a porous electrode: no lack of the cell."""
+"""Effect that the single particle leaves out of a porous electrode; it is not a deviation of the cell."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Bench:
-    """What all runs of a case share. own : changes that are no effect (own parameters, temperature of the chamber)."""
+    """The common part of all runs of a case. own : changes that are no effects (parameters, chamber temperature)."""
 
     declared: Path
     spec: CaseSpec
@@ -61,7 +61,7 @@ class _Bench:
         profiles: Sequence[Profile] | None = None,
         between: int = 1,
     ) -> list[TrueRun]:
-        """The cell with these changes under its tests, in so many rows for each of them."""
+        """The runs of the cell with these changes under its tests, with `between` rows for each row of a test."""
         setup = Setup(self.declared, model or self.spec.model, (*self.own, *applied), radial_points)
         return [simulate_truth(setup, profile, between) for profile in profiles or self.profiles]
 
@@ -71,7 +71,7 @@ class _Bench:
         model: LaboratoryModel | None = None,
         radial_points: int | None = None,
     ) -> Array:
-        """(rows of all records,) V: what was written less what the cell without effects does under that current."""
+        """(rows of all records,) V: written voltage minus that of the cell without effects at the written current."""
         believed = [
             profile
             if np.array_equal(one.current_a, profile.current_a)
@@ -83,7 +83,7 @@ class _Bench:
 
 
 def generate(spec: CaseSpec, cells: Mapping[str, Path]) -> BlindCase:
-    """The case of a specification; the same specification gives the same case.
+    """The case of a specification; equal specifications give equal cases.
 
     cells : name -> declared BPX file.
     Raises DataError for an unknown cell or recipe; SimulationError where the cell cannot be simulated.
@@ -116,10 +116,10 @@ def generate(spec: CaseSpec, cells: Mapping[str, Path]) -> BlindCase:
 def _shown(
     spec: CaseSpec, cells: Mapping[str, Path]
 ) -> tuple[_Bench, dict[str, dict[str, float]], np.random.Generator]:
-    """The bench, the values of each recipe, and the generator as it stands, on the first cell that shows all effects.
+    """(bench, values of each recipe, generator in its present state) for the first cell that shows all effects.
 
-    That of the specification, or one after it: a particle of 50 nm does not show its diffusivity. The specification's
-    own where none shows them.
+    The cells are tried from that of the specification on: a particle of 50 nm does not show its diffusivity. Where none
+    shows them all, it is the specification's own.
     """
     _check(spec, cells)
     after = [*CELLS][[*CELLS].index(spec.cell) + 1 :] + [*CELLS][: [*CELLS].index(spec.cell)]
@@ -137,7 +137,7 @@ def _shown(
 
 
 def _moved(spec: CaseSpec, cell: str) -> CaseSpec:
-    """The same case on another cell, as deep in its range of charge and as far up its rates."""
+    """The same case on another cell, at the same relative position in its ranges of charge and of rates."""
     old, new = CELLS[spec.cell], CELLS[cell]
     share = (spec.soc0 - old.soc0[0]) / (old.soc0[1] - old.soc0[0])
     soc0 = round(new.soc0[0] + share * (new.soc0[1] - new.soc0[0]), 3)
@@ -175,8 +175,8 @@ def _warmth(spec: CaseSpec, rng: np.random.Generator) -> tuple[Applied, ...]:
 
 
 def _scaled(recipe: Recipe, bench: _Bench) -> tuple[dict[str, float], float]:
-    """Values at which the recipe alone moves the voltage by about the target, or its least or most; and by how much
-    it does, V RMS."""
+    """(values at which the recipe alone changes the voltage by about the target, or its least or most; that change,
+    V RMS)."""
     target = bench.spec.target_mv / MV_PER_V
 
     def values_at(magnitude: float) -> dict[str, float]:
@@ -195,7 +195,7 @@ def _scaled(recipe: Recipe, bench: _Bench) -> tuple[dict[str, float], float]:
 
 
 def _effect_alone(recipe: Recipe, values: Mapping[str, float], bench: _Bench) -> Array:
-    """(rows,) V: what the recipe alone changes in the voltage, of a coarse single particle."""
+    """(rows,) V: change of the voltage by the recipe alone, from a coarse single particle."""
     if recipe.reference:
         return np.concatenate(_difference(recipe, values, bench))
     applied = (Applied(recipe.change, dict(values)),) if recipe.change else ()
@@ -207,7 +207,7 @@ def _effect_alone(recipe: Recipe, values: Mapping[str, float], bench: _Bench) ->
 
 
 def _difference(recipe: Recipe, values: Mapping[str, float], bench: _Bench, between: int = 1) -> list[Array]:
-    """What an option of the single particle changes against the same option without effect, a record each."""
+    """Change of the voltage, V, by an option of the single particle over the same option without effect, by record."""
     assert recipe.change is not None
     assert recipe.reference is not None
     points = recipe.radial_points
@@ -217,7 +217,7 @@ def _difference(recipe: Recipe, values: Mapping[str, float], bench: _Bench, betw
 
 
 def _changed(bench: _Bench, sizes: Mapping[str, dict[str, float]], between: int) -> list[TrueRun]:
-    """The noise-free records of the cell with all its effects, in so many rows for each of its tests."""
+    """The noise-free records of the cell with all its effects, with `between` rows for each row of a test."""
     together = [
         Applied(str(RECIPES[n].change), v)
         for n, v in sizes.items()
@@ -234,7 +234,7 @@ def _changed(bench: _Bench, sizes: Mapping[str, dict[str, float]], between: int)
 def _with_stranger(
     name: str, traces: list[TrueRun], bench: _Bench, truth: dict[str, float], seed: int
 ) -> list[TrueRun]:
-    """The records with a stranger of the size asked for, of the same constants in each."""
+    """The records with a stranger of the target size, with the same constants in each record."""
     shifts = [
         STRANGERS[name].shift(trace, bench.capacity_ah, np.random.default_rng(seed)) for trace in traces
     ]

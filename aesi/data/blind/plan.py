@@ -1,8 +1,8 @@
-"""Which cases there are. A case is a function of seed and index, and the first N of a seed are a fair small set.
+"""The plan of the cases. A case is a function of seed and index; the first N cases of a seed are a balanced sample.
 
-Cases come in blocks of fifteen, shuffled: five that lack nothing, six with one effect, two pairs, a stranger, and a
+Cases come in shuffled blocks of fifteen: five without an effect, six with one effect, two pairs, a stranger, and a
 triple or another stranger. Within each kind every factor (cell, model, records, spread, temperature, state of charge,
-rows a second, size) runs through all its values before one comes again.
+sampling rate, size) takes all its values before one is repeated.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from aesi.data.blind.strangers import STRANGERS
 from aesi.data.laboratory.simulator import LaboratoryModel
 
 FULL = 360
-"""Cases of the full set: 120 lack nothing, 144 have one effect, 48 two, 12 three, 36 are strangers."""
+"""Number of cases of the full set: 120 without an effect, 144 with one, 48 with two, 12 with three, 36 strangers."""
 BLOCK = ("none",) * 5 + ("single",) * 6 + ("pair",) * 2 + ("stranger",)
 LAST_OF_BLOCK = ("triple", "stranger")
 TARGETS_MV = (1.5, 3.0, 6.0, 12.0)
-"""RMS, from just above the noise of 1 mV up."""
+"""Target RMS changes of the voltage, mV, from just above the noise of 1 mV."""
 MODELS: tuple[LaboratoryModel, ...] = ("DFN", "SPMe")
 RECORDS: tuple[tuple[RecordKind, ...], ...] = (
     ("drive",),
@@ -38,9 +38,9 @@ RECORDS: tuple[tuple[RecordKind, ...], ...] = (
 )
 WARMTHS: tuple[Warmth, ...] = ("none", "ambient", "none", "course")
 ROWS_S = (1.0, 1.0, 0.1)
-"""Seconds a row, drawn in turn: two cases in three at 1 Hz, one at 10 Hz."""
+"""Intervals of rows, s, taken in turn: two cases of three at 1 Hz, one at 10 Hz."""
 FAST_CHARGE_SOC0 = (0.65, 0.75)
-"""Fast charges go on from there without leaving the window of voltage by more than pulses do."""
+"""Initial states of charge from which fast charges exceed the voltage window by no more than pulses do."""
 PAIRS = (
     ("series_resistance", "self_heating"),
     ("ocv_hysteresis", "series_resistance"),
@@ -74,7 +74,7 @@ def case(seed: int, index: int) -> CaseSpec:
 
 
 def small_plan(seed: int = 0) -> tuple[CaseSpec, ...]:
-    """Six easy cases that a test can afford: nothing, heat, resistance, hysteresis, a gain, a stranger."""
+    """Six easy and fast cases for tests: no effect, heat, resistance, hysteresis, a gain, a stranger."""
     recipes = ((), ("self_heating",), ("series_resistance",), ("ocv_hysteresis",))
     more = (("current_sensor_gain",), ("breathing",))
     return tuple(
@@ -94,7 +94,7 @@ def _all(seed: int) -> tuple[CaseSpec, ...]:
 
 
 class _Draws:
-    """The cases of one kind, one after the other, each factor balanced."""
+    """Generator of the cases of one kind in sequence, with every factor balanced."""
 
     def __init__(self, kind: str, rng: np.random.Generator) -> None:
         contents: dict[str, Sequence[Any]] = {
@@ -116,7 +116,7 @@ class _Draws:
         self.targets = _balanced(TARGETS_MV, rng)
 
     def case(self, number: int) -> CaseSpec:
-        """The next case; its name counts all kinds."""
+        """The next case; `number` counts cases of all kinds and is part of its name."""
         names = next(self.recipes)
         known = [RECIPES[name] for name in names if name in RECIPES]
         cell, records = next(self.cells), next(self.records)
@@ -148,6 +148,6 @@ class _Draws:
 
 
 def _balanced(values: Sequence[Any], rng: np.random.Generator) -> Iterator[Any]:
-    """Each value once in a random order, then again in another."""
+    """All values in a random order, then again in another, without end."""
     while True:
         yield from (values[k] for k in rng.permutation(len(values)))

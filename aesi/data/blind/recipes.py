@@ -1,8 +1,8 @@
 """Effects of the catalogue as this generator makes them, scaled by a magnitude m.
 
-A recipe says what is changed in the laboratory, or on the instrument, at m = 1. Where a model option moves the
-voltage by itself (surface form, size distribution), `reference` is the same option without the effect, and the
-difference of the two runs is what is added to the base run, so that one effect is one effect.
+A recipe states the change in the laboratory, or in the instrument, at m = 1. Where a model option by itself changes the
+voltage (surface form, size distribution), `reference` is the same option without the effect. The difference of the two
+runs is added to the base run, so that a recipe adds only its effect.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ class Written:
 
 
 FINER = 10
-"""Rows of the cell for one of an instrument that reads between them: a straight line between two rows of a second is up
-to 25 mV off where the current jumps."""
+"""Number of simulated rows per row of an instrument that reads between its rows: linear interpolation between rows 1 s
+apart is wrong by up to 25 mV where the current jumps."""
 
 
 def _as_is(written: Written, values: Values) -> Written:
@@ -45,17 +45,17 @@ def _as_is(written: Written, values: Values) -> Written:
 class Recipe:
     """One effect.
 
-    values : magnitude m, capacity in Ah and first state of charge -> values of the laboratory's change, or of the
+    values : (magnitude m, capacity in Ah, initial state of charge) -> values of the laboratory's change, or of the
     instrument's fault.
-    change : the laboratory's change, or None where the fault is the instrument's.
-    also : answers that a lenient judge takes as well.  least, most : magnitudes between which it is an effect: below,
-    a wrong parameter is within what parametrisations of one cell differ by; above, it is not physical.
-    test : what shows it; it takes the place of a drive.  cells : on which it can be made.
-    needs_soc0 : whether an unknown state of charge takes it up.  warm : whether it is about the temperature, which
-    no column then gives away.
-    radial_points : of the two runs whose difference counts; their mesh error cancels.
-    between : the instrument reads between rows: so many of the cell are made for each of its own.
-    as_named : the values as the parameters of those names in the package count them, by the declared cell file.
+    change : the laboratory's change, or None for a fault of the instrument.
+    also : answers that a lenient judge also accepts.  least, most : range of magnitudes: below it, a wrong parameter is
+    within the differences of parametrisations of one cell; above, it is not physical.
+    test : test that shows the effect, in place of a drive.  cells : cells on which it can be made.
+    needs_soc0 : True where an unknown state of charge would absorb it.  warm : True where it concerns the temperature,
+    which is then in no column.
+    radial_points : of the two runs whose difference is used; their mesh error cancels.
+    between : simulated rows per row, for an instrument that reads between rows.
+    as_named : converts the values to the package's parameters of those names, by the declared cell file.
     """
 
     label: str
@@ -76,12 +76,12 @@ class Recipe:
 
 
 def _beyond(parameter: str, base: float) -> float:
-    """Magnitude m at which base**-m is outside what parametrisations of one cell differ by."""
+    """Magnitude m from which base**-m exceeds the differences of parametrisations of one cell."""
     return BEYOND * SPREADS[parameter] / math.log(base)
 
 
 def _over_windows(values: Values, declared: Path) -> Values:
-    """Slopes of a diffusivity over the whole stoichiometry window of an electrode, which the laboratory has per unit of
+    """Slopes of a diffusivity over the stoichiometry window of an electrode, from the laboratory's slopes per unit of
     stoichiometry."""
     electrodes = {"negative_slope": "Negative electrode", "positive_slope": "Positive electrode"}
     return {
@@ -117,7 +117,7 @@ def _lag(written: Written, values: Values) -> Written:
 
 
 def _rate(written: Written, values: Values) -> Written:
-    """The clock runs fast: its seconds are shorter, so that rows a second apart on it lie closer in truth."""
+    """The clock runs fast: its seconds are shorter, so that rows one second apart on it are closer in true time."""
     true_s = written.time_s / (1 + values["skew"])
     return Written(
         written.time_s,

@@ -1,10 +1,10 @@
-"""By how much the own parameters of one cell differ between two careful parametrisations of it.
+"""Differences of a cell's parameters between two careful parametrisations of it.
 
 The LG M50 was taken apart and measured twice: Chen et al. 2020 (doi:10.1149/1945-7111/ab9050) and O'Regan et al. 2022
 (doi:10.1016/j.electacta.2022.140700). At 25 degC, half charge and 1 mol/l, PyBaMM's sets of the two differ by the
-natural logarithms in `DIFFERENCES`; where both are a draw about the truth, the standard deviation of one is the
-difference over the root of two. Of the two electrodes the smaller difference is used for both: the other one is 18-fold
-in diffusivity and four-fold in the rate constant, and no effect can be identified against a cell file that far off.
+natural logarithms in `DIFFERENCES`. If both are random draws about the truth, the standard deviation of one is the
+difference over sqrt(2). The smaller difference of the two electrodes is used for both: the other is 18-fold in
+diffusivity and four-fold in the rate constant, and with a cell file that wrong no effect can be identified.
 Potentials and balance are as declared.
 
     python -m aesi.data.blind.spread
@@ -28,14 +28,14 @@ DIFFERENCES = {"diffusivity": 0.61, "kinetics": 0.31, "electrolyte_diffusivity":
 SPREADS = {name: value / math.sqrt(2) for name, value in DIFFERENCES.items()}
 """Standard deviation of the natural logarithm."""
 FURTHEST = 2.0
-"""Standard deviations at which draws end. What is beyond 2.5 of them is a wrong parameter and not a spread."""
+"""Limit of draws, in standard deviations. Beyond 2.5 of them a value is a wrong parameter, not a spread."""
 BEYOND = 2.5
 REFERENCE_K = 298.15
 """Temperature at which the two parametrisations are compared."""
 
 
 def parametrisation(rng: np.random.Generator) -> tuple[Applied, ...]:
-    """One draw of a cell's own parameters, as changes of the laboratory."""
+    """One draw of a cell's parameters, as changes of the laboratory."""
 
     def factor(name: str) -> float:
         deviations = float(np.clip(rng.standard_normal(), -FURTHEST, FURTHEST))

@@ -1,7 +1,7 @@
-"""Effects that are in no catalogue: what a finder must call unknown.
+"""Effects that are not in the catalogue, which a finder must call unknown.
 
-Each changes the noise-free voltage by a real, structured amount that no physics of the catalogue has: at magnitude
-m, in millivolts, roughly m times the stated size.
+Each changes the noise-free voltage by a structured amount that no effect of the catalogue describes: at magnitude
+m, roughly m times the stated size in mV.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ from aesi.numerics.typing import Array
 
 @dataclass(frozen=True)
 class Stranger:
-    """shift : trace, capacity in Ah, random generator -> (n,) V added to the voltage at magnitude 1."""
+    """An unknown effect.  shift : (trace, capacity in Ah, generator) -> (n,) V added to the voltage at magnitude 1."""
 
     shift: Callable[[TrueRun, float, np.random.Generator], Array]
     also: tuple[str, ...] = ()
 
 
 def _throughput(trace: TrueRun) -> Array:
-    """(n,) Ah through the cell, either way."""
+    """(n,) Ah, charge throughput in both directions."""
     step = 0.5 * (np.abs(trace.current_a[1:]) + np.abs(trace.current_a[:-1])) * np.diff(trace.time_s)
     return np.concatenate([[0.0], np.cumsum(step)]) / SECONDS_PER_HOUR
 
 
 def _lagged(values: Array, time_s: Array, constant_s: float) -> Array:
-    """First-order lag of (n,) values, straight between rows."""
+    """First-order lag of (n,) values that are linear between rows."""
     decay = np.exp(-np.diff(time_s) / constant_s)
     out = np.empty_like(values)
     out[0] = 0.0
@@ -41,14 +41,14 @@ def _lagged(values: Array, time_s: Array, constant_s: float) -> Array:
 
 
 def _breathing(trace: TrueRun, capacity_ah: float, rng: np.random.Generator) -> Array:
-    """Waves of the open-circuit voltage along the charge that went through, whichever way it went."""
+    """Waves of the open-circuit voltage along the charge throughput."""
     wave = rng.uniform(0.06, 0.12) * capacity_ah
     shift: Array = 6e-3 * np.sin(2 * np.pi * _throughput(trace) / wave)
     return shift
 
 
 def _memory(trace: TrueRun, capacity_ah: float, rng: np.random.Generator) -> Array:
-    """Two lags of the current against each other: a first answer that is taken back some minutes later."""
+    """Difference of two lags of the current: a first response that decays some minutes later."""
     rate = trace.current_a / capacity_ah
     fast = _lagged(rate, trace.time_s, rng.uniform(40, 80))
     slow = _lagged(rate, trace.time_s, rng.uniform(400, 800))
@@ -67,7 +67,7 @@ def _loose_contact(trace: TrueRun, capacity_ah: float, rng: np.random.Generator)
 
 
 def _wandering(trace: TrueRun, capacity_ah: float, rng: np.random.Generator) -> Array:
-    """A reference that wanders with the air of the room, whatever the cell does."""
+    """A voltage reference that drifts with the room's air, independently of the cell."""
     period = rng.uniform(900, 2000)
     phase = rng.uniform(0, 2 * np.pi)
     shift: Array = 6e-3 * (np.sin(2 * np.pi * trace.time_s / period + phase) - np.sin(phase))
@@ -75,14 +75,14 @@ def _wandering(trace: TrueRun, capacity_ah: float, rng: np.random.Generator) -> 
 
 
 def _uneven_converter(trace: TrueRun, capacity_ah: float, rng: np.random.Generator) -> Array:
-    """A converter whose steps are not equal: an error that repeats every tens of millivolts."""
+    """A converter with unequal steps: an error that is periodic over tens of millivolts."""
     pitch = rng.uniform(0.03, 0.05)
     shift: Array = 6e-3 * np.sin(2 * np.pi * trace.voltage_v / pitch)
     return shift
 
 
 def _fatigue(trace: TrueRun, capacity_ah: float, rng: np.random.Generator) -> Array:
-    """A resistance that grows in the first seconds of every load and forgets at rest, on discharge only."""
+    """A resistance that grows in the first seconds of every discharge and recovers at rest."""
     effort = _lagged(np.maximum(trace.current_a, 0.0) / capacity_ah, trace.time_s, rng.uniform(60, 120))
     shift: Array = -0.05 * effort * np.maximum(trace.current_a, 0.0) / capacity_ah
     return shift

@@ -1,1 +1,1 @@
-"""A cell on a computer: PyBaMM's reduced and full porous-electrode models, changed, driven and cached."""
+"""A simulated cell: PyBaMM's reduced and full porous-electrode models with changes, under profiles, cached."""

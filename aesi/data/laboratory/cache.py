@@ -1,7 +1,7 @@
-"""Arrays kept on disk under the hash of everything that made them.
+"""Arrays cached on disk under the hash of everything that determines them.
 
-A killed process leaves no half of an entry; one that does not
-match its own checksum is computed again, and a warning says so.
+A killed process leaves no partial entry; one that does not
+match its own checksum is computed again, with a warning.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from aesi.numerics.typing import Array
 
 CHECKSUM = "checksum"
 SHIPPED = Path(__file__).with_name("shipped")
-"""Entries that come with the package, once `docs/hooks/ship.py` has put an experiment's virtual records there; they are
-met by content like any other. Without them they are made."""
+"""Entries that come with the package, once `docs/hooks/ship.py` has put an experiment's virtual records there. They are
+found by their key like any other; without them, the arrays are computed."""
 
 
 def key_of(parts: Mapping[str, Any]) -> str:
-    """SHA-256 of plain values and arrays, 24 hexadecimal digits."""
+    """First 24 hexadecimal digits of the SHA-256 of plain values and arrays."""
     sha = hashlib.sha256()
     for name in sorted(parts):
         value = parts[name]
@@ -44,9 +44,9 @@ def key_of(parts: Mapping[str, Any]) -> str:
 
 
 def cached(kind: str, key: str, make: Callable[[], dict[str, Array]]) -> dict[str, Array]:
-    """The arrays kept under kind and key, made and kept where they are not there yet.
+    """The arrays cached under kind and key; computed by `make` and cached where they are missing.
 
-    Those that come with the package (`SHIPPED`) are found first.
+    Those that come with the package (`SHIPPED`) are looked up first.
     Raises DataError where the cache folder cannot be written.
     """
     path = cache_folder() / kind / f"{key}.npz"

@@ -1,4 +1,4 @@
-"""One change of the laboratory's cell: where it acts, and with which values."""
+"""One change of the laboratory's cell: the part of the simulation that it changes, and its values."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def _same_voltage(time_s: Array, current_a: Array, voltage_v: Array, values: Val
 
 @dataclass(frozen=True)
 class Change:
-    """One change. defaults : its values, at which it is typically seen; units are in their names."""
+    """One change. defaults : value name, with unit -> typical value."""
 
     id: str
     defaults: Values
@@ -36,7 +36,7 @@ class Change:
     terminal_voltage: Callable[[Array, Array, Array, Values], Array] = _same_voltage
 
     def complete(self, values: Values) -> dict[str, float]:
-        """The defaults overlaid with the given values; an unknown name is a DataError."""
+        """The defaults, replaced by the given values.  Raises DataError for an unknown name."""
         unknown = sorted(set(values) - set(self.defaults))
         if unknown:
             known = ", ".join(self.defaults)

@@ -1,7 +1,7 @@
-"""What may be changed in the laboratory's cell: ids as in the catalogue of effects, physics by PyBaMM.
+"""The changes of the laboratory's cell: ids as in the catalogue of effects, physics by PyBaMM.
 
-A change acts by model options, by parameters, on the current that the cell sees, or on its terminal voltage.
-Nothing here is shared with the room that looks for effects; that is what makes a test of it a test.
+A change acts by model options, by parameters, on the current of the cell, or on its terminal voltage.
+No code is shared with the search for effects, so that a test of that search is independent.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def _ambient(parameters: Any, values: Values) -> None:
 
 
 def _course(parameters: Any, values: Values) -> None:
-    """The cell's temperature from the reference and a shift towards a plateau, as under a steady load in a chamber."""
+    """The cell's temperature rises from reference plus shift towards a plateau, as under constant load in a chamber."""
     import pybamm
 
     start = float(parameters["Initial temperature [K]"]) + values["shift_k"]
@@ -70,7 +70,7 @@ def _resistance(parameters: Any, values: Values) -> None:
 
 
 def _film(time_s: Array, current_a: Array, voltage_v: Array, values: Values) -> Array:
-    """V - R(t) I with R growing with the charge that went through, either way, and with time."""
+    """V - R(t) I, (n,) V, with R growing with charge throughput and with time."""
     through = np.concatenate(
         [[0.0], np.cumsum(0.5 * (np.abs(current_a[1:]) + np.abs(current_a[:-1])) * np.diff(time_s))]
     )
@@ -82,7 +82,7 @@ def _film(time_s: Array, current_a: Array, voltage_v: Array, values: Values) -> 
 
 
 def _hysteresis(parameters: Any, values: Values) -> None:
-    """Half the gap up on delithiation, down on lithiation, per electrode; one-state as in Axen 2022."""
+    """One-state hysteresis as in Axen 2022: half the gap up on delithiation, down on lithiation, per electrode."""
     for electrode, gap in (("Negative", values["negative_v"]), ("Positive", values["positive_v"])):
         middle = parameters[f"{electrode} electrode OCP [V]"]
         _update(
@@ -103,14 +103,14 @@ def _plus(function: Any, shift: float) -> Any:
 
 
 def _window(parameters: Any, electrode: str) -> tuple[float, float]:
-    """Stoichiometry of the empty cell and of the full one."""
+    """Stoichiometries of an electrode in the empty and in the full cell."""
     low = float(parameters[f"{electrode} electrode minimum stoichiometry"])
     high = float(parameters[f"{electrode} electrode maximum stoichiometry"])
     return (low, high) if electrode == "Negative" else (high, low)
 
 
 def _ocp(parameters: Any, values: Values) -> None:
-    """A Gaussian bump on either electrode's open-circuit potential; its place and width count in charge."""
+    """A Gaussian bump on the open-circuit potential of either electrode, with centre and width in state of charge."""
     import pybamm
 
     for electrode in ("Negative", "Positive"):
@@ -281,7 +281,7 @@ CHANGES: dict[str, Change] = {
         Change(
             "lithium_plating",
             {"rate_m_s": 1e-9},
-            {"lithium plating": "reversible", "surface form": "algebraic"},  # without, no current is shared
+            {"lithium plating": "reversible", "surface form": "algebraic"},  # else no current is shared
             _plating,
         ),
     )

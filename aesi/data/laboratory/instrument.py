@@ -1,4 +1,4 @@
-"""What a cycler writes of what the cell did: noise, then the steps of its converters."""
+"""A cycler's reading of a simulated cell: noise, then the resolution of its converters."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from aesi.records import Measurement
 
 @dataclass(frozen=True)
 class Instrument:
-    """Standard deviations of white noise, and the last digit of each channel (0 writes all digits)."""
+    """Standard deviations of the white noise, and the resolution of each channel (0 writes all digits)."""
 
     voltage_noise_v: float = 1e-3
     current_noise_a: float = 4e-3
@@ -30,7 +30,7 @@ class Instrument:
         temperature: bool,
         notes: tuple[str, ...] = (),
     ) -> Measurement:
-        """The trace as a measurement; the temperature column is there where asked for."""
+        """The trace as a measurement, with a temperature column where `temperature` is True."""
         n = len(trace.time_s)
         current = trace.current_a + self.current_noise_a * rng.standard_normal(n)
         voltage = trace.voltage_v + self.voltage_noise_v * rng.standard_normal(n)

@@ -26,14 +26,14 @@ REFERENCE_K = 298.15
 """The temperature of the published parameters."""
 CHARGE_AH_MOL = FARADAY_C_MOL / SECONDS_PER_HOUR
 COLDER_K, WARMER_K = 290.65, 305.65
-"""7.5 K either side, over which an activation energy is taken."""
+"""Temperatures, 7.5 K below and above the reference, between which an activation energy is computed."""
 
 
 @dataclass(frozen=True)
 class PublishedSet:
-    """A PyBaMM parameter set and what it leaves to be said.
+    """A PyBaMM parameter set, and the data of the cell that it lacks.
 
-    pairs : electrode pairs, by which the set's cell is multiplied.  cell : fields of BPX's section `Cell`.
+    pairs : number of electrode pairs that multiplies the set's cell.  cell : fields of BPX's section `Cell`.
     negative_ocp, positive_ocp : V, expressions in the stoichiometry x.  conductivity : S/m in x, mol/m3.
     """
 
@@ -228,7 +228,7 @@ def _efficiency(values: Any, part: str) -> float:
 
 
 def _effective_conductivity(values: Any, side: str) -> float:
-    """Of the solid as it is in the electrode, all that is no pore: BPX applies no exponent to it."""
+    """Effective conductivity of an electrode's solid, S/m, by its volume fraction: BPX applies no exponent to it."""
     solid = 1 - values[f"{side} electrode porosity"]
     exponent = values[f"{side} electrode Bruggeman coefficient (electrode)"]
     return _digits(values[f"{side} electrode conductivity [S.m-1]"] * solid**exponent)
@@ -244,7 +244,7 @@ def _at(values: Any, name: str, *inputs: float) -> float:
 
 
 def _activation(of_kelvin: Any) -> float:
-    """J/mol of a quantity between the two temperatures."""
+    """Activation energy of a quantity, J/mol, between the two temperatures."""
     ratio = np.log(of_kelvin(WARMER_K) / of_kelvin(COLDER_K))
     return round(float(GAS_CONSTANT_J_MOL_K * ratio / (1 / COLDER_K - 1 / WARMER_K)), 1)
 
@@ -254,7 +254,7 @@ def _digits(value: float) -> float:
 
 
 def write(folder: Path) -> list[Path]:
-    """Write the file of every set; their paths."""
+    """Write the files of all sets; returns their paths."""
     paths = []
     for published in SETS:
         path = folder / published.file

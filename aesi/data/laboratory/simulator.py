@@ -1,9 +1,9 @@
 """One run of PyBaMM's SPMe or DFN on a BPX cell, with changes, under a current profile.
 
-Against silent errors the solver is stopped at every edge of the current and kept from long steps, so that no
-pulse is stepped over; the charge of the model is compared with the integral of the current; a run that ends
-early is an error; radial points are dense at the surface of the particles, where the default's 20 even ones
-move the voltage by millivolts.
+To avoid silent errors, the solver is stopped at every edge of the current and its steps are limited, so that no
+pulse is skipped. The charge of the model is compared with the integral of the current, and a run that ends
+early is an error. Radial points are dense at the surface of the particles; the default's 20 even ones change
+the voltage by millivolts.
 """
 
 from __future__ import annotations
@@ -29,40 +29,40 @@ from aesi.numerics.typing import Array
 
 LaboratoryModel = Literal["SPMe", "DFN"]
 VERSION = 5
-"""Raised with every change to this room that changes a voltage, so that old cache entries are not met."""
+"""Increased with every change of this package that changes a voltage, so that old cache entries are not used."""
 
 EDGE_SHARE = 0.15
 """A change of the current between two rows by this share of its range is an edge."""
 MOST_EDGES = 400
-"""Of the current that the solver is told of, the largest: each costs a restart."""
+"""Largest number of edges at which the solver is stopped, the largest ones: each costs a restart."""
 MOST_STEPS = 40_000
-"""Steps that the limit on the solver's step may ask for: longer records have a longer limit."""
+"""Largest number of steps that the limit on the step may require: longer records have a longer limit."""
 CHARGE_TOLERANCE = 6e-4
-"""Of the nominal capacity. The solver's own error has been seen at 3.8e-4 over 8,820 s at 10 Hz; a pulse of 2 s at
-2C that is stepped over makes 1.1e-3."""
+"""Largest error of the charge, as a share of the nominal capacity. The solver's own error was 3.8e-4 over 8,820 s at 10
+Hz; a skipped pulse of 2 s at 2C makes 1.1e-3."""
 MESH: dict[LaboratoryModel, dict[str, int]] = {
     "SPMe": {"x_n": 40, "x_s": 20, "x_p": 40, "r_n": 80, "r_p": 80, "R_n": 7, "R_p": 7},
     "DFN": {"x_n": 60, "x_s": 20, "x_p": 60, "r_n": 80, "r_p": 80},
 }
-"""Of Chebyshev points across and graded ones along a radius. Even points across err in proportion to their width, like
-a resistance: 80 by 27 microohm on the LG M50, which 10 rows a second show. On its pulses of up to 1.2C, half an hour,
-against 160 points across and 200 along a radius, 80 even ones and 60 err by 0.072 mV RMS and 0.66 at most, these by
-0.011 to 0.013 and 0.10 to 0.12 in as much time."""
+"""Numbers of Chebyshev points across the cell and of graded ones along a radius. The error of even points across is in
+proportion to their width and acts like a resistance: 27 microohm with 80 on the LG M50, visible at 10 rows a second. On
+its pulses of up to 1.2C over half an hour, against 160 points across and 200 along a radius, the error of 80 even and
+60 points is 0.072 mV RMS and 0.66 at most, that of these 0.011 to 0.013 and 0.10 to 0.12 in the same time."""
 SIZES_MESH = {"x_n": 12, "x_s": 6, "x_p": 12, "r_n": 20, "r_p": 20, "R_n": 5, "R_p": 5}
-"""Of a DFN with particles of several sizes, where each point across holds a particle of each size. On the NMC cell with
-radii that scatter by 61 %, under a drive at 0.8C, against 24 points across, 30 along a radius and 7 sizes, it errs by
-0.06 mV RMS; 8 even points across and 15 along a radius by 0.13 in 0.6 times the time."""
+"""Points for a DFN with particles of several sizes, which has a particle of each size at each point across. On the NMC
+cell with a standard deviation of radii of 61 %, under a drive at 0.8C, against 24 points across, 30 along a radius and
+7 sizes, its error is 0.06 mV RMS; that of 8 even points across and 15 along a radius is 0.13 in 0.6 times the time."""
 ELECTRODES = ("negative", "positive")
 STRETCH = 3.3
-"""Of a radial mesh towards the surface, the logarithm of its widest volume over its narrowest, at the least. On pulses
-of the LG M50 at up to 2C this package's single particle is 0.05 mV RMS and 0.15 at most away; 60 points of 2.3 were
-0.08 and 0.50."""
+"""Least grading of a radial mesh towards the surface: logarithm of its widest over its narrowest volume. On pulses of
+the LG M50 at up to 2C it differs from this package's single particle by 0.05 mV RMS and 0.15 at most; 60 points with
+2.3 did by 0.08 and 0.50."""
 RESOLVED_1_S = 1e-4
-"""D / R**2 down to which STRETCH is enough; below, see `stretch`. The LG M50 has 1.5e-4, the LFP cell 1.2e-4; at a
-tenth of the LG M50's diffusivities the mesh that follows is 0.03 mV RMS from this package's single particle."""
+"""D / R**2 down to which STRETCH is enough; below, see `stretch`. The LG M50 has 1.5e-4, the LFP cell 1.2e-4. At a
+tenth of the LG M50's diffusivities, `stretch`'s mesh differs from this package's single particle by 0.03 mV RMS."""
 TOLERANCE: dict[LaboratoryModel, float] = {"SPMe": 1e-6, "DFN": 1e-5}
 COARSE_TOLERANCE = 1e-5
-"""With radial points of one's own choice, for runs whose differences count."""
+"""Tolerance of runs with a given number of radial points, of which only differences are used."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Applied:
 
 @dataclass(frozen=True, eq=False)
 class TrueRun:
-    """What the cell did, without noise. voltage_v, temperature_degc, soc : (n,)."""
+    """A simulated run without noise. voltage_v, temperature_degc, soc : (n,)."""
 
     time_s: Array
     current_a: Array
@@ -86,7 +86,7 @@ class TrueRun:
 
 @dataclass(frozen=True)
 class Setup:
-    """A cell file, a model, and what is changed in both."""
+    """A cell file, a model, and changes of both."""
 
     bpx: Path
     model: LaboratoryModel = "DFN"
@@ -99,9 +99,9 @@ class Setup:
 
 
 def simulate_truth(setup: Setup, profile: Profile, between: int = 1) -> TrueRun:
-    """The trace of a set-up under a profile, from the cache where it is there.
+    """The trace of a set-up under a profile, from the cache where it exists.
 
-    between : traces have so many rows for each of the profile, for instruments that read between its rows.
+    between : rows of the trace per row of the profile, for instruments that read between its rows.
     Raises SimulationError where the model stops early or loses charge; DataError for a cell file that cannot
     be read.
     """
@@ -140,7 +140,7 @@ def simulate_truth(setup: Setup, profile: Profile, between: int = 1) -> TrueRun:
 
 
 def finer(time_s: Array, between: int) -> Array:
-    """(n,) s with so many rows for each; every `between`-th is one that was given."""
+    """(n,) s with `between` times for each given one; every `between`-th is a given time."""
     rows = np.arange(between * (len(time_s) - 1) + 1) / between
     return np.asarray(np.interp(rows, np.arange(len(time_s)), time_s), dtype=float)
 
@@ -177,10 +177,11 @@ def parameter_values(bpx: Path, soc0: float) -> Any:
 
 
 def stretch(values: Any, electrode: str) -> float:
-    """Of the radial mesh of an electrode: as large as its diffusivity at the start asks for.
+    """Grading (see STRETCH) of the radial mesh of an electrode, as its initial diffusivity requires.
 
-    A current leaves a profile of width sqrt(D) and height 1 / sqrt(D) below the surface, which volumes of width h miss
-    by (h / sqrt(D))**2 / sqrt(D): the narrowest is in proportion to D**(3/4).  values : PyBaMM's parameters.
+    A current makes a profile of width sqrt(D) and height 1 / sqrt(D) below the surface, for which volumes of width h
+    have an error of (h / sqrt(D))**2 / sqrt(D): the narrowest is in proportion to D**(3/4).  values : PyBaMM's
+    parameters.
     """
     import pybamm
 
@@ -209,7 +210,7 @@ def _simulate(setup: Setup, profile: Profile, time: Array, values: Any) -> dict[
     declared = {"contact resistance": "true"} if values.get(CONTACT_RESISTANCE, 0.0) else {}
     options = _options([declared, *(change.options for change, _ in changes)])
     if _many_sizes(setup):
-        options.pop("heat of mixing", None)  # PyBaMM has it for particles of one size alone
+        options.pop("heat of mixing", None)  # PyBaMM supports it only for particles of one size
     current = profile.current_a
     for change, chosen in changes:
         current = change.cell_current(profile.time_s, current, chosen)
@@ -253,7 +254,7 @@ def _mesh(setup: Setup) -> dict[str, int]:
 
 
 def _submeshes(setup: Setup, values: Any) -> dict[str, Any]:
-    """Where the points across, of a radius and of a distribution of radii lie."""
+    """Meshes across the cell, along a radius and over a distribution of radii."""
     import pybamm
 
     across = ("negative electrode", "separator", "positive electrode")

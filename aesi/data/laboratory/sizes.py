@@ -1,8 +1,8 @@
-"""Particle sizes of the laboratory's cell: few, at the points of the Gauss rule of their own distribution.
+"""Particle sizes of the laboratory's cell: few, at the points of the Gauss rule of their distribution.
 
-PyBaMM divides the radii up to five standard deviations evenly. Where they scatter by 60 % of their mean, the voltage of
-a single-particle model under US06 then depends on the number of divisions: 1.7 mV off with 6, 0.6 with 8, and 0.7 with
-40, where the range itself is what is wrong. On the points of the Gauss rule, 5 sizes leave 0.04 mV against 14.
+PyBaMM divides the radii up to five standard deviations evenly. With a standard deviation of 60 % of their mean, the
+error of a single-particle model under US06 then depends on the number of divisions: 1.7 mV with 6, 0.6 with 8, and 0.7
+with 40, where the range itself is wrong. At the points of the Gauss rule, 5 sizes differ from 14 by 0.04 mV.
 """
 
 from __future__ import annotations

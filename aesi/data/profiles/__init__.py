@@ -1,1 +1,1 @@
-"""Currents to apply: drive schedules, a vehicle that makes currents of speeds, and profiles of both."""
+"""Currents to apply: drive schedules, a vehicle model that converts speeds to currents, and profiles of both."""

@@ -15,9 +15,10 @@ from aesi.numerics.typing import Array
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """time_s : (n,) s from 0, evenly spaced.  current_a : (n,) A, discharge positive, straight between rows.
+    """A current profile.
 
-    soc0 : state of charge it is meant to start from.
+    time_s : (n,) s from 0, evenly spaced.  current_a : (n,) A, discharge positive, linear between rows.
+    soc0 : intended initial state of charge.
     """
 
     name: str
@@ -30,13 +31,13 @@ class Profile:
 
     @property
     def charge_ah(self) -> float:
-        """Charge taken out over the profile."""
+        """Net discharged charge of the profile, Ah."""
         return float(np.trapezoid(self.current_a, self.time_s)) / SECONDS_PER_HOUR
 
 
 @dataclass(frozen=True)
 class Bench:
-    """What turns pieces into currents: the cell's capacity, the vehicle around it, the rows' spacing in s."""
+    """Converter of pieces to currents (n,) A: with the cell's capacity, its vehicle, and the interval of rows in s."""
 
     capacity_ah: float
     dt_s: float = 0.1
@@ -48,11 +49,11 @@ class Bench:
         return np.zeros(self._rows(seconds))
 
     def pulse(self, c_rate: float, seconds: float) -> Array:
-        """Constant current; a negative rate charges."""
+        """Constant current at a C-rate, positive on discharge."""
         return np.full(self._rows(seconds), c_rate * self.capacity_ah)
 
     def drive(self, name: str) -> Array:
-        """A bundled schedule through the vehicle, `scale` times, without the schedule's last row."""
+        """The current of a bundled schedule in the vehicle, times `scale`, without the schedule's last row."""
         vehicle = self.vehicle or Vehicle(pack=Pack.for_capacity(self.capacity_ah))
         return self.scale * vehicle.cell_current_a(schedule(name), self.dt_s)[:-1]
 
@@ -76,7 +77,7 @@ PULSE_S = 20.0
 AFTER_PULSE_S = 140.0
 PULSE_C = 5.0
 OTHER_LOAD = 2.0
-"""Takes the validation and test currents from 1.5C to 3.1C, where the paper's reach and training has been."""
+"""Factor on the validation and test currents: from 1.5C to 3.1C, which the paper's reach and training covers."""
 
 
 def with_pulses(

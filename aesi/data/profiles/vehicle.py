@@ -1,12 +1,12 @@
-"""A battery-electric vehicle on a flat road: from speed to the current of one cell.
+"""A battery-electric vehicle on a flat road: the current of one cell from the speed.
 
     F = m_e dv/dt + m g c_r + rho/2 c_d A v**2        force at the wheels while rolling             (1)
     P = F v / eta_drive          for F v > 0                                                        (2)
     P = max(F v eta_regen, -P_regen)   for F v < 0 and v above the regeneration limit, else 0       (3)
     I = (P + P_aux) / (N_s N_p V_nom)                 positive on discharge                         (4)
 
-Leaves out grade, wind, gears, the inverter's map and the sag of the pack: the voltage in (4) is nominal, so
-that the current does not depend on the model that is later driven with it. Road-load form: Guzzella &
+Leaves out grade, wind, gears, the inverter's map and the voltage drop of the pack: the voltage in (4) is nominal, so
+that the current does not depend on the model that it is later applied to. Road-load form: Guzzella &
 Sciarretta, Vehicle Propulsion Systems, 3rd ed., Springer 2013, section 2.1, doi:10.1007/978-3-642-35913-2.
 """
 
@@ -28,7 +28,7 @@ AIR_DENSITY_KG_M3 = 1.2
 class Pack:
     """series x parallel equal cells of a nominal voltage: 31.5 kWh with cells of 30 Ah.
 
-    `parallel` need not be whole: what counts is the capacity of the pack, `for_capacity`.
+    `parallel` need not be whole: the pack is defined by its capacity, see `for_capacity`.
     """
 
     series: int = 96
@@ -37,7 +37,7 @@ class Pack:
 
     @classmethod
     def for_capacity(cls, cell_capacity_ah: float, pack_capacity_ah: float = 90.0) -> Pack:
-        """As many cells of another size as give the same pack, so that a schedule is the same in C-rates."""
+        """The pack of the same capacity with cells of another size, so that a schedule has the same C-rates."""
         return cls(parallel=pack_capacity_ah / cell_capacity_ah)
 
     @property
@@ -50,8 +50,8 @@ class Pack:
 class Vehicle:
     """A compact car; the figures are round ones of its class, not of a make.
 
-    rotating_share : inertia of wheels and rotor as a share of the mass.  regen_power_w, regen_speed_m_s :
-    most power the brakes give back, and the speed below which they give none.
+    rotating_share : inertia of wheels and rotor as a share of the mass.  regen_power_w, regen_speed_m_s : largest
+    regenerative power, and the speed below which there is none.
     """
 
     mass_kg: float = 1800.0
@@ -80,7 +80,7 @@ class Vehicle:
     def cell_current_a(self, schedule: Schedule, dt_s: float) -> Array:
         """(n,) A, discharge positive, every dt_s from the start of the schedule to its end, eq. (4).
 
-        Speed runs straight between the rows of the schedule; the acceleration is that of the second around.
+        The speed is linear between the rows of the schedule; its central differences, interpolated, are the acceleration.
         """
         count = round(schedule.duration_s / dt_s) + 1
         time = np.minimum(dt_s * np.arange(count), schedule.duration_s)

@@ -1,4 +1,4 @@
-"""One reader a kind of file; the only modules of the data room that open measurement files.
+"""One reader per kind of file; the only modules of `aesi.data` that open measurement files.
 
 A cycler's text export needs no reader of its own: its names, units and sign are one file of `formats`.
 """
@@ -26,13 +26,13 @@ PROMISES = {
     ".gz": "gzip file",
     ".mat": "MATLAB file",
 }
-"""Suffixes of what is told by its first bytes, and what they promise."""
+"""Suffix -> kind of file, for kinds that are recognised by their first bytes."""
 
 
 def open_table(path: str | Path, wanted: Collection[str] = ()) -> TableFile:
-    """The reader for a file: cyclers' own by their suffix, all others by their first bytes.
+    """The reader for a file: cyclers' own formats by their suffix, all others by their first bytes.
 
-    wanted : names of columns that the user gave; they tell where a table begins below other lines.
+    wanted : names of columns that the user gave; they show where a table begins below other lines.
     Raises DataError where there is no such file, it is empty, or no reader takes it.
     """
     file = Path(path)

@@ -38,8 +38,8 @@ CURRENTS, TIME, CHARGES = ("I/mA", "<I>/mA", "I/A", "<I>/A"), "time/s", ("dq/mA.
 
 
 def _with_current(columns: dict[str, AnyArray], notes: list[str]) -> dict[str, AnyArray]:
-    """EC-Lab stores the charge between rows and no current for some techniques (GCPL), and writes its `<I>` on export:
-    the charge over the time since the row before."""
+    """The columns with a current. For some techniques (GCPL) EC-Lab stores the charge between rows and no current; its
+    exported `<I>` is that charge over the time since the row before."""
     charge = next((name for name in CHARGES if name in columns), None)
     if charge is None or TIME not in columns or any(name in columns for name in CURRENTS):
         return columns

@@ -1,4 +1,4 @@
-"""A table that a maker's own reader hands over whole: `.mpr` (galvani), `.nda` and `.ndax` (batterydf), `.xlsx`."""
+"""A table that another reader returns in memory: `.mpr` (galvani), `.nda` and `.ndax` (batterydf), `.xlsx`."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from aesi.numerics.typing import Array
 class FrameTable:
     """Columns in memory; see `aesi.data.readers.table.TableFile`.
 
-    columns : one sequence a column, in the order of `header`.  row_numbers : of each row in the file,
-    where rows have numbers there.
+    columns : one sequence per column, in the order of `header`.  row_numbers : number of each row in the file, where
+    rows have numbers there.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Where a table begins: the line with the names of its columns, below whatever a logger writes above it."""
+"""Search for the heading of a table: the line with the names of its columns, below a logger's preamble."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from aesi.data.readers.formats import recognise
 from aesi.data.readers.formats.format import Format, plain
 
 LINES_LOOKED_AT = 600
-"""BioLogic writes some 100 lines above its table, Novonix one a step of the protocol."""
+"""Number of lines searched: BioLogic writes some 100 lines above its table, Novonix one per step of the protocol."""
 SEPARATORS = ",;\t|"
 KNOWN = ("time_s", "current_a", "voltage_v", "test time / s", "current / a", "voltage / v")
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?inf(inity)?", re.ASCII | re.IGNORECASE)
@@ -25,9 +25,9 @@ UNIT_CELL = re.compile(
 
 @dataclass(frozen=True)
 class Heading:
-    """line : its number, counted from 0.  units : what a line of units below it says, '' where nothing.
+    """The heading of a table.
 
-    has_units : whether there is such a line, which holds no data.
+    line : its number, counted from 0.  units : units from a line of units below it, '' for a column without one.
     """
 
     line: int
@@ -37,14 +37,13 @@ class Heading:
 
     @property
     def has_units(self) -> bool:
-        """Whether a line of units stands between the names and the numbers."""
+        """True where a line of units, which holds no data, is between the names and the numbers."""
         return any(self.units)
 
 
 def find_heading(rows: Sequence[Sequence[str]], wanted: Collection[str] = ()) -> Heading | None:
-    """The heading among rows of cells: a maker's, or one with two of our, BDF's or the wanted names.
-
-    None where there is none of these.
+    """The heading among rows of cells: a maker's, or a row with two of this project's, BDF's or the wanted names; None
+    without one.
     """
     names = {*KNOWN, *(plain(name) for name in wanted)}
     fallback: Heading | None = None
@@ -66,8 +65,8 @@ def find_heading(rows: Sequence[Sequence[str]], wanted: Collection[str] = ()) ->
 def likely_heading(rows_from: Iterable[Sequence[Sequence[str]]]) -> Heading | None:
     """The first row of names with as many cells below it, at least two of them numbers; None where there is none.
 
-    For tables that name nothing known: what names they have is what a message can propose.
-    rows_from : of each line, its cells and those of the two below.
+    For tables without known names, so that a message can propose theirs.
+    rows_from : for each line, its cells and those of the two lines below.
     """
     for line, (cells, *below) in enumerate(rows_from):
         names = tuple(cell.strip() for cell in cells)
@@ -81,10 +80,10 @@ def likely_heading(rows_from: Iterable[Sequence[Sequence[str]]]) -> Heading | No
 
 
 def first_of_numbers(rows_from: Iterable[Sequence[Sequence[str]]]) -> int | None:
-    """The line at which a table without names begins: at least two numbers, in the same columns as in the line below,
-    and right above it nothing that could be names. None where there is none.
+    """The line at which a table without names begins: it has at least two numbers, in the same columns as the line
+    below, and no possible names directly above it. None where there is none.
 
-    rows_from : as of `likely_heading`.
+    rows_from : as for `likely_heading`.
     """
     names_above = False
     for line, (cells, *below) in enumerate(rows_from):
@@ -101,9 +100,9 @@ def _is_number(cell: str) -> bool:
 
 
 def separator_of(line: str, below: Sequence[str]) -> str:
-    """What separates the cells of a line: of several, one between which it or a line below has two numbers, and commas
-    in numbers alone, which are decimal ones then; else the most frequent. Counted, decimal commas and those of names
-    (`Zeit, s`) outnumber the tabs between them.
+    """The separator of a line's cells. Of several candidates it is one that leaves two numbers in the line or a line
+    below and commas only within numbers, where they are decimal; else the most frequent one. Frequency alone is not
+    enough: decimal commas and those of names (`Zeit, s`) may outnumber the tabs.
     """
     for separator in SEPARATORS.replace(",", ""):
         if separator in line and any(_is_row_of_numbers(split(each, separator)) for each in (line, *below)):
@@ -125,7 +124,7 @@ def split(line: str, separator: str) -> list[str]:
 
 
 def _units(header: Sequence[str], below: Sequence[str]) -> tuple[str, ...]:
-    """The units of a line that holds units alone, at least two of them; empty where it is a line of data."""
+    """The units in a line that holds only units, at least two; empty where it is a line of data."""
     cells = [cell.strip() for cell in below]
     said = [cell for cell in cells if cell]
     if len(said) < 2 or not all(UNIT_CELL.fullmatch(cell) and not cell.isdigit() for cell in said):

@@ -1,4 +1,4 @@
-"""How a text table is written: its encoding, separator, decimal sign and header, told by a look at its head."""
+"""Layout of a text table: its encoding, separator, decimal sign and header, determined from its first lines."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from aesi.errors import DataError
 
 COMMENT = "#"
 COLUMN_NUMBER = "#"
-"""Before the number of a column in a table without names."""
+"""Prefix of the number of a column in a table without names."""
 LINES_BELOW = 49
-"""Of the table, that tell its decimal sign and its width. A convention."""
+"""Number of lines of the table from which its decimal sign and width are determined. A convention."""
 THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
 BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
@@ -37,15 +37,15 @@ BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
 LONE_NUL = re.compile(rb"^\x00(?=\r?$)", re.MULTILINE)
-"""A line of one NUL, as Digatron's exports have it above the names of the columns: blank. Any other is binary."""
+"""A line of a single NUL, as in Digatron's exports above the column names, counts as blank; other NULs mean binary."""
 
 
 @dataclass(frozen=True)
 class Layout:
-    """How a text table is written: what a look at its head tells.
+    """Layout of a text table.
 
-    decimal : '' where the lines that were looked at hold whole numbers alone.
-    layer : empty cells that a row of this table begins with, in a report that holds those of cycles and steps too.
+    decimal : decimal sign, '' where the first lines hold only whole numbers.
+    layer : number of empty cells at the beginning of a row of this table, in a report with layers of cycles and steps.
     """
 
     encoding: str
@@ -60,7 +60,7 @@ class Layout:
 
 
 def decoded(head: bytes, name: str) -> tuple[str, str]:
-    """Encoding and text of the head: by its mark, else UTF-8, else Latin-1, which takes any byte."""
+    """(encoding, text) of the head: by its byte-order mark, else UTF-8, else Latin-1, which accepts any byte."""
     for mark, encoding in BYTE_ORDER_MARKS:
         if head.startswith(mark):
             try:
@@ -77,16 +77,16 @@ def decoded(head: bytes, name: str) -> tuple[str, str]:
 
 
 def layout_of(text: str, encoding: str, *, whole: bool, name: str, wanted: Collection[str]) -> Layout:
-    """How a text is laid out as a table, and sentences on what that took for granted.
+    """The layout of a text as a table, with sentences on the assumptions made.
 
-    text : the beginning of a file, or all of it (`whole`); else its last line may be cut off.  encoding : that it was
-    read in.  name : of the file.  wanted : names of columns that the user gave, which a header holds.
+    text : all of a file (`whole`), or its beginning, whose last line may be cut off.  encoding : of the file.
+    name : of the file.  wanted : names of columns that the user gave, which a header holds.
     """
     lines = io.StringIO(text, newline=None).read().split("\n")
     if lines[-1] == "":
-        del lines[-1]  # what follows the end of the last line is none
+        del lines[-1]  # the empty text after the last line end
     if not whole:
-        lines = lines[:-1]  # the last one may be cut by the size of the look
+        lines = lines[:-1]  # the last one may be cut off
     notes: list[str] = []
     rows = [_cells(lines, at) for at in range(min(len(lines), LINES_LOOKED_AT))]
     heading = find_heading(rows, wanted) or likely_heading(_rows_from(lines))
@@ -124,14 +124,14 @@ def layout_of(text: str, encoding: str, *, whole: bool, name: str, wanted: Colle
 
 
 def with_decimal(layout: Layout, decimal: str) -> Layout:
-    """The layout with a decimal sign, and a sentence on one that is a comma."""
+    """The layout with this decimal sign, and a sentence where it is a comma."""
     told = ("Numbers were read with a decimal comma.",) if decimal == "," else ()
     return replace(layout, decimal=decimal, notes=(*layout.notes, *told))
 
 
 def _rows_from(lines: Sequence[str]) -> Iterator[list[list[str]]]:
-    """Of each line, its cells and those of the two below, all split as the line itself is: decimal commas may outnumber
-    the separators below."""
+    """For each line, its cells and those of the two lines below, all split by the separator of the line itself: decimal
+    commas may outnumber the separators below."""
     for start, line in enumerate(lines[:LINES_LOOKED_AT]):
         separator = _separator_at(lines, start)
         below = lines[start + 1 : start + 3]
@@ -142,11 +142,11 @@ def _rows_from(lines: Sequence[str]) -> Iterator[list[list[str]]]:
 
 
 def _layer(above: Sequence[str], header: tuple[str, ...], below: Sequence[str], separator: str) -> int:
-    """Empty cells that a row of this table begins with, below the names of other layers; 0 of a table by itself.
+    """Number of empty cells at the beginning of a row of this table, below the names of other layers; 0 without layers.
 
-    Those names stand in the lines right above, each indented by one cell more, and the rows of such a layer have no
-    more cells than its names: a first column without a name, as of row numbers, is none of that. Neware may write the
-    first row of a step into the line of its cycle, so that the cells of the layers between may follow.
+    The names of layers are in the lines directly above, each indented by one cell more, and the rows of a layer have no
+    more cells than its names, unlike a table with an unnamed first column of row numbers. Neware may write the first
+    row of a step into the line of its cycle, so that cells of the layers between may follow.
     """
     layer = next((i for i, name in enumerate(header) if name), 0)
     names = [_extent(line, separator) for line in above[-layer:]] if layer else []
@@ -159,7 +159,7 @@ def _layer(above: Sequence[str], header: tuple[str, ...], below: Sequence[str], 
 
 
 def _extent(line: str, separator: str) -> tuple[int, int]:
-    """Numbers of the first and of the last cell of a line that holds something."""
+    """Indices of the first and of the last non-empty cell of a line."""
     filled = [i for i, cell in enumerate(split(line, separator)) if cell.strip()]
     return (filled[0], filled[-1]) if filled else (0, 0)
 
@@ -173,7 +173,7 @@ def _separator_at(lines: Sequence[str], at: int) -> str:
 
 
 def _first_line(lines: Sequence[str], name: str) -> tuple[int, tuple[str, ...]]:
-    """Where no line names known columns: the first that is neither blank nor a comment."""
+    """(index, cells) of the first line that is neither blank nor a comment, where no line names known columns."""
     start = next((i for i, line in enumerate(lines) if line.strip() and not line.startswith(COMMENT)), None)
     if start is None:
         raise DataError(f"{name} has no header line; the first line should name the columns.")
@@ -192,7 +192,7 @@ def _first_line(lines: Sequence[str], name: str) -> tuple[int, tuple[str, ...]]:
 
 
 def _numbered(cells: Sequence[str], name: str, line: int, wanted: Collection[str]) -> tuple[str, ...]:
-    """Names for the columns of a table that has none, by which a user who saw its first row can call them."""
+    """Names for the columns of a table that has none, which a user can recognise from its first row."""
     if not any(each.startswith(COLUMN_NUMBER) for each in wanted):
         shown = ", ".join(
             f"{COLUMN_NUMBER}{i} {cell.strip()!r}" for i, cell in enumerate(cells[:SHOWN], start=1)
@@ -208,7 +208,7 @@ def _numbered(cells: Sequence[str], name: str, line: int, wanted: Collection[str
 
 
 def _as_wide_as_the_rows(header: tuple[str, ...], below: Sequence[str], separator: str) -> tuple[str, ...]:
-    """Loggers end their names or their rows with a separator, not always both."""
+    """The header, as wide as the rows: loggers end the line of names or the rows with a separator, not always both."""
     first = next((line for line in below if line.strip()), None)
     if first is None:
         return header
@@ -221,10 +221,10 @@ def _as_wide_as_the_rows(header: tuple[str, ...], below: Sequence[str], separato
 
 
 def decimal_in(rows: Iterable[Sequence[str]], separator: str) -> str | None:
-    """A comma, where more of the cells have a comma than a point; None where no cell has either.
+    """The decimal sign: a comma where more cells have a comma than a point, else a point; None where no cell has either.
 
-    Between commas such cells are quoted, and a comma may be one between thousands, which has three digits behind it
-    and none but 1 to 9 in front: where all are so, it is left to be refused.
+    With a comma as separator, such cells are quoted, and the comma may separate thousands: three digits follow it, and
+    the number does not begin with 0. Where all cells are so, they are left to be refused.
     """
     cells = [cell.strip() for row in rows for cell in row]
     with_comma = [cell for cell in cells if WITH_COMMA.fullmatch(cell)]

@@ -1,6 +1,6 @@
-"""MATLAB's `.mat` up to version 7, through scipy: a structure of equally long vectors, or such vectors by themselves.
+"""MATLAB's `.mat` up to version 7, through scipy: a structure of equally long vectors, or such vectors alone.
 
-Where a file holds several such structures, the name of a column with the structure's chooses one: 'meas.Time'.
+Where a file holds several such structures, a column name with that of its structure selects one: 'meas.Time'.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from aesi.data.readers.table import names_listed
 from aesi.errors import DataError
 
 NO_STRUCTURE = ""
-"""Stands for its name where vectors are in none."""
+"""Name of the table of vectors that are in no structure."""
 
 
 def open_mat(path: Path, wanted: Collection[str] = ()) -> FrameTable:
     """The table of a `.mat` file.
 
     wanted : names of columns that the user gave.
-    Raises DataError where the file is damaged or of version 7.3, where it holds no table or several of which none is
-    chosen, and where the vectors are not equally long.
+    Raises DataError where the file is damaged or of version 7.3, where it holds no table, or several without a choice,
+    and where the vectors are not equally long.
     """
     content = _load(path)
     tables = _tables(content)
@@ -65,8 +65,8 @@ def _load(path: Path) -> dict[str, Any]:
 
 
 def _tables(content: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Columns by the name of their structure; vectors by themselves where no structure has any, and numbers, which are
-    columns of one row, where there are no vectors."""
+    """Name of a structure -> its columns; else the vectors outside structures; else the numbers, as columns of one
+    row."""
     for least in (2, 1):
         inside = {name: _columns(_fields(value), least) for name, value in content.items()}
         tables = {name: columns for name, columns in inside.items() if columns}
@@ -77,13 +77,13 @@ def _tables(content: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
 
 
 def _fields(value: Any) -> dict[str, Any]:
-    """What one structure holds; nothing for what is none, or an array of several."""
+    """The fields of a single structure; empty for anything else."""
     names = getattr(getattr(value, "dtype", None), "names", None)
     return {name: value.ravel()[0][name] for name in names} if names and value.size == 1 else {}
 
 
 def _columns(values: Mapping[str, Any], least: int) -> dict[str, Any]:
-    """The vectors of so many rows, and the cells of words as long as one of them; empty with fewer than two vectors."""
+    """The vectors of at least `least` rows, and cells of words of the same length; empty for fewer than two vectors."""
     numbers = {name: value.ravel() for name, value in values.items() if _is_vector(value, "iufb", least)}
     if len(numbers) < 2:
         return {}
@@ -105,7 +105,7 @@ def _is_vector(value: Any, kinds: str, least: int) -> bool:
 
 
 def _words(cells: Any) -> list[str] | None:
-    """None where a cell holds more than one word."""
+    """The cells as words; None where a cell holds more than one word."""
     if not all(isinstance(cell, np.ndarray) and cell.size <= 1 for cell in cells.flat):
         return None
     return [str(cell.item()) if cell.size else "" for cell in cells.flat]
@@ -114,7 +114,7 @@ def _words(cells: Any) -> list[str] | None:
 def _chosen(
     path: Path, content: Mapping[str, Any], tables: Mapping[str, dict[str, Any]], wanted: Collection[str]
 ) -> str:
-    """The name of the one table, or of the one that a wanted column names."""
+    """The name of the only table, or of the table that a wanted column names."""
     if not tables:
         raise DataError(
             f"{path.name} holds no table: no structure whose fields are vectors, and no vectors by themselves (it has "

@@ -1,9 +1,9 @@
 """Excel workbooks (.xlsx), as Arbin and Neware write them, through openpyxl.
 
-The table is taken from the first sheet whose rows hold a heading of known names, or else from the longest with any
-heading: cyclers write sheets of sums over steps and cycles before that of the records. A note names further sheets with
-the same columns, as Arbin makes them of a long test; clock times and dates become text, so that they are read in the
-same way as from a text file.
+The table is taken from the first sheet with a heading of known names, or else from the longest sheet with any heading:
+cyclers write sheets of sums over steps and cycles before that of the records. A note names further sheets with the same
+columns, into which Arbin divides a long test. Clock times and dates become text, so that they are read as from a text
+file.
 """
 
 from __future__ import annotations
@@ -21,10 +21,11 @@ from aesi.data.readers.heading import LINES_LOOKED_AT, Heading, find_heading, li
 from aesi.errors import DataError
 
 WORKBOOK = "[Content_Types].xml"
-"""In every one of Office Open XML (ECMA-376, part 2)."""
+"""A member of every Office Open XML archive (ECMA-376, part 2)."""
 
 LAST_YEAR_OF_CLOCKS = 1900
-"""A time of a day and more, formatted as one of the day (h:mm:ss), is a date of it to Excel. No test is as old."""
+"""Excel stores a time of more than a day, formatted as a time of day (h:mm:ss), as a date up to this year; no test is
+that old."""
 
 
 def open_sheet(path: Path, wanted: Collection[str] = ()) -> FrameTable:
@@ -54,7 +55,7 @@ def open_sheet(path: Path, wanted: Collection[str] = ()) -> FrameTable:
 
 
 def _check_no_archive(path: Path) -> None:
-    """A workbook is a zip archive of its own kind; one of other files has to be unpacked."""
+    """Refuse a zip archive that is not a workbook: it has to be unpacked."""
     if not zipfile.is_zipfile(path):
         return
     with zipfile.ZipFile(path) as archive:

@@ -1,4 +1,4 @@
-"""What a reader offers: a header, and the numbers below it on request."""
+"""The interface of a reader: a header, and the numbers below it on request."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from aesi.numerics.typing import Array
 
 
 class TableFile(Protocol):
-    """One table on disk, whatever its format.
+    """One table on disk, in any format.
 
-    format : the maker's, where the names of the columns are those of one.
-    units : of a line of units below the names, one a column; empty where there is no such line.
+    format : format of a maker whose column names the table has, else None.
+    units : one per column, from a line of units below the names; empty where there is no such line.
     """
 
     path: Path
@@ -36,16 +36,16 @@ class TableFile(Protocol):
         ...
 
     def where(self, row: int) -> str:
-        """How to find a row (counted from 0) in the file: 'row 5 (line 6)'."""
+        """Place of a row (counted from 0) in the file, as text: 'row 5 (line 6)'."""
         ...
 
 
 SHOWN = 12
-"""Names in a sentence at most."""
+"""Largest number of names in a sentence."""
 
 
 def names_listed(names: Iterable[str]) -> str:
-    """Names of a file's columns, or of what else it holds, for a sentence: a dozen, and how many more there are."""
+    """Names, such as those of a file's columns, for a sentence: at most SHOWN, and the number of the others."""
     every = list(names)
     more = f" and {len(every) - SHOWN} more" if len(every) > SHOWN else ""
     return ", ".join(repr(name[:40]) for name in every[:SHOWN]) + more

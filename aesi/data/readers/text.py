@@ -1,9 +1,9 @@
-"""Text tables: comma, semicolon, tab or bar between the cells, plain or gzip, in any encoding loggers write.
+"""Text tables: cells separated by comma, semicolon, tab or bar, plain or gzip, in any encoding that loggers write.
 
 The header is the first line that names known columns, or else the first of names with numbers below, or else the first
 that is neither blank nor a comment (#).
 Numbers are converted by pyarrow as a stream, so that ten million rows cost the memory of their numbers; only when that
-fails does a slow pass in Python look for the first cell at fault.
+fails does a slow pass in Python look for the first invalid cell.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from aesi.errors import DataError
 from aesi.numerics.typing import Array
 
 HEAD_BYTES = 1 << 18
-"""Read to find the header in: more than any maker's preamble."""
+"""Bytes searched for the header: more than any maker's preamble."""
 BLOCK_BYTES = 1 << 22
-"""Of a file that is converted at a time; it bounds the memory beyond the numbers."""
+"""Bytes of a file that are converted at a time, which bounds the memory beyond the numbers."""
 MISSING = ("", "nan", "NaN", "NAN", "NA", "N/A", "n/a", "#N/A", "null", "NULL", "None", "-nan", "-NaN")
 MINUS = "\N{MINUS SIGN}"
 DAMAGED = (EOFError, zlib.error, gzip.BadGzipFile)
@@ -89,13 +89,13 @@ class TextTable:
         return f"row {row + 1}"
 
     def _first_decimal(self) -> str:
-        """The decimal sign of the first row that has one, in a table that begins with whole numbers, as a rest does."""
+        """The decimal sign of the first row that has one, for a table that begins with whole numbers, as at rest."""
         try:
             with closing(self._rows()) as rows:
                 found = (decimal_in([cells], self._layout.separator) for _, cells in rows)
                 return next((sign for sign in found if sign), ".")
         except (*DAMAGED, csv.Error, UnicodeError, OSError):
-            return "."  # whoever reads the table says what is wrong with it
+            return "."  # the error is raised when the table is read
 
     def _convert(self, positions: tuple[int, ...]) -> list[Array]:
         import pyarrow as pa
@@ -124,10 +124,10 @@ class TextTable:
         return [np.concatenate(piece) if piece else np.empty(0) for piece in pieces]
 
     def _blocks(self) -> Generator[bytes, None, None]:
-        """The file in pieces of whole lines, none of blank lines alone.
+        """The file in blocks of whole lines; no block has only blank lines.
 
-        Cut here: a Python file that pyarrow streams is read ahead in a thread, which a bad cell leaves behind; the
-        process then aborted at its end about one time in twenty.
+        The file is divided here, not by pyarrow, which reads a Python file ahead in a thread. A bad cell left that
+        thread behind, and about one process in twenty aborted at its end.
         """
         rest = b""
         with self._utf8() as stream:
@@ -145,7 +145,7 @@ class TextTable:
         return self.path.open("rb")
 
     def _utf8(self) -> BinaryIO:
-        """The file as UTF-8 bytes; loggers' files nearly always are, and then nothing is copied."""
+        """The file as UTF-8 bytes; without a copy where it already is UTF-8, as nearly all loggers' files."""
         if self._layout.layer:
             return self._records_alone()
         if self._layout.encoding in ("utf-8", "utf-8-sig"):
@@ -153,7 +153,7 @@ class TextTable:
         return cast(BinaryIO, codecs.EncodedFile(self._bytes(), "utf-8", self._layout.encoding))
 
     def _records_alone(self) -> BinaryIO:
-        """The lines above the table, and of the rows those of its own layer, without the tabs that pad their cells."""
+        """The lines above the table and the rows of its own layer, without the tabs that pad their cells."""
         layout = self._layout
         start = layout.separator * layout.layer
         with self._text() as text:
@@ -168,9 +168,9 @@ class TextTable:
         return io.TextIOWrapper(self._bytes(), encoding=self._layout.encoding, errors="replace")
 
     def _rows(self) -> Generator[tuple[int, list[str]], None, None]:
-        """Line number and cells of each row below the header; blank lines are passed over.
+        """(line number, cells) of each row below the header, without blank lines.
 
-        To be closed: left half way, it would hold the file open for as long as an error's traceback lives.
+        The caller has to close it: otherwise an error's traceback would keep the file open.
         """
         with self._text() as text:
             for _ in range(self._layout.lines_before_data):
@@ -181,9 +181,9 @@ class TextTable:
                     yield self._layout.lines_before_data + reader.line_num, cells
 
     def _raise_first_fault(self, positions: tuple[int, ...]) -> int:
-        """The slow pass: name the first row of the wrong length or cell that is no number.
+        """The slow pass: raise DataError for the first row of the wrong length or cell that is not a number.
 
-        Returns the number of rows where it finds no fault.
+        Returns the number of rows where there is none.
         """
         row = -1
         try:
@@ -229,12 +229,12 @@ class TextTable:
 
 
 def _is_number(cell: str, decimal: str) -> bool:
-    """Whether a cell is a number with that decimal sign: beside a decimal comma a point is none."""
+    """True where a cell is a number with that decimal sign; with a decimal comma, a point is not allowed."""
     return bool(NUMBER.fullmatch(cell.replace(decimal, "."))) and (decimal == "." or "." not in cell)
 
 
 def _advice(cell: str, name: str, layout: Layout) -> str:
-    """What to do about a cell that is no number, in the column of that name; from ': ' or ', ' on."""
+    """End of a message, from ': ' or ', ' on: advice for a cell that is not a number, in the column of that name."""
     if cell == name:
         return ": a second table begins there, below the names of its columns; split the file there"
     if _is_number(cell.replace(MINUS, "-"), layout.decimal):
