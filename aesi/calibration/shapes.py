@@ -1,13 +1,13 @@
-"""Corrections of open-circuit potentials, which keep falling with stoichiometry, and of entropic coefficients.
+"""Corrections of entropic coefficients, and of open-circuit potentials that stay monotonic in stoichiometry.
 
-A potential falls with stoichiometry: one that rose would give a particle two states at one voltage, and a porous
-electrode none. What is fitted is therefore the logarithm of its slope against that of the start file:
+A potential falls with stoichiometry: if it rose, a particle would have two states at one voltage, and a porous
+electrode no solution. The fitted quantity is therefore the logarithm of its slope over that of the start file:
 
     -dU/dx = s(x) exp(sum_k z_k B_k(x)),      s = max(-dU_start/dx, LEAST_SLOPE)
 
-B_k cardinal cubic splines over the whole range of stoichiometry. The record of a full cell tells the difference of both
-electrodes' potentials, so that one level is free, that of the positive electrode. The voltage's slopes in z follow by
-quadrature from the surface stoichiometries of a run; they need no simulation.
+B_k are cardinal cubic splines over the whole range of stoichiometry. The record of a full cell determines only the
+difference of both electrodes' potentials, so that one level is fitted, that of the positive electrode. The derivatives
+of the voltage in z follow by quadrature from the surface stoichiometries of a run; they need no simulation.
 """
 
 from __future__ import annotations
@@ -38,17 +38,18 @@ LEVEL_SD_V = 0.04
 """Standard deviation of the difference of both potentials, V: half-cell measurements of one material differ by as
 much."""
 ENTROPY_SD_V_K = 1.5e-4
-"""Standard deviation of an entropic coefficient at each knot, V/K: its own size."""
+"""Standard deviation of an entropic coefficient at each knot, V/K: equal to its typical size."""
 BEYOND = 0.06
-"""Share of the stoichiometry window by which an entropy's table reaches beyond it: surfaces leave it under load."""
+"""Extension of an entropy's table beyond the stoichiometry window, as a share of it: surfaces leave it under load."""
 
 
 @dataclass(frozen=True, eq=False)
 class Potential:
-    """A potential whose slope is a file's times a factor, always negative.
+    """An open-circuit potential whose slope is that of a file times a positive factor, and always negative.
 
-    grid : (n,) stoichiometries 0..1.  slope : (n - 1,) V per unit, the file's fall between them.  anchor : index of the
-    grid where the potential is the file's, at volts `level`.  basis : (n - 1, knots) deviations of the log slope.
+    grid : (n,) stoichiometries 0..1.  slope : (n - 1,) V per unit of stoichiometry, -dU/dx of the file between them.
+    anchor : index of the grid point where the potential is that of the file, `level` V.  basis : (n - 1, knots) change
+    of the log slope per working unit of each knot.
     """
 
     grid: Array
@@ -74,7 +75,7 @@ class Potential:
         return self.basis.shape[1]
 
     def falls(self, z: Array) -> Array:
-        """(n - 1,) V that the potential falls by from one point of the grid to the next."""
+        """(n - 1,) V, fall of the potential from one point of the grid to the next, >= 0."""
         return self.slope * np.exp(self.basis @ z) * np.diff(self.grid)
 
     def at(self, z: Array) -> LookupTable:
@@ -84,7 +85,7 @@ class Potential:
         return LookupTable(tuple(map(float, self.grid)), tuple(map(float, volts)))
 
     def columns(self, z: Array, theta: Array) -> Array:
-        """(n, knots) V per working unit of each knot, at stoichiometries theta (n,)."""
+        """(n, knots) V, derivative of the potential in each working coordinate, at stoichiometries theta (n,)."""
         fallen = np.cumsum(self.falls(z)[:, None] * self.basis, axis=0)
         fallen = np.concatenate([np.zeros((1, self.knots)), fallen])
         volts = -(fallen - fallen[self.anchor])
@@ -96,7 +97,8 @@ class Potential:
 
 @dataclass(frozen=True, eq=False)
 class Entropy:
-    """Cardinal cubic splines over the stoichiometries [low, high], constant beyond, times a deviation."""
+    """Correction of an entropic coefficient: cardinal cubic splines over the stoichiometries [low, high], constant
+    beyond, times ENTROPY_SD_V_K."""
 
     low: float
     high: float
@@ -110,7 +112,7 @@ class Entropy:
         return cls(low, high, CubicSpline(places, np.eye(ENTROPY_KNOTS), bc_type="natural"))
 
     def columns(self, theta: Array) -> Array:
-        """(n, knots) V/K per working unit of each knot."""
+        """(n, knots) V/K, derivative of the coefficient in each working coordinate, at stoichiometries theta (n,)."""
         return np.asarray(ENTROPY_SD_V_K * self.spline(np.clip(theta, self.low, self.high)))
 
     def added(self, base: Relation, z: Array) -> Relation:
@@ -147,16 +149,16 @@ class Shapes:
 
     @property
     def size(self) -> int:
-        """Working coordinates of all: knots, and the level of the positive potential."""
+        """Number of all working coordinates: knots, and the level of the positive potential."""
         return self.closed + (0 if self.entropic is None else ENTROPY_KNOTS)
 
     @property
     def closed(self) -> int:
-        """Working coordinates whose slopes have a closed form, the first ones: those of the potentials."""
+        """Number of the working coordinates with closed-form derivatives, which come first: those of the potentials."""
         return self.positive.knots + self.negative.knots + 1
 
     def columns(self, z: Array, theta_n: Array, theta_p: Array) -> Array:
-        """(n, closed) V per working unit: what the voltage gains, at surface stoichiometries."""
+        """(n, closed) V, derivatives of the voltage in the working coordinates, at surface stoichiometries (n,)."""
         of_p, of_n, _, _ = self._split(z)
         level = np.full((len(theta_p), 1), LEVEL_SD_V)
         parts = [self.positive.columns(of_p, theta_p), -self.negative.columns(of_n, theta_n), level]

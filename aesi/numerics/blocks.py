@@ -1,7 +1,6 @@
-"""Blocks of neighbouring rows: moving ones over several records, which rows a resample holds and how often; pieces that
-are left out in turn.
+"""Blocks of neighbouring rows: the moving-block bootstrap over several records, and pieces that are left out in turn.
 
-Rows of all records are numbered through; a block never runs over the end of its record. The number of
+Rows are numbered consecutively over all records; a block never extends over the end of its record. The number of
 blocks is the number of rows over the block length, rounded up, and the last block is cut so that a resample
 has as many rows as the data.
 
@@ -25,16 +24,16 @@ Span = tuple[int, int]
 
 
 def block_starts(spans: Sequence[Span], length: int) -> IntArray:
-    """All rows at which a block of `length` fits into its record (the record's start where none does)."""
+    """All rows at which a block of `length` rows can start in its record (the record's first row if it is shorter)."""
     return np.concatenate([np.arange(a, max(a, b - length) + 1) for a, b in spans])
 
 
 def moving_block_weights(
     spans: Sequence[Span], length: int, resamples: int, rng: np.random.Generator
 ) -> CountArray:
-    """How often each row occurs in each resample.
+    """(resamples, n) number of times that each row occurs in each resample.
 
-    spans : consecutive records covering rows 0 to n.  Returns (resamples, n).
+    spans : consecutive records covering rows 0 to n.
     """
     n = spans[-1][1]
     ends = np.concatenate([np.full(b - a, b) for a, b in spans])
@@ -54,7 +53,7 @@ def moving_block_weights(
 
 
 def coverage(weights: CountArray) -> Array:
-    """(resamples,) the share of rows that each resample holds at least once."""
+    """(resamples,) share of the rows that occur at least once in each resample."""
     return np.asarray((weights > 0).mean(axis=1))
 
 
@@ -69,13 +68,13 @@ def pieces(spans: Sequence[Span], length: int) -> list[Span]:
 
 
 def dealt_folds(n: int, blocks: int, folds: int) -> IntArray:
-    """(n,) fold of each row: contiguous blocks, as long as one another, dealt out in turn, so that each fold spans the
-    record."""
+    """(n,) fold of each row: contiguous blocks of equal length, assigned to the folds in turn, so that each fold spans
+    the record."""
     return np.arange(n) * blocks // max(n, 1) % folds
 
 
 def leave_out_weights(cut: Sequence[Span], n: int) -> CountArray:
-    """(pieces, n): one everywhere but zero on one piece."""
+    """(pieces, n) weights, 1 except 0 on the rows of the piece that is left out."""
     weights = np.ones((len(cut), n), dtype=np.uint16)
     for row, (a, b) in zip(weights, cut, strict=True):
         row[a:b] = 0

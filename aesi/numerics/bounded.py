@@ -1,10 +1,10 @@
 """Levenberg-Marquardt inside a box, for residuals that cost a simulation each.
 
-A step is the least of the damped quadratic model within the box. Slopes by finite differences cost as many simulations
-as there are coordinates, a step one: after each step the slopes are brought up to date by what the step showed
-(Broyden, Math. Comp. 19 (1965) 577), as long as that brings the cost down, and only then taken anew.
-A place where the residual jumps, or has no value beyond, is a wall: what cannot pass it stays on its side, as on an end
-of the box, and the others go on. So is one at which a slope turns round.
+A step is the minimum of the damped quadratic model within the box. Slopes by finite differences cost one simulation per
+coordinate, a step one: after each step the slopes are updated (Broyden, Math. Comp. 19 (1965) 577) as long as that
+reduces the cost, and only then computed again.
+A place where the residual jumps, or beyond which it has no value, is a wall: a coordinate that cannot pass it stays on
+its side, as at an end of the box, and the others continue. So is a place where a slope changes its sign.
 Nocedal & Wright, Numerical Optimization, 2nd ed. (2006), chapters 10, 11 and 16.
 """
 
@@ -20,31 +20,31 @@ import numpy as np
 from aesi.numerics.typing import Array
 
 DAMPING = 1e-3
-"""Of a first step, over the curvature: next to none. A convention."""
+"""Damping of the first step, over the curvature: nearly none. A convention."""
 STRONGER = 8.0
-"""Factor on the damping after a step that does not gain. A convention."""
+"""Factor on the damping after a step that does not reduce the cost. A convention."""
 UPDATED_TRIALS = 2
-"""Trials of a step whose slopes were only brought up to date: where it fails, these may be what is wrong."""
+"""Trials of a step with updated slopes: where it fails, the slopes may be wrong."""
 
 
 class Residual(Protocol):
-    """What is minimised: half the sum of its squares."""
+    """A residual vector; half its sum of squares is minimised."""
 
     def residual(self, x: Array) -> Array | None:
-        """(m,) at x (n,), or None where the model fails; a value that is not finite counts as none."""
+        """Residual (m,) at x (n,), or None where the model fails; a value that is not finite counts as None."""
 
     def slopes(self, x: Array, residual: Array) -> Array | None:
-        """(m, n) derivatives at x (n,), where the residual is (m,), or None where the model fails; as above."""
+        """Derivatives (m, n) at x (n,), where the residual is `residual` (m,), or None as above."""
 
 
 @dataclass(frozen=True, eq=False)
 class Minimum:
-    """Where a descent ended.
+    """The result of a descent.
 
-    x : (n,) the best place.  cost : half the sum of squares there.  rounds : how often slopes were taken.
-    converged : whether it ended because nothing was left to gain.
-    known_x : (n,) the last place where slopes were taken, of a cost less than the tolerance above that at x, for those
-    who need slopes where a descent ended; x where it did not converge.
+    x : (n,) the best point.  cost : half the sum of squares there.  rounds : number of times that slopes were computed.
+    converged : True where it ended because no step reduces the cost by the tolerance.
+    known_x : (n,) last point where slopes were computed, with a cost less than the tolerance above that at x, for
+    callers that need slopes at the end; x where the descent did not converge.
     """
 
     x: Array
@@ -56,7 +56,7 @@ class Minimum:
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """x (n,), residual (m,) and slopes (m, n) there, taken or brought up to date."""
+    """x (n,), and residual (m,) and slopes (m, n) there, computed or updated."""
 
     x: Array
     residual: Array
@@ -78,9 +78,9 @@ def descend(
 ) -> Minimum:
     """Minimise half a sum of squares within low <= x <= high.
 
-    rounds : slopes are taken so many times at most.  tolerance : stops where the steps from them gain less than this.
+    rounds : largest number of times that slopes are computed.  tolerance : stops where steps with computed slopes
+    reduce the cost by less than this.  slopes : (m, n) start values, from near x0; convergence is not judged by them.
     Where the model fails at x0, the cost is infinite.
-    slopes : (m, n) as they are near x0, to begin with; nothing is concluded from them.
     """
     x = np.clip(x0, low, high)
     residual = model.residual(x)
@@ -109,7 +109,7 @@ def descend(
 
 
 def foreseen_cost(x: Array, residual: Array, slopes: Array, low: Array, high: Array) -> float:
-    """Half a sum of squares after one step within the box, to first order."""
+    """Half the sum of squares after one step within the box, with the residual to first order."""
     here = _Place(x, residual, slopes)
     step = _step(here, low, high, DAMPING)
     return _half_square(residual + slopes @ step)
@@ -118,9 +118,9 @@ def foreseen_cost(x: Array, residual: Array, slopes: Array, low: Array, high: Ar
 def _broyden_steps(
     model: Residual, here: _Place, low: Array, high: Array, tolerance: float, damping: float, fresh: bool
 ) -> tuple[_Place, float]:
-    """Steps from one place, with its slopes and then with updates of them, while each gains; and the damping.
+    """(last place, damping) after steps with the slopes of a place and then with their updates, while the cost falls.
 
-    fresh : the slopes were taken here.
+    fresh : True where the slopes were computed at this place.
     """
     for _ in range(1 + len(here.x)):
         there, damping = _accepted_step(model, here, low, high, tolerance, damping, fresh)
@@ -135,12 +135,12 @@ def _broyden_steps(
 def _accepted_step(
     model: Residual, here: _Place, low: Array, high: Array, tolerance: float, damping: float, fresh: bool
 ) -> tuple[_Place | None, float]:
-    """One step that gains, with slopes brought up to date, or None; and the damping for the next one.
+    """(place after one step that reduces the cost, with updated slopes, or None; damping for the next step).
 
-    What does not gain is tried again with a damping eight times as strong, until it promises less than the tolerance,
-    which is tried once, and only with slopes that were taken here. Where those are right some step gains, however far
-    the damping had come down before: on a pulse test read 0.125 s late (blind set, seed 31, case 50) six trials left a
-    fit 2,000 nats short at a lag of one row, where the slope has a kink.
+    A step that does not is repeated with a damping eight times as strong, until it promises less than the tolerance;
+    such a step is tried once, and only with slopes computed here. Where those are right some step reduces the cost,
+    however small the damping was before: on a pulse test read 0.125 s late (blind set, seed 31, case 50) six trials
+    left a fit 2,000 nats short at a lag of one row, where the slope has a kink.
     """
     for trial in count() if fresh else range(UPDATED_TRIALS):
         step = _step(here, low, high, damping)
@@ -161,11 +161,11 @@ def _accepted_step(
 def _within_walls(
     model: Residual, here: _Place, low: Array, high: Array, tolerance: float
 ) -> tuple[Array, Array] | None:
-    """The box up to the walls at x, of a place whose slopes promise what no step along them gains; None where they
-    promise less than the tolerance, or there is no wall.
+    """(low, high) of the box limited by walls at x, for a place where no step achieves the reduction that its slopes
+    promise; None where they promise less than the tolerance, or there is no wall.
 
-    A wall is where a coordinate by itself, in the shortest step that still promises as much, ends higher by more than
-    the tolerance than its slope foresees.
+    A wall is found where a coordinate alone, in the shortest step that promises the tolerance, ends with a cost more
+    than the tolerance above the one that its slope predicts.
     """
     step, damping = np.zeros(len(here.x)), DAMPING
     while (tried := _step(here, low, high, damping)).any():
@@ -178,15 +178,17 @@ def _within_walls(
         x[j] += step[j]
         residual = model.residual(x)
         foreseen = _half_square(here.residual + here.slopes[:, j] * step[j])
-        if residual is None or not _half_square(residual) - foreseen <= tolerance:  # NaN is no value either
+        if (
+            residual is None or not _half_square(residual) - foreseen <= tolerance
+        ):  # NaN counts as a wall, too
             (low if step[j] < 0.0 else high)[j] = here.x[j]
             found = True
     return (low, high) if found else None
 
 
 def _step(here: _Place, low: Array, high: Array, damping: float) -> Array:
-    """(n,) a damped Gauss-Newton step: the least of the damped quadratic model within the box."""
-    room = low < high  # none between a wall and an end of the box
+    """(n,) damped Gauss-Newton step: the minimum of the damped quadratic model within the box."""
+    room = low < high  # False where a wall is at an end of the box
     if not room.all():
         out, free = np.zeros(len(here.x)), _Place(here.x[room], here.residual, here.slopes[:, room])
         out[room] = _step(free, low[room], high[room], damping) if room.any() else 0.0
@@ -202,10 +204,10 @@ def _step(here: _Place, low: Array, high: Array, damping: float) -> Array:
 
 
 def _within(curvature: Array, gradient: Array, least: Array, most: Array) -> Array:
-    """(n,) s of the least s' curvature s / 2 + gradient' s, least <= s <= most.
+    """(n,) s that minimises s' curvature s / 2 + gradient' s within least <= s <= most.
 
-    A free step that is cut off at the box is another one: what was to make up for the part that is cut off stays in it,
-    so that it may lead uphill however strong the damping.
+    Clipping the free minimum to the box is not enough: the other coordinates would still compensate for the clipped
+    part, so that the step may increase the cost at any damping.
     """
     from scipy.optimize import lsq_linear
 
@@ -228,11 +230,11 @@ def slope_within(
     bounds: tuple[float, float],
     step: float,
 ) -> Array | None:
-    """(n,) slope of a function of x (k,) over x[j] by a one-sided difference: forward where the bounds leave room, else
-    backward; to the other side where the function has no value.
+    """(n,) derivative of a function of x (k,) in x[j] by a one-sided difference: forward where the bounds leave room,
+    else backward; to the other side where the function has no value.
 
-    function : x -> (n,), None where it has no value.  here : (n,) at x.  bounds : of x[j]; the step is at most a
-    quarter of what they span.  None where there is a value on neither side, or no room between the bounds.
+    function : x -> (n,), None where it has no value.  here : (n,) value at x.  bounds : (low, high) of x[j]; the step
+    is at most a quarter of their distance.  None where neither side has a value, or the bounds leave no room.
     """
     low, high = bounds
     size = min(step, 0.25 * (high - low))

@@ -1,9 +1,9 @@
-"""numba's compiler with machine code kept on disk under a digest of all the sources that it was made of.
+"""numba's compiler with machine code cached on disk under a digest of all its source files.
 
-numba itself watches the file of the compiled function alone. After an update of the package it would go on with the
-code of a function from another file as it was, or end with an AttributeError where a named tuple of a signature has
-moved (numba, Notes on Caching, "Caching limitations"). Here each file with compiled functions has a folder of its own
-for each state of its sources, so that what was compiled from others is never opened.
+numba itself checks only the file of the compiled function. After an update of the package it would use outdated code of
+a function from another file, or fail with an AttributeError where a named tuple of a signature has moved (numba, Notes
+on Caching, "Caching limitations"). Here each file with compiled functions has a folder for each state of its sources,
+so that code compiled from other sources is never loaded.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from aesi.numerics.files.first_use import compiling
 
 SETTINGS: Any = numba.config
 CHOOSING = threading.Lock()
-"""Numba has one cache folder a process: functions that two threads define at once would take each other's, or the
-working folder."""
+"""Lock: numba has one cache folder per process, so functions that two threads define at once would use each other's, or
+the working folder."""
 ROOT = Path(__file__).resolve().parents[2]
 IMPORT = re.compile(rb"^from (aesi[\w.]*) import", re.MULTILINE)
 COMPILED = re.compile(rb"^@(njit|compiled|kept_njit)\b", re.MULTILINE)
 
 
 class _Compiling(event.Listener):
-    """Hears when numba compiles; what it finds on disk it does not compile."""
+    """Listener for numba's compilations; code loaded from disk does not count as one."""
 
     def on_start(self, event: Any) -> None:
         compiling()
@@ -49,7 +49,7 @@ event.register("numba:compile", _Compiling())  # type: ignore[no-untyped-call]
 
 
 def kept_njit(**options: Any) -> Callable[[Any], Any]:
-    """numba.njit with these options whose machine code is found again by the next process.
+    """numba.njit with these options, with machine code that the next process loads from disk.
 
     The folder is chosen when the function is defined: beside its source, else (a read-only installation) in the cache
     folder of the package; NUMBA_CACHE_DIR comes before both.
@@ -70,8 +70,8 @@ def kept_njit(**options: Any) -> Callable[[Any], Any]:
 
 
 def sources(source: Path) -> set[Path]:
-    """All files that decide what is compiled from `source`: itself, what it imports of this package, on through files
-    with compiled functions, and the layouts beside those, whose named tuples stand in signatures."""
+    """All files that determine the code compiled from `source`: itself, its imports from this package, recursively
+    through files with compiled functions, and the layouts beside those, whose named tuples are in signatures."""
     found: set[Path] = set()
     ahead = {source.resolve()}
     while ahead:
@@ -83,7 +83,7 @@ def sources(source: Path) -> set[Path]:
 
 @cache
 def _asked_by(file: Path) -> frozenset[Path]:
-    """What a file with compiled functions imports of this package, and the layouts beside it; of any other, nothing."""
+    """Imports from this package of a file with compiled functions, and the layouts beside it; empty for other files."""
     text = _text(file)
     if not COMPILED.search(text):
         return frozenset()
@@ -103,7 +103,7 @@ def _file_of(module: str) -> Path:
 
 @cache
 def _folder(source: Path, chosen: str) -> Path:
-    """Of the machine code from `source`, its sources as they are now."""
+    """Folder of the machine code compiled from `source` in the present state of its sources."""
     sha = hashlib.sha256()
     for file in sorted(sources(source)):
         sha.update(str(file.relative_to(ROOT)).encode() + b"\0" + _text(file) + b"\0")
@@ -122,7 +122,7 @@ def _folder(source: Path, chosen: str) -> Path:
 
 
 def _drop_earlier(kept: Path, stem: str) -> None:
-    """What was compiled from earlier sources. A process that still runs them compiles again where it looks for it."""
+    """Delete code compiled from earlier sources. A process that still uses those compiles again when it needs it."""
     with suppress(OSError):
         for other in kept.parent.glob(f"{stem}-*"):
             if other != kept:

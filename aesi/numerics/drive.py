@@ -1,9 +1,9 @@
-"""What the current says about the next error: its value, and how it has just jumped.
+"""Features of the current for the next error: its value, and its latest jumps.
 
     I, |I|, dI, |dI|, dI_1, |dI_1|, |dI_2|         dI_j = I[k-j] - I[k-j-1]
 
-The current of sample k is known when its voltage is predicted, so its row may hold I[k]. A jump before the
-record began counts as none.
+The current of sample k is known when its voltage is predicted, so its row may hold I[k]. Jumps before the first
+sample are 0.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from aesi.numerics.typing import Array
 
 N_RECENT = 4
-"""Currents that one row needs: of the sample itself and of the three before it."""
+"""Number of currents that one row needs: those of the sample itself and of the three before it."""
 
 
 def drive_features(current_a: Array) -> Array:
@@ -27,7 +27,7 @@ def drive_features(current_a: Array) -> Array:
 
 
 def drive_row(recent: Array) -> Array:
-    """(7,) features of the last up to N_RECENT currents, the sample's own at the end."""
+    """(7,) features from the last currents, A, at most N_RECENT of them, that of the sample itself last."""
     padded = np.full(N_RECENT, recent[0])
     padded[N_RECENT - len(recent) :] = recent
     return np.asarray(drive_features(padded)[-1])

@@ -36,7 +36,7 @@ def mser(error: Array, prediction: Array) -> float:
 
 
 def pearson(truth: Array, prediction: Array) -> float:
-    """Correlation coefficient; 0 where either series is constant or not finite (it explains nothing)."""
+    """Correlation coefficient; 0 where either series is constant or not finite, since it explains nothing."""
     if len(truth) < 2 or not np.isfinite(prediction).all():
         return 0.0
     a, b = truth - np.mean(truth), prediction - np.mean(prediction)

@@ -67,10 +67,10 @@ def _line_search(
 
 
 def fit_quantiles(x: Array, y: Array, levels: Array) -> Array:
-    """Coefficients of the linear quantiles of y given x, a column a level.
+    """(p, L) coefficients of the linear quantiles of y given x, one column per level.
 
-    x : (n, p), scaled inside.  y : (n,).  levels : (L,) in (0, 1).
-    Returns (p, L).  Raises FitError for fewer rows than columns.
+    x : (n, p), scaled internally.  y : (n,).  levels : (L,) in (0, 1).
+    Raises FitError for fewer rows than columns.
     """
     n, p = x.shape
     if n <= p:

@@ -1,4 +1,4 @@
-"""Side by side in threads: for work whose time goes to compiled code, which does not hold the interpreter's lock."""
+"""Parallel threads, for work that is mostly in compiled code, which releases the interpreter's lock."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Made = TypeVar("Made")
 
 
 def side_by_side(do: Callable[[Given], Made], items: Iterable[Given]) -> Iterator[Made]:
-    """`do` of each, in the order given, so that what is made of it does not depend on how many threads there are. What
-    has not begun is left undone where the caller takes no more."""
+    """Yield `do(item)` for each item, in the order given, so that results do not depend on the number of threads. Calls
+    that have not begun are cancelled when the caller stops iterating."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         yield from pool.map(do, items)

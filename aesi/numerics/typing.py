@@ -11,7 +11,7 @@ IntArray = NDArray[np.int64]
 ComplexArray = NDArray[np.complex128]
 AnyArray = NDArray[Any]
 Numbers = ArrayLike
-"""What a caller may give where rows of numbers are asked for: arrays of any number, lists, columns of a table."""
+"""Rows of numbers that a caller may give: arrays of any numeric type, lists, columns of a table."""
 
 SavedState = dict[str, Any]
-"""Plain values and numpy arrays under string keys, as a model folder keeps them; nothing in it needs pickle."""
+"""Plain values and numpy arrays by string key, as stored in a model folder without pickle."""

@@ -6,9 +6,9 @@ For a library A with n rows, A = Q R with orthonormal Q, and for each resample w
 
 Q' W Q is well conditioned even where A' A is not, so F keeps the digits that normal equations would lose.
 
-Weights are whole numbers, constant over long runs of rows. Cells of rows enter through one product of the
-(resamples x cells) smallest weights with the Gram matrices of the cells; rows whose weight exceeds the
-smallest of their cell are added one resample at a time.
+Weights are whole numbers, constant over long runs of rows. Cells are groups of CELL rows. One product of the
+(resamples x cells) smallest weights with the Gram matrices of the cells gives most of the sum; rows whose weight
+exceeds the smallest of their cell are added one resample at a time.
 """
 
 from __future__ import annotations
@@ -21,27 +21,27 @@ from aesi.numerics.blocks import CountArray
 from aesi.numerics.typing import Array
 
 CELL = 25
-"""Rows a cell; like _CELLS_AT_ONCE and _COLUMNS_AT_ONCE it sets the speed alone, by what fits into the cache."""
+"""Rows per cell; like _CELLS_AT_ONCE and _COLUMNS_AT_ONCE it affects only the speed, by the size of the cache."""
 _CELLS_AT_ONCE = 160
 _COLUMNS_AT_ONCE = 64
 
 
 def orthonormal(matrix: Array) -> tuple[Array, Array]:
-    """Q (n, m) stored by rows and R (m, m), upper triangular, of a matrix stored by columns (overwritten)."""
+    """(Q (n, m) stored by rows, R (m, m) upper triangular) of a matrix stored by columns, which is overwritten."""
     q, r = qr(matrix, mode="economic", overwrite_a=True, check_finite=False)
     return np.ascontiguousarray(q), r
 
 
 def weighted_grams(rows: Array, weights: CountArray) -> Array:
-    """rows' diag(w) rows for each weight vector.
+    """(resamples, m, m): rows' diag(w) rows for each weight vector w.
 
-    rows : (n, m) stored by rows.  weights : (resamples, n).  Returns (resamples, m, m).
+    rows : (n, m) stored by rows.  weights : (resamples, n).
     """
     n, m = rows.shape
     whole = n // CELL * CELL
     by_cell = weights[:, :whole].reshape(len(weights), -1, CELL).min(axis=2)
     as_float = by_cell.astype(float)
-    grams = np.zeros((len(weights), m, m))  # below the diagonal too: it is added to
+    grams = np.zeros((len(weights), m, m))  # zero below the diagonal too, since terms are added
     cells = rows[:whole].reshape(-1, CELL, m)
     for start in range(0, m, _COLUMNS_AT_ONCE):
         stop = min(start + _COLUMNS_AT_ONCE, m)
@@ -54,7 +54,7 @@ def weighted_grams(rows: Array, weights: CountArray) -> Array:
         if len(some):
             scaled = rows[some]
             scaled *= np.sqrt(extra[some].astype(float))[:, None]
-            gram += np.triu(dsyrk(1.0, scaled.T, lower=0))  # below the diagonal is whatever was in memory
+            gram += np.triu(dsyrk(1.0, scaled.T, lower=0))  # dsyrk leaves memory below the diagonal undefined
         gram[lower] = gram.T[lower]
     return grams
 
@@ -71,8 +71,8 @@ def _upper_columns(cells: Array, by_cell: Array, start: int, stop: int) -> Array
 def triangular_factors(grams: Array, r: Array) -> Array:
     """F with F' F = R' gram R for each gram, in place: (resamples, m, m), upper triangular where possible.
 
-    Where a resample leaves a direction unseen its Gram matrix is singular; then an eigendecomposition with
-    negative round-off set to zero gives F, which is not triangular.
+    Where a resample has no information on a direction, its Gram matrix is singular; then an eigendecomposition
+    with negative round-off set to zero gives F, which is not triangular.
     """
     for k, gram in enumerate(grams):
         upper, info = lapack.dpotrf(gram, lower=0, clean=1)

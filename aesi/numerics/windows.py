@@ -1,4 +1,4 @@
-"""Causal features of a series: what the recent past says about the next value.
+"""Causal features of a series, from its recent past, for the prediction of the next value.
 
 Row k is made of e[k-1], e[k-2], ... only, never of e[k]. With h the values since the last missing one:
 
@@ -8,9 +8,9 @@ Row k is made of e[k-1], e[k-2], ... only, never of e[k]. With h the values sinc
     step_m          mean absolute difference of neighbours
     |h[1]|          size of the last value
 
-Until w values are there, the long spans use what is there; below N_LAGS values a row does not exist. All
-features are homogeneous of degree one: twice the series, twice the features. Batch and stream run the same
-compiled row, so their results agree to the last bit.
+With fewer than w values, long spans use the available ones; with fewer than N_LAGS values there is no row. All
+features are homogeneous of degree one: twice the series, twice the features. Batch and stream use the same
+compiled function for a row, so their results are bitwise equal.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from aesi.numerics.compiled import kept_njit
 from aesi.numerics.typing import Array, BoolArray, IntArray
 
 N_LAGS = 10
-"""A convention; the spans beyond carry the slower past."""
+"""Number of single past values; a convention. The longer spans hold the slower past."""
 SPANS = (5, 20, 60)
-"""Samples; a convention."""
+"""Lengths of the averages, in samples; a convention."""
 
 
 def spans(window: int) -> IntArray:
@@ -32,7 +32,7 @@ def spans(window: int) -> IntArray:
 
 
 def n_features(window: int) -> int:
-    """Columns of `history_features` for this window."""
+    """Number of columns of `history_features` for this window."""
     return N_LAGS + 3 * len(spans(window)) + 1
 
 
@@ -74,11 +74,10 @@ def _fill_rows(series: Array, window: int, lengths: IntArray, rows: Array, ready
 
 
 def history_features(series: Array, window: int) -> tuple[Array, BoolArray]:
-    """Features of every sample's past.
+    """(features of every sample's past (n, n_features(window)), ready (n,)).
 
     series : (n,) V; a non-finite value is missing, and the history starts again after it.
-    Returns rows (n, n_features(window)) and ready (n,): False where the history is shorter than N_LAGS
-    (that row is zero).
+    ready is False where the history is shorter than N_LAGS; that row is zero.
     """
     series = np.ascontiguousarray(series, dtype=float)
     rows = np.zeros((series.size, n_features(window)))
@@ -99,7 +98,7 @@ def runs_before(series: Array) -> IntArray:
 
 
 def raw_lags(series: Array, window: int) -> tuple[Array, BoolArray]:
-    """The last `window` values before each sample, most recent first: rows (n, window) and ready (n,).
+    """The last `window` values before each sample, most recent first: (rows (n, window), ready (n,)).
 
     Rows are views into one padded copy, so n windows cost the memory of one series.
     """

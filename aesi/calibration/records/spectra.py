@@ -1,5 +1,5 @@
-"""Impedance spectra that were measured of the cell: which of them a model can be held against, and, where they are
-fitted, what each of their frequencies is off by."""
+"""Measured impedance spectra of the cell: the choice of those that a model can be compared with, and the misfit of each
+frequency where they are fitted."""
 
 from __future__ import annotations
 
@@ -43,18 +43,18 @@ def state_of(cell: Cell, spectrum: Spectrum) -> float:
 
 
 def degc_of(spectrum: Spectrum) -> float:
-    """Temperature at which a model is held against a spectrum, degC."""
+    """Temperature at which a model is compared with a spectrum, degC."""
     return ASSUMED_DEGC if spectrum.temperature_degc is None else spectrum.temperature_degc
 
 
 def in_band(spectrum: Spectrum) -> BoolArray:
-    """(n,) which frequencies of a spectrum lie in `BAND_HZ`."""
+    """(n,) True for the frequencies of a spectrum in `BAND_HZ`."""
     return (spectrum.frequency_hz >= BAND_HZ[0]) & (spectrum.frequency_hz <= BAND_HZ[1])
 
 
 def usable(cell: Cell, spectra: Sequence[Spectrum]) -> tuple[tuple[Spectrum, ...], tuple[str, ...]]:
-    """The spectra that a model of this cell can be held against, and sentences on those that are left out and those
-    whose temperature is not known."""
+    """(spectra that a model of this cell can be compared with, sentences on those left out and on those of unknown
+    temperature)."""
     kept, told = [], []
     for spectrum in spectra:
         soc = state_of(cell, spectrum)
@@ -71,10 +71,10 @@ def usable(cell: Cell, spectra: Sequence[Spectrum]) -> tuple[tuple[Spectrum, ...
 
 
 def check_spectra(cell: Cell, spectra: Sequence[Spectrum]) -> None:
-    """Raises DataError, before anything is fitted, for spectra that are no such cell's, and where none could be used.
+    """Raises DataError, before anything is fitted, for spectra that cannot be of such a cell, and where none is usable.
 
-    cell : whose capacity may be off by what a fit moves it, so that a state in Ah is judged by `MOST_CAPACITIES` alone.
-    A spectrum in milliohm is told as a current in mA is, by capacity times resistance: that of its smallest |Z|.
+    cell : a fit may change its capacity, so that a state in Ah is checked by `MOST_CAPACITIES` alone.
+    A spectrum in milliohm is detected as a current in mA is, by capacity x resistance: that of its smallest |Z|.
     """
     for spectrum in spectra:
         least_ohm = float(np.min(np.abs(spectrum.z_ohm)))
@@ -106,7 +106,7 @@ def check_spectra(cell: Cell, spectra: Sequence[Spectrum]) -> None:
 
 
 def fitted_ones(cell: Cell, spectra: Sequence[Spectrum]) -> tuple[tuple[Spectrum, ...], tuple[str, ...]]:
-    """The spectra that a fit from this cell takes in, and sentences, as of `usable`, and on those outside the band.
+    """(spectra that a fit from this cell uses, sentences as from `usable` and on those outside the band).
 
     Raises DataError where spectra were given and none can be fitted.
     """
@@ -128,21 +128,22 @@ def fitted_ones(cell: Cell, spectra: Sequence[Spectrum]) -> tuple[tuple[Spectrum
 
 @dataclass(frozen=True, eq=False)
 class FittedSpectra:
-    """Spectra that are fitted beside the records.
+    """Spectra that are fitted together with the records.
 
-    The misfit of a frequency is complex, (Z_model - Z) / |Z| over `SPECTRUM_SHARE`, its real and its imaginary part.
-    Frequencies of one decade say one thing: together they count as one.
+    The misfit of a frequency is the real and the imaginary part of (Z_model - Z) / |Z| / `SPECTRUM_SHARE`. The
+    frequencies of one decade count together as one, since their errors are not independent.
     """
 
     spectra: tuple[Spectrum, ...]
     model: ModelName
 
     def misfits(self, cell: Cell) -> Array:
-        """(2 frequencies in the band, all spectra after one another) of this cell."""
+        """Misfits of this cell, (2 x frequencies in the band,), all spectra one after another."""
         return _joined([self._misfit(cell, spectrum) for spectrum in self.spectra])
 
     def information_weights(self, cell: Cell) -> Array:
-        """(as `misfits`) factors that make a spectrum that is missed by more than was expected say as much less."""
+        """Factors, as `misfits` in shape, that reduce the information of a spectrum with a larger misfit than expected
+        accordingly."""
         parts = []
         for spectrum in self.spectra:
             misfit = self._misfit(cell, spectrum)
@@ -152,7 +153,9 @@ class FittedSpectra:
     def _misfit(self, cell: Cell, spectrum: Spectrum) -> Array:
         seen = in_band(spectrum)
         measured = spectrum.z_ohm[seen]
-        soc = min(max(state_of(cell, spectrum), 0.0), 1.0)  # near empty, a step of the capacity may leave it
+        soc = min(
+            max(state_of(cell, spectrum), 0.0), 1.0
+        )  # near empty, a change of the capacity may leave it
         z = impedance(cell, spectrum.frequency_hz[seen], soc, degc_of(spectrum), model=self.model)
         off = (z - measured) / np.abs(measured)
         return np.concatenate([off.real, off.imag]) / (SPECTRUM_SHARE * _by_decade(spectrum) ** 0.5)
@@ -163,7 +166,7 @@ def _joined(parts: Sequence[Array]) -> Array:
 
 
 def _by_decade(spectrum: Spectrum) -> float:
-    """How many of a spectrum's frequencies within the band lie in a decade, at least one."""
+    """Number of a spectrum's frequencies per decade within the band, at least 1."""
     hz = spectrum.frequency_hz[in_band(spectrum)]
     decades = float(np.log10(hz.max() / hz.min()))
     return max(len(hz) / max(decades, 1.0), 1.0)

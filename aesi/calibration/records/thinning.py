@@ -1,4 +1,4 @@
-"""The rows that a calibration simulates, which of them it believes, and the steps of its model."""
+"""The rows that a calibration simulates, those that count in the fit, and the steps of its model."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from aesi.records import Hold, Measurement
 WINDOW_S = 1.0
 """Rows of a drive are averaged over this: solid diffusion and the electrolyte are slower."""
 MOST_ROWS = 4000
-"""Rows of a drive that a fit sees: windows grow until there are no more."""
+"""Most rows of a drive in a fit; the averaging window grows until there are no more."""
 STEADY_ROWS = 400
-"""Rows that a steady record is spread over, besides those after its steps."""
+"""Number of rows of a record of constant currents, besides those after its steps."""
 SPACING = Spacing(first_s=0.2, growth=0.4)
 SOON_S = 1.0
 """A row with a step of the current in it does not count in the fit where the next row follows this soon."""
@@ -37,7 +37,7 @@ class Thinned:
 
 
 def thinned(data: Measurement, capacity_ah: float) -> Thinned:
-    """The rows that a fit sees.  capacity_ah : what a step of the current is measured by."""
+    """The rows that a fit uses.  capacity_ah : converts the C-rate of a step of the current to A."""
     span_s = float(data.time_s[-1] - data.time_s[0])
     steady = condensed(data, capacity_ah, span_s / STEADY_ROWS, SPACING, hold_counted(data))
     if steady is None:

@@ -1,4 +1,4 @@
-"""From a model to what the compiled steps of the porous electrode take."""
+"""Arguments of the compiled steps of the porous electrode, from a model."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def porous_arguments(model: EspmModel) -> tuple[Particles, Stack, Electrodes]:
 
 
 def _particles(model: EspmModel) -> Particles:
-    """Units place by place, size by size."""
+    """Constants of the units, ordered by place, then by particle size."""
     sphere, layer = sphere_modes(model.solid_order), gauss_layer(model.electrode_points)
     solids = [solid_diffusion(x.diffusivity) for x in (model.cell.negative, model.cell.positive)]
     place, kind, scale, share, volume, exchange, reactive = [], [], [], [], [], [], []
@@ -41,7 +41,7 @@ def _particles(model: EspmModel) -> Particles:
         first = len(rates)
         of_volume = sum(a * r for a, r in interface.bins)
         for _, ratio in interface.bins:
-            # Where diffusivity varies, each particle follows its own profile, and has weights of its own.
+            # Where the diffusivity varies, each particle has its own profile and so its own weights.
             for _ in range(1 if solids[side].linear else model.electrode_points):
                 rates.append(sphere.lam[1:] * solids[side].d0 / (electrode.particle_radius_m * ratio) ** 2)
                 sides.append(side)
@@ -93,7 +93,7 @@ def _stack(model: EspmModel) -> Stack:
     at_places = np.vstack(
         [lobatto_to(x, order) @ stack.to_nodes[k * order : (k + 1) * order + 1] for k, x in positions]
     )
-    at_places[:, 0] = at_places[:, 0].mean()  # the conserved mode is the same everywhere: to the last digit
+    at_places[:, 0] = at_places[:, 0].mean()  # the conserved mode is uniform; this makes it exactly so
     return Stack(
         rates=stack.lam * diffusion.d0,
         at=at_places,
@@ -111,7 +111,7 @@ def _stack(model: EspmModel) -> Stack:
 
 
 def _gap_path(order: int, length_m: float) -> Array:
-    """(nodes,) m of the separator by node, so that the sum over conductivities there is its resistance."""
+    """(nodes,) m, weights of the separator's nodes: their sum over the conductivities is its resistance x area."""
     path = np.zeros(3 * order + 1)
     path[order : 2 * order + 1] = 0.5 * length_m * gauss_lobatto(order + 1)[1]
     return path

@@ -1,11 +1,11 @@
-"""Compiled transport: what particles and salt come to at a step's end, as linear functions of the reaction there.
+"""Compiled transport: states of particles and salt at the end of a step, as linear functions of the reaction there.
 
-A reaction that runs straight from y0 at the start of a step to y1 at its end moves each mode exactly:
+For a reaction that is linear in time from y0 at the start of a step to y1 at its end, each mode is exact:
 
     z1 = E z0 - gain (a y0 + b y1) - rate (a f0 + b f1)
 
-with E, a, b of `kernels.step_weights` and f the part of diffusion that the constant diffusivity leaves out. `calm` is
-this without y1. In a particle that constant follows the profile at every step, as in the single particle
+with E, a, b of `kernels.step_weights` and f the diffusion beyond that of the constant diffusivity. `calm` is z1 with
+y1 = 0. In a particle the constant diffusivity is adapted to the profile at every step, as in the single particle
 (`transport_kernels.EXACT_SHARE`): f is the mode of the flux of all diffusion less `near` times z.
 """
 
@@ -17,8 +17,8 @@ from aesi.physics.espm.transport_kernels import EXACT_SHARE
 
 @compiled
 def renew_particles(p, largest, near, faster, dt, missing, w, taken):  # type: ignore[no-untyped-def]
-    """Weights of one step length and of factors `faster` (3,) of diffusion, see `renew_salt`: of particles whose
-    diffusivity is followed anew, of all others if they are `missing`.
+    """Compute the weights for one step length and factors `faster` (3,) of diffusion, see `renew_salt`: for particles
+    with an adapted diffusivity, and for all others if they are `missing`.
 
     largest, near : (kinds,) of the profile, over that of the rates: in, and what is stepped exactly, out.
     Out: w (kinds, 3, modes).  taken (kinds,) s, what a unit of y1 takes off a surface, over `scale`.
@@ -33,8 +33,8 @@ def renew_particles(p, largest, near, faster, dt, missing, w, taken):  # type: i
 
 @njit(inline="always", fastmath=FASTMATH)
 def renew_kind(p, k, factor, dt, w, taken):  # type: ignore[no-untyped-def]
-    """As `renew_particles`, of one kind of particle, at `factor` times its rates."""
-    taken[k] = 1.5 * dt  # of the mean: three times half a step
+    """As `renew_particles`, for one kind of particle, at `factor` times its rates."""
+    taken[k] = 1.5 * dt  # part of the mean: three times half a step
     for j in range(p.rates.shape[1]):
         w[k, 0, j], w[k, 1, j], w[k, 2, j] = step_weights(p.rates[k, j] * factor, dt)
         taken[k] += p.gains[j] * w[k, 2, j]
@@ -42,9 +42,9 @@ def renew_kind(p, k, factor, dt, w, taken):  # type: ignore[no-untyped-def]
 
 @compiled
 def renew_salt(s, faster, dt, w_salt, spread):  # type: ignore[no-untyped-def]
-    """Weights of one step length and of factors `faster` (3,) of diffusion (negative, positive, salt).
+    """Compute the weights for one step length and factors `faster` (3,) of diffusion (negative, positive, salt).
 
-    Out: w_salt (3, modes).  spread (places, places) m2/A, what a unit of reaction at v adds to the salt over rest at r.
+    Out: w_salt (3, modes).  spread (places, places) m2/A, change of the salt over rest at r per reaction at v.
     """
     for j in range(s.rates.shape[0]):
         w_salt[0, j], w_salt[1, j], w_salt[2, j] = step_weights(s.rates[j] * faster[2], dt)
@@ -58,7 +58,7 @@ def renew_salt(s, faster, dt, w_salt, spread):  # type: ignore[no-untyped-def]
 
 @compiled
 def calm_particles(p, state, t, faster, dt, w):  # type: ignore[no-untyped-def]
-    """Modes, means and surfaces of all particles without what the reaction at the end of the step does."""
+    """Modes, means and surfaces of all particles at the end of the step, for zero reaction at its end."""
     for u in range(p.place.shape[0]):
         k = p.kind[u]
         side = p.side[k]
@@ -90,7 +90,7 @@ def end_mean(p, t, u, y, dt):  # type: ignore[no-untyped-def]
 
 @compiled
 def calm_salt(s, state, t, faster, w):  # type: ignore[no-untyped-def]
-    """Modes, and salt over rest at the places, without what the reaction at the end of the step does."""
+    """Modes of the salt, and salt over rest at the places, at the end of the step, for zero reaction at its end."""
     strength = s.strength * faster
     for j in range(s.rates.shape[0]):
         source = 0.0
@@ -120,7 +120,7 @@ def end_salt(s, t, given, w):  # type: ignore[no-untyped-def]
 
 @compiled
 def salt_at_places(s, q, salt):  # type: ignore[no-untyped-def]
-    """salt (places,) over rest."""
+    """Set salt (places,), the concentration over rest, from the modes q."""
     for r in range(s.at.shape[0]):
         value = 0.0
         for j in range(q.shape[0]):

@@ -5,13 +5,13 @@ from aesi.physics.espm.interface_kernels import stripped
 from aesi.physics.espm.kernels import compiled
 
 UPDATE_TOLERANCE_V = 5e-5
-"""Newton's method squares what is left: after an update below this the error is about its square over 2 R T / F,
-0.05 uV."""
+"""Tolerance of Newton's method, which converges quadratically: after an update below this the error is about its square
+over 2 R T / F, 0.05 uV."""
 
 
 @compiled
 def add_side_currents(e, t, n, thermal, psi, given, salt):  # type: ignore[no-untyped-def]
-    """Add double layers and plating of each place to `given`, which holds the units, and to the conductance."""
+    """Add double layers and plating of each place to the currents `given` of the units, and to the conductance."""
     half = psi.shape[0] // 2
     for r in range(psi.shape[0]):
         given[r] += t.layer_c[r] * psi[r] - t.layer_old[r]

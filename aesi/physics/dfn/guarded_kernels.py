@@ -1,8 +1,9 @@
-"""Compiled solution of a step that Newton's method on currents does not find: places that run full or empty, or rise.
+"""Compiled solution of a step for which Newton's method on currents fails: particles nearly full or empty, or
+potentials that rise with lithium.
 
-There the kinetic drop is a logarithm of what room is left, and a small step in current leaps over the end of it. So the
-currents are eliminated place by place, each found for a given potential between bounds that close in on it, and
-Newton's method runs on the potentials, its steps halved until they bring the solution nearer.
+There the kinetic drop is a logarithm of the remaining room, and a small step in current passes the end of it. So the
+currents are eliminated place by place: each is found for a given potential by bracketing. Newton's method runs on the
+potentials, with steps halved until they reduce the residual.
 """
 
 import math
@@ -12,17 +13,17 @@ from aesi.physics.dfn.local_kernels import SMALLEST_SALT, salt_logarithm, unit_p
 from aesi.physics.espm.kernels import compiled
 
 LOST_V = 1e-3
-"""A solution is found where the last update is below this, though Newton's steps do not end."""
+"""Largest last update with which the solution is accepted when the number of Newton's steps is used up."""
 LOCAL_TOLERANCE_V = 1e-6
 LOCAL_STEPS = 60
 MOST_STEPS = 60
 SMALLEST_SHARE = 1.0 / 256.0
-"""Of a Newton step, below which it is taken although it does not bring the solution nearer."""
+"""Smallest share of a Newton step; it is taken even if it does not reduce the residual."""
 
 
 @compiled
 def solve_guarded(p, e, t, n, spread, total, t_k, thermal, y, theta, psi, given, salt):  # type: ignore[no-untyped-def]
-    """As `solve_reaction`, from the potentials and currents that it was given (`n.psi_in`, `n.y_in`)."""
+    """As `solve_reaction`, from its start values of potentials and currents (`n.psi_in`, `n.y_in`)."""
     half = psi.shape[0] // 2
     phi_n, phi_p, share, before, worst = 0.0, 0.0, 1.0, math.inf, math.inf
     chi = 2.0 * (1.0 - e.transference) * thermal
@@ -56,7 +57,7 @@ def solve_guarded(p, e, t, n, spread, total, t_k, thermal, y, theta, psi, given,
 
 @compiled
 def begin(p, e, n, total, y, psi, given):  # type: ignore[no-untyped-def]
-    """The start values again, with a reaction that adds up to the current of each electrode."""
+    """Restore the start values, with a reaction whose sum is the current of each electrode."""
     half = psi.shape[0] // 2
     given[:] = 0.0
     for u in range(y.shape[0]):
@@ -73,7 +74,7 @@ def begin(p, e, n, total, y, psi, given):  # type: ignore[no-untyped-def]
 
 @compiled
 def local_currents(p, e, t, n, spread, thermal, rise, y, theta, psi, given, salt):  # type: ignore[no-untyped-def]
-    """Currents y of all units at the potentials psi; their slopes, and what these come to at a place."""
+    """Currents y of all units at the potentials psi, their slopes, and the sums of these at each place."""
     places, half = psi.shape[0], psi.shape[0] // 2
     for r in range(places):
         n.shift[r], n.conductance[r] = 0.0, 0.0
@@ -97,8 +98,8 @@ def local_currents(p, e, t, n, spread, thermal, rise, y, theta, psi, given, salt
 
 @compiled
 def local_current(e, side, exchange, film, reach, give, s, thermal, rise, psi, y):  # type: ignore[no-untyped-def]
-    """Current of a unit whose potential is psi, its slope and by_salt: Newton's steps in the logarithm of the current
-    where kinetics hold it, in the current where filling does, between bounds that close in."""
+    """Current of a unit at potential psi, its slope and by_salt: bracketed Newton's steps, in the logarithm of the
+    current where kinetics limit it, in the current where filling does."""
     low, high, slope, by_salt = -math.inf, math.inf, 1.0, 0.0
     for _ in range(LOCAL_STEPS):
         pot, slope, by_salt, d_eta, scale = unit_potential(
@@ -137,7 +138,7 @@ def local_current(e, side, exchange, film, reach, give, s, thermal, rise, psi, y
 
 @compiled
 def excess(p, e, t, n, thermal, y, psi, given, salt):  # type: ignore[no-untyped-def]
-    """n.slack (places,) A/m2: what units, double layers and plating give at their potentials beyond `given`."""
+    """n.slack (places,) A/m2: current of units, double layers and plating at their potentials minus `given`."""
     for r in range(psi.shape[0]):
         n.slack[r] = 0.0
     for u in range(y.shape[0]):
@@ -150,8 +151,8 @@ def excess(p, e, t, n, thermal, y, psi, given, salt):  # type: ignore[no-untyped
 
 @compiled
 def apart(e, t, n, chi, thermal, total, psi, given, salt):  # type: ignore[no-untyped-def]
-    """How far from a solution: the largest of what potentials differ by over R T / F, and of excess currents over the
-    share of the current and the exchange current of their place."""
+    """Residual norm: the largest of the errors of potentials over R T / F and of the excess currents over (share of the
+    current + exchange current) of their place."""
     half = psi.shape[0] // 2
     worst = 0.0
     for side in range(2):

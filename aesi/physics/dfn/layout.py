@@ -14,8 +14,8 @@ from aesi.numerics.typing import Array, IntArray
 class Particles(NamedTuple):
     """Constants of the units.
 
-    place, kind : (units,) where, and which row of `rates`.  side : (kinds,) electrode.  scale : (units,)
-    stoichiometry/(A/m2 s) per unit gain.  share, volume : (units,) of its electrode's reaction and material.
+    place, kind : (units,) place, and row of `rates`.  side : (kinds,) electrode.  scale : (units,)
+    stoichiometry/(A/m2 s) per unit gain.  share, volume : (units,) share of its electrode's reaction and material.
     exchange : (units,) A/m2 at unit salt and occupancy.
     reactive : (units,) surface per area of cell.  rates : (kinds, modes) 1/s.  gains : (modes,).
     psi, strength, at, project : of the variable part of diffusion, see `tables.DiffusionTable` and `SphereModes`.
@@ -96,9 +96,9 @@ class DfnState(NamedTuple):
     """State that a step changes.
 
     z : (units, modes) stoichiometry.  mean, theta : (units,) the same, of the whole particle and of its surface.
-    y : (units,) A/m2, what the particles give.  trend : (units,) A/(m2 s), how y leaves its share of the current.
-    flow : (units, modes) stoichiometry, of the integral of the diffusivity over that of the rates.
-    largest : (kinds,) diffusivity of a profile over that of the rates.
+    y : (units,) A/m2, currents of the particles.  trend : (units,) A/(m2 s), rate at which y deviates from its share of
+    the current.  flow : (units, modes) stoichiometry, modes of the integral of (diffusivity over that of the rates).
+    largest : (kinds,) largest diffusivity of a profile over that of the rates.
     q, forcing : (salt modes,) mol/m3, of the salt, the latter of the variable part of diffusion.  c : (nodes,) mol/m3.
     given : (places,) A/m2, of particles, double layers and plating.  psi : (places,) V, see `reaction_kernels`.
     salt : (places,) over rest.  layer : (places,) A/m2 into double layers.  plated : (places,) mol/m3.
@@ -122,23 +122,23 @@ class DfnState(NamedTuple):
 
 
 class DfnTrial(NamedTuple):
-    """Scratch of a step. `calm_...` is its end without what the reaction there does; `..._start` and `..._back` are its
-    start. What `DfnState` names as well has the units that it has there.
+    """Scratch of a step. `calm_...` is its end for zero reaction there; `..._start` and `..._back` are its start.
+    Fields that `DfnState` has too have the same units.
 
     calm_z, calm_mean, calm_q, calm_salt, y_start, given_start, psi_start, flow, largest, forcing, q, c, salt : as
     there; y_start with what double layers lag by.
     reach, give : (units,) stoichiometry, and that per A/m2: surface = reach - give y.
-    near : (kinds,) what is stepped exactly of the diffusivity, over that of the rates.
-    rest : (units, modes) stoichiometry, flow less what is stepped exactly.
+    near : (kinds,) exactly stepped diffusivity over that of the rates.
+    rest : (units, modes) stoichiometry, flow minus its exactly stepped part.
     force, z_end : (modes + 1,) and (modes,) of one unit, see `solid_forcing`.
-    nodes : (points of a particle,) stoichiometry.  kappa : (places,) S/m.  salt_before, forcing_before : a step ago.
+    nodes : (points of a particle,) stoichiometry.  kappa : (places,) S/m.  salt_before, forcing_before : one step ago.
     ohm : (places, points of an electrode) ohm m2.
     layer_c A/(V m2), layer_old A/m2, skew, lag A/m2 : (places,) double layers.
     metal_before mol/m3, metal_filled mol/m3 per A/m2 : (places,) plated lithium, see `interface_kernels.stripped`.
     y_back : (units,) A/m2, without what double layers lag by.
-    total, before, change : (2,) A/m2, currents of both electrodes at the end of a step, at its start, and what is
-    between.  faster : (3,) factors of diffusion, negative, positive, salt.
-    no_spread : zeros, for an instant.  rates : (8,) Arrhenius factors, by `Electrodes.energies`.
+    total, before, change : (2,) A/m2, currents of both electrodes at the end of a step, at its start, and their
+    difference.  faster : (3,) factors of diffusion: negative, positive, salt.
+    no_spread : zeros, for a solution at an instant.  rates : (8,) Arrhenius factors, by `Electrodes.energies`.
     """
 
     calm_z: Array

@@ -25,13 +25,13 @@ from aesi.physics.espm.tables import electrolyte_diffusion, solid_diffusion
 from aesi.physics.model import EspmModel, activation_energies
 
 POINTS = 16
-"""Across an electrode: where double layers carry all of the current, it stays near the separator."""
+"""Gauss points across an electrode: where double layers carry all of the current, it stays near the separator."""
 
 
 def porous_impedance(
     model: EspmModel, slopes_v: Array, rest: Array, kelvin: float, omega: Array
 ) -> ComplexArray:
-    """(n,) ohm of the whole cell.
+    """Impedance of the whole cell, (n,) ohm, complex.
 
     slopes_v : (2,) V, dU/dx of both electrodes at stoichiometries `rest` (2,).  omega : (n,) 1/s.
     """

@@ -8,9 +8,10 @@ from aesi.physics.espm.interface_kernels import asymmetric, asymmetric_start
 from aesi.physics.espm.kernels import BEYOND_RANGE_V, FASTMATH, SMALLEST_OCCUPANCY
 
 SMALLEST_SLOPE = 1e-3
-"""Of the kinetic slope: what filling takes off it would make a place run away, near the edge of a potential."""
+"""Lower limit of a unit's slope, as a share of the kinetic slope: near the edge of a potential, filling reduces the
+slope until the place runs away."""
 SMALLEST_SALT = 1e-4
-"""Of the rest concentration: below it the logarithm goes on as its tangent."""
+"""Share of the rest concentration below which the logarithm is continued by its tangent."""
 
 
 @njit(inline="always", fastmath=FASTMATH)
@@ -27,7 +28,7 @@ def kinetic_drop(y, exchange, alpha, thermal):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", fastmath=FASTMATH)
 def row_lookup(tables, row, position):  # type: ignore[no-untyped-def]
-    """As `kernels.lookup`, of one row of tables; a view of the row would cost more than the value."""
+    """As `kernels.lookup`, for one row of tables; a view of the row would cost more than the value."""
     last = tables.shape[1] - 1
     s = min(max(position, 0.0), 1.0) * last
     i = min(int(s), last - 1)
@@ -36,7 +37,7 @@ def row_lookup(tables, row, position):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", fastmath=FASTMATH)
 def equilibrium(ocp, entropic, side, rise, theta):  # type: ignore[no-untyped-def]
-    """Open-circuit potential (V) at a surface stoichiometry and its slope, falling on outside [0, 1]."""
+    """Open-circuit potential (V) at a surface stoichiometry and its slope; it continues to fall outside [0, 1]."""
     inside = min(max(theta, 0.0), 1.0)
     last = ocp.shape[1] - 1
     s = inside * last
@@ -50,7 +51,7 @@ def equilibrium(ocp, entropic, side, rise, theta):  # type: ignore[no-untyped-de
 
 @njit(inline="always", fastmath=FASTMATH)
 def occupancy(theta):  # type: ignore[no-untyped-def]
-    """x (1 - x), kept off zero, and the slope of its logarithm."""
+    """x (1 - x) with a positive lower limit, and the slope of its logarithm."""
     product = theta * (1.0 - theta)
     if product < SMALLEST_OCCUPANCY:
         return SMALLEST_OCCUPANCY, 0.0
@@ -59,7 +60,7 @@ def occupancy(theta):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", fastmath=FASTMATH)
 def value_and_slope(table, side, theta):  # type: ignore[no-untyped-def]
-    """Of an electrode's row of a table over stoichiometry: its value at a surface stoichiometry, and its slope."""
+    """(value, slope) of an electrode's table over stoichiometry at a surface stoichiometry."""
     last = table.shape[1] - 1
     s = min(max(theta, 0.0), 1.0) * last
     i = min(int(s), last - 1)
@@ -77,15 +78,15 @@ def salt_logarithm(s):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", fastmath=FASTMATH)
 def unit_potential(e, side, exchange, film, surface, give, y, s, thermal, rise):  # type: ignore[no-untyped-def]
-    """Potential of a unit at a current y, its slope in y and in the salt s, the kinetic part of the slope, and the
-    exchange current as it is there.  film : factor on the film's ohm m2, of temperature over reactive surface."""
+    """Potential of a unit at a current y, its slopes in y and in the salt s, the kinetic part of the slope, and the
+    exchange current.  film : factor on the film's ohm m2: that of temperature over reactive surface."""
     room, d_room = occupancy(surface)
     quicker, d_quicker = value_and_slope(e.rate, side, surface)
     scale = exchange * quicker * math.sqrt(s * room)
     eta, d_eta = kinetic_drop(y, scale, e.alpha[side], thermal)
     level, falls = equilibrium(e.ocp, e.entropic, side, rise, surface)
     ohm, d_ohm = value_and_slope(e.film, side, surface)
-    moved = -0.5 * y * d_eta  # with the logarithm of the salt, or of the occupancy, in the exchange current
+    moved = -0.5 * y * d_eta  # slope in the logarithm of salt or occupancy, by the exchange current
     resistance = film * ohm
     slope = d_eta + resistance
     slope = max(

@@ -1,17 +1,18 @@
-"""Compiled outputs of the porous electrode at a sample, and what left its range there."""
+"""Compiled outputs of the porous electrode at a sample, and the state that left its range there."""
 
 from numba import njit
 
 from aesi.physics.espm.kernels import FASTMATH, compiled
 
 UNDERSHOOT = 0.02
-"""Of the rest concentration. The reaction leaves a place that runs dry, and the salt there stays at zero; its
-polynomial passes below by 0.8 % at worst before the cut-off (LG HG2 at -2 degC and 3.2C, 0.2 % with 20 points)."""
+"""Largest undershoot of the salt below zero, as a share of its rest concentration. The reaction stops at a place where
+the salt is used up, and the salt stays at zero there. Its polynomial undershoots by 0.8 % at worst before the cut-off
+(LG HG2 at -2 degC and 3.2C, 0.2 % with 20 points)."""
 
 
 @njit(inline="always", fastmath=FASTMATH)
 def smallest(values):  # type: ignore[no-untyped-def]
-    """The smallest of (n,) values; not a number where one is not."""
+    """The smallest of (n,) values; NaN where one of them is."""
     low = values[0]
     for value in values:
         if not value >= low:
@@ -33,7 +34,7 @@ def mean_surfaces(p, theta, half):  # type: ignore[no-untyped-def]
 
 @compiled
 def record(p, e, state, half, out, k):  # type: ignore[no-untyped-def]
-    """Averages of the electrodes, salt at the collectors, plated lithium."""
+    """Write sample k of `out`: averages of the electrodes, salt at the collectors, plated lithium."""
     out[1, k], out[2, k] = mean_surfaces(p, state.theta, half)
     out[5, k], out[6, k] = 0.0, 0.0
     for u in range(p.place.shape[0]):
@@ -47,7 +48,7 @@ def record(p, e, state, half, out, k):  # type: ignore[no-untyped-def]
 
 @compiled
 def record_profile(k, p, e, state, profile, salt_profile):  # type: ignore[no-untyped-def]
-    """What is told of each place, and the salt at each node."""
+    """Write sample k of the profiles: the quantities of each place, and the salt at each node."""
     for r in range(state.given.shape[0]):
         profile[k, 1, r] = state.given[r] / e.node_share[r]
         profile[k, 2, r] = state.salt[r]

@@ -6,9 +6,9 @@ Places are the Gauss points, those of the negative electrode first, each counted
     psi_r + chi ln s_r + sum_v ohm[r, v] Y_v = Phi        with the collector's potential Phi of its electrode,
     Y_r = sum_u y_u + double layer + plating,             sum over an electrode Y_v = its current,
 
-with theta_u = reach_u - give_u y_u and s_r = calm_r + sum_v spread[r, v] Y_v: what particles and salt do within a
-step is linear in the reaction at its end. Newton's method on Y and Phi; units and psi are eliminated place by place.
-Where it goes to and fro, at the edges of potentials, `guarded_kernels` begins again.
+with theta_u = reach_u - give_u y_u and s_r = calm_r + sum_v spread[r, v] Y_v: particles and salt at the end of a step
+are linear in the reaction there. Newton's method on Y and Phi; units and psi are eliminated place by place. Where it
+oscillates, at the edges of potentials, `guarded_kernels` starts again.
 """
 
 from numba import njit
@@ -21,13 +21,13 @@ from aesi.physics.espm.kernels import FASTMATH, compiled
 
 GAS_OVER_FARADAY = GAS_CONSTANT_J_MOL_K / FARADAY_C_MOL
 EASY_STEPS = 6
-"""So many without looking back; most steps of time need two."""
+"""Newton's steps before `guarded_kernels` takes over; most time steps need two."""
 
 
 @compiled
 def solve_reaction(p, e, t, n, spread, total, t_k, y, theta, psi, given, salt):  # type: ignore[no-untyped-def]
-    """Currents y of all units (A per m2 of cell); returns the collectors' potentials and the number of steps, negative
-    where none solves the equations.
+    """Currents y of all units (A per m2 of cell). Returns the collectors' potentials, V, and the number of steps,
+    negative where no solution was found.
 
     p, e, t, n : Particles, Electrodes, DfnTrial and NewtonScratch, see `layout`.  spread : (places, places) m2/A.
     total : (2,) current of each electrode, delithiation positive.  t_k : K.
@@ -68,7 +68,7 @@ def solve_reaction(p, e, t, n, spread, total, t_k, y, theta, psi, given, salt): 
 
 @njit(inline="always", fastmath=FASTMATH)
 def sum_units(p, y, given):  # type: ignore[no-untyped-def]
-    """given (places,): what the units at each place give."""
+    """Set given (places,): the sum of the currents of the units at each place."""
     for r in range(given.shape[0]):
         given[r] = 0.0
     for u in range(y.shape[0]):
@@ -77,7 +77,7 @@ def sum_units(p, y, given):  # type: ignore[no-untyped-def]
 
 @compiled
 def evaluate_units(p, e, t, n, spread, thermal, rise, first, y, theta, psi, given, salt):  # type: ignore[no-untyped-def]
-    """Salt at the places; potential of every unit, its slopes in y and in the salt; what they come to at a place."""
+    """Salt at the places; potential of every unit and its slopes in y and salt; their sums at each place."""
     places, half = psi.shape[0], psi.shape[0] // 2
     for r in range(places):
         n.slack[r], n.shift[r], n.conductance[r] = 0.0, 0.0, 0.0

@@ -12,20 +12,20 @@ from aesi.physics.espm.kernels import FASTMATH, ROUND_OFF, compiled, lookup, par
 from aesi.physics.espm.transport_kernels import arrhenius, heated, mean_heat, renew_factors, solid_forcing
 
 SHORTER, SHORTEST = 0.25, 0.25**6
-"""Where no reaction is found at the end of a step, a quarter of it is tried, down to the shortest: at the edges of
-potentials, and where one rises with lithium, the end of a long step has several solutions or none in reach."""
+"""Factor on a step for whose end no reaction was found, and the smallest share of a step. At the edges of potentials,
+and where a potential rises with lithium, the end of a long step has several solutions or none in reach."""
 FIRST_LENGTH = 0.25
-"""Of a step, where double layers meet a current that has turned: whole steps of 1 s between edges of 0.1 s were 0.52 mV
-RMS off under pulses to 3C, a quarter of one first leaves 0.05."""
+"""Share of a step that is taken first where the current has turned and there are double layers. Under pulses to 3C, the
+error of whole steps of 1 s between edges of 0.1 s is 0.52 mV RMS; with a quarter step first, 0.05."""
 TEMPERATURE_STEP_K = 0.01
-"""Rates of diffusion are renewed where the temperature has moved by this much (0.04 % of a rate at 30 kJ/mol)."""
+"""Change of temperature after which the rates of diffusion are computed again (0.04 % of a rate at 30 kJ/mol)."""
 
 
 @compiled
 def run_porous(  # type: ignore[no-untyped-def]
     drive, theta0, p, s, e, state, t, newton, weights, out, profile, salt_profile
 ):
-    """Step all samples; `layout` says what the named tuples hold.
+    """Step all samples; `layout` describes the named tuples.
 
     drive : see `aesi.physics.espm.layout.Drive`.  theta0 : (2,) at rest.  out : (9, n) voltage, mean surface
     stoichiometries (n, p), c_e0, c_eL, mean stoichiometries (n, p), temperature, plated lithium (mol/m3 of the negative
@@ -102,7 +102,7 @@ def run_porous(  # type: ignore[no-untyped-def]
             if e.heat[0] > 0.0:
                 power = 0.0
                 theta_n, theta_p = mean_surfaces(p, state.theta, half)
-                # Single units that are full or empty are no fault, and their potentials go on as those of the voltage.
+                # Single full or empty units are no fault: their potentials continue beyond [0, 1].
                 if steps > 0 and fault_at < 0 and left_range(theta_n, theta_p, state.c, s.c0) == 0:
                     voltage = voltage_of(s, e, state, t, phi_n, phi_p, t.total[0])
                     power = heat_power(p, e, state, half, i1, voltage, t_k)
@@ -124,7 +124,7 @@ def run_porous(  # type: ignore[no-untyped-def]
 
 @njit(inline="always", fastmath=FASTMATH)
 def set_currents(t, current, area):  # type: ignore[no-untyped-def]
-    """Both electrodes' currents at the end of a step, at its start, and what is between."""
+    """Set both electrodes' currents at the end and at the start of a step, and their difference."""
     t.before[0], t.before[1] = t.total[0], t.total[1]
     t.total[0], t.total[1] = current / area, -current / area
     t.change[0], t.change[1] = t.total[0] - t.before[0], t.total[1] - t.before[1]
@@ -147,7 +147,7 @@ def jump(last, current, p, s, e, state, t, newton, half, t_k):  # type: ignore[n
 
 @compiled
 def start_at_rest(p, s, e, state, t, half, theta0, t_k):  # type: ignore[no-untyped-def]
-    """Rest: uniform particles, uniform salt, no reaction."""
+    """Set the state to rest: uniform particles, uniform salt, no reaction."""
     state.c.fill(s.c0)
     for r in range(2 * half):
         side = 0 if r < half else 1
@@ -166,14 +166,14 @@ def start_at_rest(p, s, e, state, t, half, theta0, t_k):  # type: ignore[no-unty
 
 @njit(inline="always", fastmath=FASTMATH)
 def set_rates(e, t, t_k):  # type: ignore[no-untyped-def]
-    """Arrhenius factors of everything that has an activation energy."""
+    """Set the Arrhenius factors of all quantities with an activation energy."""
     for i in range(8):
         t.rates[i] = arrhenius(e.energies[i], t_k, e.reference_k)
 
 
 @compiled
 def voltage_of(s, e, state, t, phi_n, phi_p, density):  # type: ignore[no-untyped-def]
-    """Terminal voltage: both collectors, less the drop in the separator and the contacts."""
+    """Terminal voltage, V: difference of the collectors' potentials minus the drops in separator and contacts."""
     gap = 0.0
     for i in range(s.gap_path.shape[0]):
         if s.gap_path[i] > 0.0:
@@ -183,8 +183,8 @@ def voltage_of(s, e, state, t, phi_n, phi_p, density):  # type: ignore[no-untype
 
 @compiled
 def heat_power(p, e, state, half, current, voltage, t_k):  # type: ignore[no-untyped-def]
-    """Heat released (W): what lithium gives on its way from the mean of its particle, with its entropy, less what
-    double layers store and what leaves as electric power."""
+    """Heat released, W: power of the lithium from the mean stoichiometry of its particle, with its entropy, minus the
+    power stored in double layers and the electric power delivered."""
     power = -current * voltage
     for r in range(state.layer.shape[0]):
         power -= e.area * state.layer[r] * state.psi[r]

@@ -15,10 +15,10 @@ from aesi.physics.model import EspmModel, of_record
 from aesi.records import Hold
 
 LONGER_STEPS = 5.0
-"""Steps here over those of the single particle, whose deviations are of first order: on half-hour pulses 5 s instead of
-0.25 s move the voltage by 0.002 mV RMS, 15 s by 0.014, 60 s by 0.2. Where a diffusivity spans three decades, under
-pulses of 10 s, they are 0.05 mV RMS off steps of 1/32 s at 25 degC and 0.20 at 0 degC, where the single particle in
-steps of 1 s is 0.04 and 0.28 off its own."""
+"""Length of steps over that for the single particle, whose deviations are of first order. On half-hour pulses, steps of
+5 s instead of 0.25 s change the voltage by 0.002 mV RMS, 15 s by 0.014, 60 s by 0.2. Where a diffusivity spans three
+decades, under pulses of 10 s, the error against steps of 1/32 s is 0.05 mV RMS at 25 degC and 0.20 at 0 degC; that of
+the single particle in steps of 1 s is 0.04 and 0.28."""
 
 
 def run_porous_electrode(
@@ -30,9 +30,9 @@ def run_porous_electrode(
     hold: Hold,
     profiles: dict[str, Array] | None = None,
 ) -> tuple[Array, dict[str, Array], int, int]:
-    """As `extended.run_extended`: rows (7, n), further states by name, the first fault and what it was.
+    """As `extended.run_extended`: (rows (7, n), further states by name, sample of the first fault, its kind).
 
-    profiles : is given what `Run.profiles` names.  Raises InputError for an electrode cut into regions.
+    profiles : filled with the arrays of `Run.profiles`.  Raises InputError for an electrode cut into regions.
     """
     from aesi.physics.dfn.record_kernels import run_porous
 
@@ -89,7 +89,7 @@ def _named(model: EspmModel, profile: Array) -> dict[str, Array]:
 
 
 def _nodes(model: EspmModel) -> Array:
-    """(nodes,) m: where the electrolyte is known, from the negative collector to the positive one."""
+    """(nodes,) m, positions of the electrolyte's nodes, from the negative collector to the positive one."""
     cell = model.cell
     inside = 0.5 * (gauss_lobatto(model.electrode_points + 1)[0] + 1.0)
     out, start = [np.zeros(1)], 0.0

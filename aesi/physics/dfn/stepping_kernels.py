@@ -22,18 +22,18 @@ from aesi.physics.espm.tables import CORRECTED_MARGIN
 from aesi.physics.espm.transport_kernels import solid_forcing
 
 SALT_TOLERANCE = 1e-3
-"""Of the rest concentration: how far from its prediction the salt may end before a step is repeated. What rests on the
-prediction, conductivity and the variable part of diffusion, is then known to 0.1 %."""
+"""Largest error of the predicted salt, as a share of its rest concentration, before a step is repeated. Conductivity
+and the variable part of diffusion, which use the prediction, are then accurate to 0.1 %."""
 SURFACE_TOLERANCE = 1e-6
-"""Of stoichiometry: the same of a surface whose diffusivity varies."""
+"""The same for the surface stoichiometry of a particle with a variable diffusivity."""
 PASSES = 6
 LARGEST_GROWTH = 4.0
-"""Of a step over the last one: beyond it nothing is extrapolated."""
+"""Largest ratio of a step to the previous one with which start values are extrapolated."""
 
 
 @compiled
 def take_back(state, t):  # type: ignore[no-untyped-def]
-    """The start of a step whose end was not found: `commit` alone changes the rest of the state."""
+    """Restore the start of a step whose end was not found; only `commit` changes the rest of the state."""
     t.total[0], t.total[1] = t.before[0], t.before[1]
     for u in range(state.y.shape[0]):
         state.y[u] = t.y_back[u]
@@ -45,7 +45,7 @@ def take_back(state, t):  # type: ignore[no-untyped-def]
 
 @compiled
 def find_reaction(p, s, e, state, t, newton, spread, total, t_k):  # type: ignore[no-untyped-def]
-    """Solve for the reaction, with the conductivity at the salt `t.salt`; returns as `solve_reaction`."""
+    """Solve for the reaction, with the conductivity for the salt `t.salt`; returns as `solve_reaction`."""
     half = s.at.shape[0] // 2
     for r in range(2 * half):
         t.kappa[r] = t.rates[5] * lookup(s.kappa, t.salt[r] * s.c0 / s.top)
@@ -79,10 +79,9 @@ def settle(p, s, e, state, t, newton, change, total, t_k):  # type: ignore[no-un
 def hold_layers(e, state, t, newton, dt):  # type: ignore[no-untyped-def]
     """Double layers over a step, each as a conductance `t.layer_c` and a current `t.layer_old`.
 
-    That is exact for a layer that relaxes by its own kinetics as they are at the start of the step: the conductance
-    that the last solution left at each place.
-    What a layer takes falls off faster than a straight line, and the particles get the rest. `t.lag` is what they get
-    beyond a straight line, as a current at the start of the step.
+    That is exact for a layer that relaxes by its kinetics at the start of the step: the conductance of the last
+    solution at each place. The current of a layer decays faster than linearly, and the particles carry the rest.
+    `t.lag` is their current beyond a linear one, as a current at the start of the step.
     """
     for r in range(e.capacity.shape[0]):
         kinetic = newton.conductance[r] - t.layer_c[r]
@@ -98,7 +97,7 @@ def hold_layers(e, state, t, newton, dt):  # type: ignore[no-untyped-def]
 
 @compiled
 def hold_metal(e, state, t, dt, t_k):  # type: ignore[no-untyped-def]
-    """Plated lithium over a step, exact for metal that strips as it does at the start of the step, t_k (K)."""
+    """Plated lithium over a step, exact for metal that strips at the rate at the start of the step, t_k (K)."""
     thermal, alpha = GAS_OVER_FARADAY * t_k, e.plating[1]
     for r in range(state.plated.shape[0] // 2):
         strength, filled = e.plating[0] * e.node_share[r], e.plating_to_c * dt / e.node_share[r]
@@ -113,10 +112,10 @@ def hold_metal(e, state, t, dt, t_k):  # type: ignore[no-untyped-def]
 def advance(  # type: ignore[no-untyped-def]
     p, s, e, state, t, newton, weights, slot, dt, last_dt, t_k, last_try
 ):
-    """One step to the currents t.total, which changed by t.change; temperature t_k at its end.
+    """One step to the currents t.total, which changed by t.change; temperature t_k (K) at its end.
 
-    weights, slot : those of the step's length.  last_dt : of the step before, 0 after a jump.
-    last_try : take the step although it solves nothing.  Returns as `solve_reaction`.
+    weights, slot : those of the step's length.  last_dt : length of the previous step, s, 0 after a jump.
+    last_try : take the step even without a solution.  Returns as `solve_reaction`.
     """
     faster, w, taken = t.faster, weights.particle[slot], weights.taken[slot]
     w_salt, spread = weights.salt[slot], weights.spread[slot]
@@ -155,7 +154,8 @@ def advance(  # type: ignore[no-untyped-def]
 
 @njit(inline="always", fastmath=FASTMATH)
 def extrapolate(p, s, e, state, t, dt, last_dt, taken, change):  # type: ignore[no-untyped-def]
-    """Start values at the end of the step: each share of the current and its trend; salt and forcing as last moved."""
+    """Start values for the end of the step: shares of the current extrapolated by their trend, salt and forcing by
+    their last change."""
     half = s.at.shape[0] // 2
     ahead = dt / last_dt if dt < LARGEST_GROWTH * last_dt else 0.0
     for r in range(2 * half):
@@ -179,7 +179,7 @@ def extrapolate(p, s, e, state, t, dt, last_dt, taken, change):  # type: ignore[
 
 @njit(inline="always", fastmath=FASTMATH)
 def hold_flows(p, state, t):  # type: ignore[no-untyped-def]
-    """Diffusion beyond what is stepped exactly, t.rest, as it is at the start of the step."""
+    """Set t.rest, the diffusion beyond the exactly stepped part, at the start of the step."""
     for u in range(p.place.shape[0]):
         for j in range(p.gains.shape[0]):
             t.rest[u, j] = state.flow[u, j] - t.near[p.kind[u]] * state.z[u, j]
@@ -187,10 +187,10 @@ def hold_flows(p, state, t):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", fastmath=FASTMATH)
 def end_flows(p, state, t, faster, dt, w, taken, more):  # type: ignore[no-untyped-def]
-    """Diffusion at the end of the step, t.flow and t.rest; returns by how much its change moves a surface.
+    """Set the diffusion at the end of the step, t.flow and t.rest; returns the largest change of a surface by it.
 
-    more : a pass follows. Where the diffusivity has risen so far that passes would part instead of meeting, more of it
-    is stepped exactly from then on.
+    more : True if another pass follows. Where the diffusivity has risen so far that passes would diverge, more of it is
+    stepped exactly from then on.
     """
     worst = 0.0
     for u in range(p.place.shape[0]):
@@ -220,7 +220,7 @@ def end_flows(p, state, t, faster, dt, w, taken, more):  # type: ignore[no-untyp
 
 @njit(inline="always", fastmath=FASTMATH)
 def commit(p, s, e, state, t, dt, w, change, varies):  # type: ignore[no-untyped-def]
-    """Take the end of the step as the state."""
+    """Set the state to the end of the step."""
     half = s.at.shape[0] // 2
     for u in range(p.place.shape[0]):
         state.mean[u] = end_mean(p, t, u, state.y[u], dt)
@@ -241,7 +241,7 @@ def commit(p, s, e, state, t, dt, w, change, varies):  # type: ignore[no-untyped
 
 @compiled
 def commit_metal(p, e, state, t, dt, t_k):  # type: ignore[no-untyped-def]
-    """Plated lithium at the end of the step, before `commit_layers`; particles get to the last digit the rest."""
+    """Set the plated lithium at the end of the step, before `commit_layers`; particles get the exact remainder."""
     for r in range(state.plated.shape[0] // 2):
         metal = stripped(
             e.plating[0] * e.node_share[r], e.plating[1], t.metal_before[r], t.metal_filled[r],
@@ -261,7 +261,7 @@ def commit_metal(p, e, state, t, dt, t_k):  # type: ignore[no-untyped-def]
 
 @compiled
 def commit_layers(p, e, state, t, dt):  # type: ignore[no-untyped-def]
-    """Currents into double layers at the end of the step; particles get to the last digit what layers do not take."""
+    """Set the currents into double layers at the end of the step; particles get the exact remainder."""
     for r in range(e.capacity.shape[0]):
         begun = state.layer[r]
         state.layer[r] = t.layer_c[r] * state.psi[r] - t.layer_old[r]

@@ -7,8 +7,8 @@ between its collector and the electrolyte at the separator's edge:
     sum y + capacitive + plating = J
 
 with y_u the current of unit u per cell area, positive for delithiation, R the film's resistance over the unit's
-surface, J = I/A in the negative electrode and -I/A in the positive. Newton's method on all y and Phi, of one unit on
-its y alone: without a double layer it is there at once.
+surface, J = I/A in the negative electrode and -I/A in the positive. Newton's method solves for all y and Phi; for a
+single unit only for its y, which without a double layer is known at once.
 """
 
 import math
@@ -27,15 +27,15 @@ from aesi.physics.espm.kernels import (
 )
 
 NEWTON_STEPS = 60
-"""At most; a handful is usual."""
+"""Largest number of Newton's steps; a handful is usual."""
 NEWTON_TOLERANCE_V = 1e-11
-"""Of every potential: well within the 1e-9 V to which an effect vanishes at its neutral value."""
+"""Tolerance of every potential: well below the 1e-9 V to which an effect vanishes at its neutral value."""
 SMALLEST_STEP = 1.0 / 256.0
-"""Of Newton's, below which it is taken although it does not bring the solution nearer."""
+"""Smallest share of a Newton step; it is taken even if it does not reduce the residual."""
 SMALLEST_SLOPE = 1e-9
-"""Of a potential over its current: a flat one takes a finite step."""
+"""Lower limit of the slope of a potential in its current, so that the step at a flat one is finite."""
 SMALLEST_SHARE = 1e-12
-"""Of a double layer's mean current over a step, at its end."""
+"""Lower limit of a double layer's current at the end of a step, as a share of its mean over the step."""
 
 
 @compiled
@@ -67,7 +67,7 @@ def solve_electrode(lo, hi, side, total, at, particles, surfaces, memory):  # ty
 def solve_unit(lo, side, total, at, particles, surfaces, memory):  # type: ignore[no-untyped-def]
     """Newton's method on the current of an electrode's only unit, between bounds; returns Phi.
 
-    What is given grows with the current, but as a logarithm far out, where Newton's step leaps to the other side.
+    The total current grows with the unit's, but as a logarithm at large currents, where Newton's step overshoots.
     """
     y, slope, gain = memory.y, memory.slope, memory.gain
     first = side * memory.ohm.shape[0]
@@ -93,8 +93,8 @@ def solve_unit(lo, side, total, at, particles, surfaces, memory):  # type: ignor
 def solve_units(lo, hi, side, total, at, particles, surfaces, memory):  # type: ignore[no-untyped-def]
     """Newton's method on the currents of several units and on Phi, which is returned.
 
-    Where a unit fills, its kinetic drop is a logarithm of the room that is left, and a whole step leaps over the end of
-    it: steps are halved until they bring the solution nearer.
+    Where a unit fills, its kinetic drop is a logarithm of the remaining room, and a full step passes the end of it:
+    steps are halved until they reduce the residual.
     """
     matrix, move, n, phi = memory.matrix, memory.move, hi - lo, 0.0
     share, nearest, ohm = 1.0, math.inf, 0.0
@@ -124,7 +124,7 @@ def solve_units(lo, hi, side, total, at, particles, surfaces, memory):  # type: 
 def linearise(lo, hi, side, total, phi, chi, particles, memory):  # type: ignore[no-untyped-def]
     """memory.matrix : the equations of `solve_units` about its currents and `phi`, their right-hand side last.
 
-    Returns the largest residual of a potential (V), and what the currents sum up to beyond `total`.
+    Returns the largest residual of a potential (V), and the sum of the currents minus `total`.
     """
     matrix, slope, gain, ohm = memory.matrix, memory.slope, memory.gain, memory.ohm
     regions, n = ohm.shape[0], hi - lo
@@ -152,10 +152,10 @@ def linearise(lo, hi, side, total, phi, chi, particles, memory):  # type: ignore
 
 @njit(inline="always", fastmath=FASTMATH)
 def evaluate_electrode(lo, hi, side, total, begins, at, particles, surfaces, memory):  # type: ignore[no-untyped-def]
-    """Potential, slope and gain of each unit at its current, and the current of each region with what passes its units.
+    """Potential, slope and gain of each unit at its current, and the current of each region with its side currents.
 
-    gain : of the region's current over the unit's: that of the first unit there moves double layer and plating too.
-    begins : whether Newton's method does.
+    gain : derivative of the region's current in the unit's; that of the region's first unit includes double layer and
+    plating.  begins : True at the first Newton step.
     """
     regions = memory.ohm.shape[0]
     first = side * regions
@@ -214,7 +214,7 @@ def surface_potential(u, side, total, at, particles, surfaces, memory):  # type:
 def layer_current(r, side, potential, begins, at, surfaces, memory):  # type: ignore[no-untyped-def]
     """Current (A/m2) into the double layer of region r at the end of the step, and its slope in the potential.
 
-    All units of the region charge it together: its time constant is that of what they conduct in parallel.
+    All units of the region charge it together: its time constant follows from their conductances in parallel.
     """
     capacity = surfaces.capacity[side]
     if not (capacity > 0.0 and at.dt > 0.0):
@@ -233,7 +233,7 @@ def layer_current(r, side, potential, begins, at, surfaces, memory):  # type: ig
 
 @njit(inline="always", fastmath=FASTMATH)
 def metal_current(r, potential, at, surfaces, memory):  # type: ignore[no-untyped-def]
-    """Current (A/m2) that lithium metal of region r gives over the step, and its slope in the potential."""
+    """Current (A/m2) of stripping lithium metal in region r over the step, and its slope in the potential."""
     filled = surfaces.plating_to_c * at.dt
     metal, slope, memory.new_plated[r] = stripped(
         surfaces.plating[0],
@@ -257,7 +257,7 @@ def local_conductivity(table, salt, first, unit):  # type: ignore[no-untyped-def
 
 @compiled
 def region_drops(solid, salt, kappa, first, ohm):  # type: ignore[no-untyped-def]
-    """ohm[r, v] : drop of region r per current of region v."""
+    """Set ohm[r, v], ohm m2: drop of region r per current of region v."""
     regions = ohm.shape[0]
     for v in range(regions):
         for r in range(regions):
@@ -268,7 +268,7 @@ def region_drops(solid, salt, kappa, first, ohm):  # type: ignore[no-untyped-def
 
 @compiled
 def eliminate(matrix, n):  # type: ignore[no-untyped-def]
-    """Solve in place: the right-hand side stands in column n and is replaced by the solution."""
+    """Solve in place: the right-hand side in column n is replaced by the solution."""
     for k in range(n):
         best = k
         for i in range(k + 1, n):

@@ -1,4 +1,4 @@
-"""Arguments of the compiled general path: whatever effects add to the plain model.
+"""Arguments of the compiled general path, which has all that effects add to the plain model.
 
 Particles of several sizes, regions across each electrode, diffusivities that depend on stoichiometry, asymmetric
 kinetics, double layers, plating, and a temperature that is measured or follows from a heat balance.
@@ -42,7 +42,7 @@ from aesi.records import Hold
 def run_extended(
     model: EspmModel, time: Array, current: Array, temperature_k: Array | None, soc0: float, hold: Hold
 ) -> tuple[Array, dict[str, Array], int, int]:
-    """Rows as `plain.run_plain`, then further states by name, then the first fault."""
+    """(rows as of `plain.run_plain`, further states by name, sample of the first fault (-1 for none), its kind)."""
     from aesi.physics.espm.extended_kernels import run_general
 
     model = of_record(model, temperature_k is not None)
@@ -84,7 +84,7 @@ def _memory(particles: Units, salt: Salt, regions: int) -> tuple[Memory, Modes, 
 
 @lru_cache(maxsize=64)
 def general_arguments(model: EspmModel) -> tuple[Units, Salt, Surfaces, Whole]:
-    """What `extended_kernels.run_general` knows of the cell."""
+    """Constants of the cell for `extended_kernels.run_general`."""
     cell = model.cell
     whole = Whole(
         energies=activation_energies(cell),
@@ -117,7 +117,7 @@ def _salt(model: EspmModel) -> Salt:
 
 
 def particle_units(model: EspmModel) -> Units:
-    """Particles, region by region from each collector, size by size."""
+    """Constants of the particles, ordered by region from each collector, then by size."""
     solids = [solid_diffusion(x.diffusivity) for x in (model.cell.negative, model.cell.positive)]
     sphere = sphere_modes(model.solid_order)
     units, rates, gains, lump, share, volume, exchange = [], [], [], [], [], [], []
@@ -157,7 +157,7 @@ def particle_units(model: EspmModel) -> Units:
 
 
 def _padded(tables: list[Array]) -> Array:
-    """Tables of one length: a linear one is all zeros anyway."""
+    """Tables padded to the same length; the table of a linear diffusion is all zeros anyway."""
     longest = max(len(t) for t in tables)
     return np.array([t if len(t) == longest else np.zeros(longest) for t in tables])
 
@@ -182,7 +182,7 @@ def _surfaces(model: EspmModel) -> Surfaces:
 
 
 def interface_capacity(model: EspmModel, side: int) -> float:
-    """F/m2 of cell: double layer of one region of an electrode (0 negative, 1 positive)."""
+    """Capacity of the double layer of one region of an electrode (0 negative, 1 positive), F/m2 of cell."""
     cell = model.cell
     electrode, interface = ((cell.negative, model.negative), (cell.positive, model.positive))[side]
     area = electrode.area_per_volume_1_m * electrode.thickness_m / model.regions
@@ -190,7 +190,7 @@ def interface_capacity(model: EspmModel, side: int) -> float:
 
 
 def ohmic_drops(model: EspmModel) -> tuple[Array, Array]:
-    """Ohm m2 of the solid (2, regions, regions), and of the electrolyte times its conductivity, by region crossed."""
+    """(resistances of the solid, ohm m2; those of the electrolyte times its conductivity, m), (2, regions, regions)."""
     n, p = model.cell.negative, model.cell.positive
     solid, salt = ohmic_shares(model.regions)
     return (

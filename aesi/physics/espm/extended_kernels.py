@@ -1,9 +1,9 @@
-"""Compiled time stepping of the model with everything that effects may add to it.
+"""Compiled time stepping of the model with all that effects may add to it.
 
 Within a step a unit (see `electrode_kernels`) carries its share of the current, linear or held, plus a deviation that
-is constant over the step and found from the electrode's equations at its end: deviations cannot ring. A double layer
-takes most of what it takes where the step begins, and what it takes less in the mean than at the end its particles took
-there: lithium is kept to round-off.
+is constant over the step and found from the electrode's equations at its end: deviations cannot oscillate. The current
+of a double layer differs between the mean of a step and its end; its particles get the difference at the beginning of
+the step, so that lithium is conserved to round-off.
 """
 
 import numpy as np
@@ -120,7 +120,7 @@ def run_general(  # type: ignore[no-untyped-def]
 
 @compiled
 def rest_particles(theta0, density, particles, electrolyte, memory, modes, dissolved):  # type: ignore[no-untyped-def]
-    """Uniform particles and salt; each unit carries its share of the cell's current density."""
+    """Set the state to uniform particles and salt; each unit carries its share of the cell's current density."""
     dissolved.c.fill(electrolyte.c0)
     for u in range(memory.y.shape[0]):
         side = particles.place[u, 0]
@@ -145,9 +145,8 @@ def ends_of_part(current, k, part, parts, backward):  # type: ignore[no-untyped-
 
 @njit(inline="always", fastmath=FASTMATH)
 def set_conductivities(warmer, electrolyte, memory, c):  # type: ignore[no-untyped-def]
-    """Of each region and, last, of the separator; of an undivided electrode, at the mean salt of the cell.
-
-    warmer : factor of temperature.
+    """Set the conductivity of each region and, last, of the separator; in an undivided electrode, at the mean salt of
+    the cell.  warmer : factor of temperature.
     """
     kappa, table, regions = memory.kappa, electrolyte.kappa, memory.ohm.shape[0]
     if regions == 1:
@@ -172,7 +171,7 @@ def end_of_step(side, dt, held, t_k, supply, cell):  # type: ignore[no-untyped-d
 
 @compiled
 def react(side, total, last_total, at, particles, surfaces, memory):  # type: ignore[no-untyped-def]
-    """Currents of the units of one electrode at the end of a step, from the last deviations on; returns Phi.
+    """Currents of the units of one electrode at the end of a step, started from the last deviations; returns Phi, V.
 
     total, last_total : A/m2 of cell, positive for delithiation, now and at the end of the step before.
     """
@@ -199,14 +198,14 @@ def units_of(side, particles):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", fastmath=FASTMATH)
 def take_deviations(density, dt, slot, particles, memory, modes):  # type: ignore[no-untyped-def]
-    """Give the particles what their units carried beyond their shares, as if over the whole step, and what double
-    layers took less in the mean than at its end, as if at its beginning."""
+    """Add to the particles the currents of their units beyond their shares, over the whole step, and the double layers'
+    current at the end of the step minus its mean, at the beginning of the step."""
     regions = memory.ohm.shape[0]
     for u in range(modes.means.shape[0]):
         side = particles.place[u, 0]
         share = particles.share[u] if side == 0 else -particles.share[u]
         extra = memory.y[u] - share * density
-        # Less of the current than at the end went past the particles; units share it as they do their region.
+        # The mean side current was smaller than at the end; units share the difference as they do their region.
         early = memory.ahead[side * regions + particles.place[u, 1]] * particles.share[u] * regions
         if extra != 0.0 or early != 0.0:
             for j in range(modes.z.shape[1]):
@@ -218,8 +217,8 @@ def take_deviations(density, dt, slot, particles, memory, modes):  # type: ignor
 
 @njit(inline="always", fastmath=FASTMATH)
 def reaction_heat(t_k, cell, particles, surfaces, memory, means):  # type: ignore[no-untyped-def]
-    """Power (W) that lithium gives on its way from the mean of its particle, with its entropy, less what double layers
-    store."""
+    """Power, W, of the lithium from the mean stoichiometry of its particle, with its entropy, minus the power stored in
+    double layers."""
     power = 0.0
     for r in range(memory.layer.shape[0]):
         power -= cell.area * memory.layer[r] * memory.delta[r]
@@ -233,8 +232,8 @@ def reaction_heat(t_k, cell, particles, surfaces, memory, means):  # type: ignor
 
 @njit(inline="always", fastmath=FASTMATH)
 def electrode_surfaces(particles, theta):  # type: ignore[no-untyped-def]
-    """Mean surface stoichiometry of each electrode (negative, positive). A particle that has filled lies a little
-    beyond [0, 1] by itself."""
+    """Mean surface stoichiometry of each electrode (negative, positive). A full particle may lie slightly outside
+    [0, 1]."""
     mean_n, mean_p = 0.0, 0.0
     for u in range(theta.shape[0]):
         if particles.place[u, 0] == 0:
@@ -246,7 +245,8 @@ def electrode_surfaces(particles, theta):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", fastmath=FASTMATH)
 def record_sample(k, particles, memory, modes, c, c0, out):  # type: ignore[no-untyped-def]
-    """Means of the electrodes, salt at the collectors, plated lithium; returns what left its range, 0 for nothing."""
+    """Write the means of the electrodes, salt at the collectors and plated lithium; returns the state that left its
+    range, 0 for none."""
     theta_n, theta_p = electrode_surfaces(particles, memory.theta)
     out[1, k], out[2, k] = theta_n, theta_p
     out[5, k], out[6, k] = 0.0, 0.0

@@ -7,23 +7,23 @@ from numba import njit
 from aesi.physics.espm.kernels import FASTMATH, compiled, mean_asinh
 
 SMALLEST_EXPONENT, LARGEST_EXPONENT = -60.0, 60.0
-"""Of what would leave the range of a number."""
+"""Limits of exponents, against overflow and underflow."""
 MOST_STEPS = 30
 LARGEST_CHANGE = 4.0
 SMALLEST_CHANGE = 1e-4
-"""Of an overpotential over R T / F, in one step. Each leaves a twelfth of the cube of what it changes at most: below
-the smallest it is right to round-off."""
+"""Change of an overpotential over R T / F below which the iteration stops. The error after a step is at most a twelfth
+of the cube of its change: round-off, below this limit."""
 
 
 @njit(inline="always", fastmath=FASTMATH)
 def bounded_exp(x):  # type: ignore[no-untyped-def]
-    """exp with its argument kept from overflow."""
+    """exp with its argument limited against overflow."""
     return math.exp(min(max(x, SMALLEST_EXPONENT), LARGEST_EXPONENT))
 
 
 @njit(inline="always", fastmath=FASTMATH)
 def asymmetric_start(x, alpha):  # type: ignore[no-untyped-def]
-    """Where `asymmetric` begins for x: right for alpha of one half, and for a large current."""
+    """Start value of `asymmetric` for x: exact for alpha of one half, and for a large current."""
     half = 0.5 * abs(x)
     eta = 2.0 * math.copysign(math.log(half + math.sqrt(1.0 + half * half)), x)
     if half > 1.0:
@@ -34,7 +34,7 @@ def asymmetric_start(x, alpha):  # type: ignore[no-untyped-def]
 @compiled
 def asymmetric(x, alpha, eta):  # type: ignore[no-untyped-def]
     """Overpotential over R T / F of a current x over its exchange current, and its slope in x, for
-    x = exp(alpha eta) - exp(-(1 - alpha) eta).  eta : to begin with.
+    x = exp(alpha eta) - exp(-(1 - alpha) eta).  eta : start value.
     """
     gradient = 1.0
     for _ in range(MOST_STEPS):
@@ -77,11 +77,10 @@ def overpotential(y, exchange, occupancy, g1, g2, g3, log_salt, alpha, thermal):
 
 @njit(inline="always", fastmath=FASTMATH)
 def stripped(strength, alpha, before, filled, salt, potential, thermal):  # type: ignore[no-untyped-def]
-    """Current of a metal that strips (plates where negative) at the end of a step, its slope in the potential, and the
-    metal there: before - filled current, which stays positive whatever the step.
+    """(current of stripping (plating where negative) at the end of a step, its slope in the potential, metal there).
 
-    strength : current per metal and per salt.  before : metal, without what the current at the end does.  filled :
-    metal per current.
+    The metal is before - filled current, which is positive for every step.  strength : current per metal and per salt.
+    before : metal at the end for zero current there.  filled : metal per current.
     """
     up = strength * bounded_exp((1.0 - alpha) * potential / thermal)
     down = strength * salt * bounded_exp(-alpha * potential / thermal)
@@ -100,5 +99,5 @@ def end_weight(z):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", fastmath=FASTMATH)
 def relaxed(z):  # type: ignore[no-untyped-def]
-    """Current at the end of a step of z time constants over its mean, of an exponential that a jump began."""
+    """Current at the end of a step of z time constants over its mean, for the exponential decay after a jump."""
     return z / math.expm1(min(z, LARGEST_EXPONENT)) if z > 1e-6 else 1.0 - 0.5 * z

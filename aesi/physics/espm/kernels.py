@@ -14,33 +14,33 @@ FASTMATH = {"reassoc", "contract", "arcp", "nsz"}
 compiled: Callable[[Any], Any] = kept_njit(
     nogil=True, fastmath=FASTMATH, error_model="numpy", _nrt=False, forceinline=True
 )
-"""Of every function that numba does not inline itself. It counts the references to each array that it takes out of a
-named tuple, one atomic instruction at each use: without (nothing here allocates) a sample of the porous electrode takes
-2.5 us instead of 8.4. What is divided by zero is infinite, as in numpy: past the end of a cell a trial may underflow,
-and what has to be told is the fault before it.
+"""Options of every function that numba does not inline itself. numba counts references to each array that it takes out
+of a named tuple, one atomic instruction per use. Without counting (nothing here allocates) a sample of the porous
+electrode takes 2.5 us instead of 8.4. A division by zero gives infinity, as in numpy: beyond the end of a cell a trial
+may underflow, and the fault before it has to be reported.
 
-LLVM takes each function into its caller. As calls they are weak symbols, of which a process uses the first that it
-loads: that of the caller, of the function by itself where this process compiled it, or of another kernel that uses it.
-These add in another order, so that a discovery differed in the last digits between the process that compiled and the
-next ones, and where a direction is flat in its simulations. Without calls a sample takes 26 to 43 % less time, too."""
+LLVM inlines each function into its caller. Calls would be to weak symbols, of which a process uses the first loaded:
+that of the caller, of the function itself where this process compiled it, or of another kernel that uses it. These sum
+in different orders, so that a discovery differed in the last digits between the process that compiled and later ones,
+and in flat directions in its simulations. Inlining also saves 26 to 43 % of the time of a sample."""
 NANOSECONDS = 1e9
 BEYOND_RANGE_V = 10.0
-"""Slope (V per unit of stoichiometry) at which open-circuit potentials go on outside [0, 1]."""
+"""Slope (V per unit of stoichiometry) at which open-circuit potentials continue to fall outside [0, 1]."""
 SMALLEST_OCCUPANCY = 1e-9
 NEARLY_DRY = 0.1
-"""Of the salt at rest: below this the reaction withdraws to where there is salt, which one particle an electrode does
-not see. A porous electrode's salt tends to zero where that of a uniform reaction passes it (an LG 18650HG2 under US06
-at 10 degC: 56 mol/m3 against -104 at the wall)."""
+"""Share of the salt at rest below which the reaction moves to places with more salt, which a single particle does not
+model. There the salt of a porous electrode tends to zero, and that of a uniform reaction becomes negative (an LG
+18650HG2 under US06 at 10 degC: 56 mol/m3 against -104 at the wall)."""
 SMALLEST_EXPONENT = -10.0
-"""Of the salt that is left: products of its powers stay above what a number can hold."""
+"""Lower limit of the exponent of the remaining salt, so that products of its powers do not underflow."""
 ROUND_OFF = 1e-9
-"""Of a part of a step: stamps are rounded, and what is left by less than this is no part of its own."""
+"""Share of a part of a step below which the remainder of a step is not a further part: stamps are rounded."""
 LEFT_PART = 0.125
-"""Of a part: what is left by no more than this is shared among the others and is no part of its own. Rows of a second
-are the usual ones, and clocks that are slow by up to a tenth are looked for. Where rows of 1.0000001 s were taken in
-two steps, a clock slow by 1e-7 moved the voltage of an LG M50 by up to 0.08 mV and that of an LG 18650HG2 by 0.20."""
+"""Share of a part of a step up to which the remainder is divided among the other parts. Rows of 1 s are usual, and
+clocks that are slow by up to a tenth are searched for. If rows of 1.0000001 s were taken in two steps, a clock slow by
+1e-7 would move the voltage of an LG M50 by up to 0.08 mV and that of an LG 18650HG2 by 0.20."""
 LARGEST_RATIO = 1e12
-"""Above it the product of ten factors would leave the range of a number."""
+"""Upper limit of a ratio, above which the product of ten factors would overflow."""
 
 
 @njit(inline="always", fastmath=FASTMATH)
@@ -54,27 +54,26 @@ def lookup(table, position):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", fastmath=FASTMATH)
 def parts_of(step, longest, most, finer):  # type: ignore[no-untyped-def]
-    """Into how many equal parts a step is taken that are as long as it, or `longest`, over `finer`, and hardly longer;
-    at most `most`."""
+    """Number of equal parts of a step, at most `most`; each is about as long as min(step, longest) / finer."""
     return min(max(1, math.ceil(finer * max(1.0, step / longest) - LEFT_PART)), most)
 
 
 @njit(inline="always", fastmath=FASTMATH)
 def share_ahead(step, last):  # type: ignore[no-untyped-def]
-    """By how much of what it moved over the last step, 0 s for none, what is explicit is taken on over a step; no more
-    than all of it.
+    """Share, at most 1, of the last step's change of the explicit part by which that part is extrapolated over a step.
 
-    Beyond it a long step behind a short one takes on whatever a jump of the current began. With at most all of it no
-    order of long and short steps grows where equal ones do not: by at most 0.96 a step in 20,000 cycles of 2 to 5
-    lengths that are up to 400 times one another, with an explicit rest of 0.316 of the diffusivity that is stepped
-    exactly (`EXTRAPOLATED_MARGIN`); with twice as much at most 1.18, without a limit hundreds.
+    step, last : lengths of this and the last step, s; last is 0 for none. Without the limit, a long step after a short
+    one would extrapolate the beginning of a jump's transient. With it, no sequence of long and short steps is unstable
+    where equal ones are stable: growth is at most 0.96 per step in 20,000 cycles of 2 to 5 lengths with ratios up to
+    400, with an explicit rest of 0.316 of the exactly stepped diffusivity (`EXTRAPOLATED_MARGIN`). With a limit of 2 it
+    is at most 1.18, without a limit hundreds.
     """
     return min(step / last, 1.0) if last > 0.0 else 0.0
 
 
 @njit(inline="always", fastmath=FASTMATH)
 def open_circuit(table, theta):  # type: ignore[no-untyped-def]
-    """Potential at `theta`, falling on at a fixed slope outside [0, 1]."""
+    """Potential (V) at `theta`; outside [0, 1] it continues to fall at a constant slope."""
     inside = min(max(theta, 0.0), 1.0)
     return lookup(table, inside) - BEYOND_RANGE_V * (theta - inside)
 
@@ -90,7 +89,7 @@ def wet(salt):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", fastmath=FASTMATH)
 def salt_at_separator(c, c0):  # type: ignore[no-untyped-def]
-    """Salt where the electrodes meet the separator, over rest, of the electrode that has less there.
+    """Salt over rest at the edge of the separator, the lower one of the two electrodes.
 
     c : nodes of three equal layers that share their ends, mol/m3.
     """
@@ -100,7 +99,7 @@ def salt_at_separator(c, c0):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", fastmath=FASTMATH)
 def out_of_range(theta_n, theta_p, driest):  # type: ignore[no-untyped-def]
-    """What left its range: 1 the negative surface, 2 the positive, 3 the electrolyte, 0 nothing."""
+    """The state that left its range: 1 negative surface, 2 positive surface, 3 electrolyte, 0 none."""
     if not 0.0 <= theta_n <= 1.0:
         return 1
     if not 0.0 <= theta_p <= 1.0:
@@ -127,9 +126,9 @@ def step_weights(rate, dt):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", fastmath=FASTMATH)
 def slot_of(dt, keys):  # type: ignore[no-untyped-def]
-    """Where the weights of a step of dt s stand, and whether they are still to be made there.
+    """(slot of the weights of a step of dt s, True where they have to be computed).
 
-    keys : (slots,) nanoseconds of the steps whose weights are kept; that of this one is entered.
+    keys : (slots,) nanoseconds of the steps whose weights are kept; that of this step is entered.
     """
     key = np.int64(dt * NANOSECONDS + 0.5)
     slot = key % CACHE_SLOTS
@@ -153,6 +152,6 @@ def mean_asinh(s, c1, c2, c3):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", fastmath=FASTMATH)
 def kinetic_ratio(density, exchange, theta):  # type: ignore[no-untyped-def]
-    """|j| / (2 F K sqrt(x (1 - x))), with the occupancy kept off zero."""
+    """|j| / (2 F K sqrt(x (1 - x))), with a positive lower limit of x (1 - x)."""
     occupancy = max(theta * (1.0 - theta), SMALLEST_OCCUPANCY)
     return abs(density) / (2.0 * exchange * math.sqrt(occupancy))

@@ -11,15 +11,15 @@ from typing import NamedTuple
 from aesi.numerics.typing import Array, IntArray
 
 CACHE_SLOTS = 61
-"""Lengths of a step whose weights are kept at a time, each where its nanoseconds leave this remainder: a prime, since
-whole milliseconds are all multiples of 64. With 64 a record whose steps alternate made its weights anew at each."""
+"""Number of step lengths whose weights are kept; the slot is the length in nanoseconds modulo this. A prime, since
+whole milliseconds are multiples of 64: with 64 slots, weights of alternating steps were computed again at each step."""
 VOLTAGE_ROWS = 7
 """Rows of the output of every path: voltage, surface stoichiometries (n, p), salt at the collectors (n, p) and mean
-stoichiometries (n, p). Further states stand below."""
+stoichiometries (n, p). Rows of further states follow."""
 
 
 class Drive(NamedTuple):
-    """A record as the steps see it.
+    """A record for the compiled steps.
 
     time, current : (n,) s, A.  temperature : K, (n,) where `given`, else (1,) at the start.
     backward : a row's current holds since the row before.  substep, most : s and count of the steps within a row.
@@ -166,8 +166,7 @@ class Modes(NamedTuple):
 
     z, means : (units, modes) and (units,).  nodes, force, force_end : scratch of the variable part.
     faster : (3,) factors of temperature, negative, positive, salt.
-    near, largest : (units,) diffusivity that is stepped exactly, and the largest in the particle, over that of the
-    rates.
+    near, largest : (units,) exactly stepped diffusivity, and the largest in the particle, over that of the rates.
     keys, w, w_e : (slots,) nanoseconds of the steps whose weights are kept, (slots, units, 3, modes) those of the
     particles, (slots, 3, salt modes) those of the salt.
     """
@@ -188,8 +187,8 @@ class Modes(NamedTuple):
 class StepEnd(NamedTuple):
     """State of one electrode at the end of a step.
 
-    dt : s.  held : whether the current jumped to its value where the step began; a double layer's current is then no
-    continuation of the last one, and would ring.  thermal : R T / F, V.  rise : K above the reference.
+    dt : s.  held : True where the current jumped to its value at the beginning of the step; continuing a double layer's
+    last current would then oscillate.  thermal : R T / F, V.  rise : K above the reference.
     chi : 2 (1 - t+) R T / F, V.  quicker, film : factors of temperature on rate constants and films.
     """
 

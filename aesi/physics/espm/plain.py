@@ -21,9 +21,9 @@ from aesi.records import Hold
 def run_plain(
     model: EspmModel, time: Array, current: Array, soc0: float, hold: Hold
 ) -> tuple[Array, int, int]:
-    """Rows of (7, n): voltage, surface stoichiometries (n, p), c_e0, c_eL, mean stoichiometries (n, p).
+    """(rows (7, n), sample of the first fault (-1 for none), its kind); a fault is a surface or salt out of range.
 
-    And the first sample at which a surface or the electrolyte left its range, -1 for none, with what it was.
+    Rows: voltage, surface stoichiometries (n, p), c_e0, c_eL, mean stoichiometries (n, p).
     """
     from aesi.physics.espm.plain_kernels import run_linear
 
@@ -60,14 +60,14 @@ def rate_factor(energy_j_mol: float, temperature_k: float, reference_k: float) -
 
 
 def shifted_ocp(electrode: Electrode, rise_k: float) -> Relation:
-    """Open-circuit potential `rise_k` above the reference temperature."""
+    """Open-circuit potential (V over stoichiometry) at `rise_k` above the reference temperature."""
     if rise_k == 0.0 or electrode.entropic == Constant(0.0):
         return electrode.ocp
     return Sum(electrode.ocp, Scaled(electrode.entropic, rise_k))
 
 
 def stoichiometry_per_coulomb(cell: Cell, electrode: Electrode) -> float:
-    """1/C: surface gain of one times this is d(stoichiometry) per charge, 1 / (F R c_max x reactive area)."""
+    """Change of stoichiometry per charge at a surface gain of one, 1/C: 1 / (F R c_max x reactive area)."""
     area = cell.total_area_m2 * electrode.thickness_m * electrode.area_per_volume_1_m
     return 1.0 / (area * FARADAY_C_MOL * electrode.particle_radius_m * electrode.c_max_mol_m3)
 
@@ -93,7 +93,7 @@ def _salt_gain(stack: StackModes) -> Array:
 
 @lru_cache(maxsize=64)
 def plain_arguments(model: EspmModel) -> tuple[PlainSolid, PlainSalt, PlainCell]:
-    """What `plain_kernels.run_linear` knows of the cell."""
+    """Constants of the cell for `plain_kernels.run_linear`."""
     cell = model.cell
     n, p, e = cell.negative, cell.positive, cell.electrolyte
     temperature, reference = cell.initial_temperature_k, cell.reference_temperature_k

@@ -1,4 +1,4 @@
-"""Compiled time stepping of the model where nothing but the electrolyte's diffusivity is nonlinear.
+"""Compiled time stepping of the model where only the diffusion in the electrolyte is nonlinear.
 
 Modes of solid diffusion are stepped exactly for a current that is constant or linear within a step. The
 electrolyte is stepped exactly for a constant diffusivity d0; the rest, psi(c), is extrapolated over a step
@@ -67,7 +67,8 @@ def run_linear(time, current, backward, theta0, solid, salt, cell, memory, out):
 
 @compiled
 def renew_plain_weights(dt, slot, solid, salt, memory):  # type: ignore[no-untyped-def]
-    """Weights of a step of length `dt`: of the particles' modes, and of the parts that the electrolyte takes it in."""
+    """Compute the weights of a step of `dt` s: for the particles' modes, and for the parts that the electrolyte takes
+    it in."""
     rates, gains = solid.rates, solid.gains
     w_n, w_p, w_e = memory.w_n, memory.w_p, memory.w_e
     parts = parts_of(dt, salt.substep, salt.most, salt.finer) if salt.nonlinear else 1
@@ -99,7 +100,7 @@ def step_solid(z, w, slot, u0, u1):  # type: ignore[no-untyped-def]
 def step_salt(i0, i1, dt, last_step, slot, cell, salt, memory):  # type: ignore[no-untyped-def]
     """Step the electrolyte's modes q and the concentrations c at its nodes; returns the length of one part.
 
-    last_step : of the part before, 0 for the first.
+    last_step : length of the previous part, s, 0 for the first.
     """
     q, c, forcing, before, w = memory.q, memory.c, memory.forcing, memory.before, memory.w_e
     parts = memory.parts[slot]
@@ -135,7 +136,7 @@ def step_salt(i0, i1, dt, last_step, slot, cell, salt, memory):  # type: ignore[
 
 @njit(inline="always", fastmath=FASTMATH)
 def salt_at_gauss_points(c, c0, gauss, g):  # type: ignore[no-untyped-def]
-    """g : (6,) salt over rest at the Gauss points of both electrodes, kept positive."""
+    """Set g (6,): salt over rest at the Gauss points of both electrodes, kept positive."""
     nodes = c.shape[0]
     width = (nodes - 1) // 3 + 1
     for i in range(6):

@@ -68,7 +68,7 @@ class PlainCell(NamedTuple):
 
 
 class PlainMemory(NamedTuple):
-    """What the steps of the plain path change.
+    """State that the steps of the plain path change.
 
     z_n, z_p : (modes,) of the particles.  q, forcing, before : (salt modes,).  c, rest : (nodes,) mol/m3.
     g : (6,) salt over rest at the Gauss points.

@@ -21,15 +21,15 @@ from aesi.physics.cell.relations import (
 )
 
 RATE_POINTS = 513
-"""Courses of rates are smooth in their logarithm; a point every 0.2 % of stoichiometry follows them."""
+"""Points of the tables of rate factors, whose logarithms are smooth: one every 0.2 % of stoichiometry."""
 ELECTROLYTE_POINTS = 2049
 ELECTROLYTE_SPAN = 4.0
 """Tables of electrolyte properties run from zero to this many times the rest concentration."""
 EXTRAPOLATED_MARGIN = 0.76
-"""The exactly stepped diffusivity exceeds three quarters of the largest one where the explicit rest is extrapolated
-from two steps, so that it cannot grow, however long the step."""
+"""Share of the largest diffusivity that is stepped exactly where the explicit rest is extrapolated from two steps:
+above three quarters, this is stable for steps of any length."""
 CORRECTED_MARGIN = 0.55
-"""Half of it is enough where the rest is predicted and corrected within the step."""
+"""The same share where the rest is predicted and corrected within the step: above one half is stable."""
 
 
 def ocp_table(ocp: Relation, side: str, what: str = "open-circuit potential") -> Array:
@@ -116,7 +116,7 @@ def solid_diffusion(diffusivity: Relation) -> DiffusionTable:
 def _split(
     diffusivity: Relation, reference: float, top: float, working: tuple[float, ...], margin: float
 ) -> DiffusionTable:
-    """What is no positive number, outside the range of a fit, is taken as `LEAST_TRANSPORT`; the rest as it is."""
+    """Split of a diffusivity. Values that are not positive, outside the range of a fit, become `LEAST_TRANSPORT`."""
     grid = np.linspace(0.0, top, ELECTROLYTE_POINTS)
     values = diffusivity(grid)
     at_reference = float(diffusivity(np.array([reference]))[0])
@@ -131,7 +131,7 @@ def _split(
 
 
 def conductivity_table(conductivity: Relation, c0: float) -> Array:
-    """(ELECTROLYTE_POINTS,) S/m on [0, ELECTROLYTE_SPAN c0], kept off zero, which no salt at all has.
+    """(ELECTROLYTE_POINTS,) S/m on [0, ELECTROLYTE_SPAN c0], with a positive lower limit: without salt it would be 0.
 
     Raises CellError unless positive at rest.
     """

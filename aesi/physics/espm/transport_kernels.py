@@ -8,13 +8,13 @@ from aesi.constants import GAS_CONSTANT_J_MOL_K
 from aesi.physics.espm.kernels import FASTMATH, compiled, lookup, share_ahead, step_weights, wet
 
 EXACT_SHARE = 0.78
-"""Of the largest diffusivity in a particle, what is stepped exactly: between `CORRECTED_MARGIN`, above which the
-explicit rest cannot grow, and all of it. Of pulses to 1.4C at 10 degC the files of an LG 18650HG2 and of a Panasonic
-NCR18650PF are 0.08 and 0.11 mV RMS off steps of 1/32 s with it, with 0.6 0.07 and 0.09, with 1 0.10 and 0.14. It
-follows the profile at every step: where it moved by jumps a voltage did, too, by up to 0.4 mV, and a fit stopped there.
-"""
+"""Share of the largest diffusivity in a particle that is stepped exactly: between `CORRECTED_MARGIN`, above which the
+explicit rest is stable, and 1. Under pulses to 1.4C at 10 degC, the error of the files of an LG 18650HG2 and of a
+Panasonic NCR18650PF against steps of 1/32 s is 0.08 and 0.11 mV RMS with it, 0.07 and 0.09 with 0.6, and 0.10 and 0.14
+with 1. The diffusivity is adapted to the profile at every step: where it changed by jumps, the voltage did by up to 0.4
+mV, and a fit stopped there."""
 DIFFUSIONS = (0, 1, 4)
-"""Where the activation energies of diffusion stand: negative, positive electrode, electrolyte."""
+"""Indices of the activation energies of diffusion: negative electrode, positive electrode, electrolyte."""
 
 
 @njit(inline="always", fastmath=FASTMATH)
@@ -25,8 +25,8 @@ def arrhenius(energy, temperature, reference):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", fastmath=FASTMATH)
 def renew_weights(dt, missing, particles, e_rates, slot, modes):  # type: ignore[no-untyped-def]
-    """Decay and input weights of all modes for a step of dt s, where they stand in `slot`: of particles whose
-    diffusivity is followed anew, of all others if they are `missing` there."""
+    """Compute the decay and input weights for a step of dt s in `slot`: for particles with an adapted diffusivity, and
+    for all other modes if they are `missing` there."""
     for u in range(modes.near.shape[0]):
         side = particles.place[u, 0]
         followed = particles.strength[side] > 0.0
@@ -49,7 +49,7 @@ def step_electrolyte(  # type: ignore[no-untyped-def]
 ):
     """Step the modes q and the concentrations c at the nodes.
 
-    j0, j1 : cell current density at both ends.  deviation : (2 regions,) of each region's current from its share.
+    j0, j1 : cell current density at both ends.  deviation : (2 regions,) each region's current minus its share.
     ahead : see `share_ahead`.  faster : factor of temperature on the explicit part.
     """
     rates, gains, to_nodes, project = electrolyte[:4]
@@ -86,11 +86,11 @@ def step_electrolyte(  # type: ignore[no-untyped-def]
 def step_particle(  # type: ignore[no-untyped-def]
     u, mean, z, u0, u1, dt, faster, near, particles, w, scratch
 ):
-    """Step particle u under a current from u0 to u1; returns its new mean, what a unit of current takes, and the
-    largest diffusivity of its profile over that of the rates.
+    """Step particle u under a current from u0 to u1; returns its new mean, the decrease of its surface per unit of
+    current, and the largest diffusivity of its profile over that of the rates.
 
-    faster : factor of temperature on the explicit part, which is predicted, then corrected once: what the diffusivity
-    is beyond the one that is stepped exactly, `near` times that of the rates.
+    faster : factor of temperature on the explicit part, which is predicted, then corrected once: the diffusivity minus
+    the exactly stepped one, `near` times that of the rates.
     """
     side, rates, gains, lump = (
         particles.place[u, 0],
@@ -124,7 +124,7 @@ def step_particle(  # type: ignore[no-untyped-def]
 def solid_forcing(mean, z, at, project, psi, nodes, force):  # type: ignore[no-untyped-def]
     """force[k] : mode k of the integral psi of the diffusivity's variable part, at the profile of (mean, z).
 
-    Beyond [0, 1] the diffusivity stays what it is at the end.  Returns the largest slope of psi on the profile.
+    Beyond [0, 1] the diffusivity is constant.  Returns the largest slope of psi on the profile.
     """
     for i in range(nodes.shape[0]):
         level = mean
@@ -161,7 +161,7 @@ def observe_salt(c, c0, gauss, salt, log_salt, region_salt):  # type: ignore[no-
 
 @njit(inline="always", fastmath=FASTMATH)
 def mean_heat(start, end, i0, i1):  # type: ignore[no-untyped-def]
-    """Mean heat over a step whose current is a straight line: quadratic in it, by the larger end's resistance."""
+    """Mean heat over a step of linear current: quadratic in the current, with the resistance at the larger end."""
     if i0 == i1:
         return end
     resistance = start / (i0 * i0) if abs(i0) > abs(i1) else end / (i1 * i1)
@@ -179,10 +179,10 @@ def heated(t_k, watts, dt, heat, around_k):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", fastmath=FASTMATH)
 def renew_factors(t_k, t_weights, within_k, energies, reference_k, faster, keys):  # type: ignore[no-untyped-def]
-    """Factors of temperature on diffusion, where it has moved by more than `within_k` since `t_weights`; returns that
-    of which they are now.
+    """Compute the factors of temperature on diffusion where the temperature has changed by more than `within_k` since
+    `t_weights`; returns the temperature (K) for which they now hold.
 
-    energies : (8,) J/mol.  faster : (3,) is set.  keys : (slots,) of the weights that are kept, which are then void.
+    energies : (8,) J/mol.  faster : (3,) is set.  keys : (slots,) of the kept weights, which then become invalid.
     """
     if abs(t_k - t_weights) <= within_k:
         return t_weights
@@ -196,9 +196,9 @@ def renew_factors(t_k, t_weights, within_k, energies, reference_k, faster, keys)
 def diffuse(  # type: ignore[no-untyped-def]
     j0, j1, dt, last_step, slot, particles, electrolyte, memory, modes, dissolved
 ):
-    """Salt and particles over a step of the cell's current density from j0 to j1, last deviations as they were.
+    """Step salt and particles under the cell's current density from j0 to j1, with the last deviations.
 
-    last_step : of the step before, 0 for the first.
+    last_step : length of the previous step, s, 0 for the first.
     """
     ahead = share_ahead(dt, last_step)
     step_electrolyte(
