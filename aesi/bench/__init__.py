@@ -1,4 +1,4 @@
-"""Benchmarks against the peers, by name: each yields one JSON-ready dict a line, peer and ours in one run."""
+"""Benchmarks against other programs, by name; each yields one JSON-ready dict per line."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any, TypeVar
@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 from aesi.errors import InputError
 
 CaseRow = dict[str, Any]
-"""What is told of one case: JSON-ready values by name."""
+"""Row of one case: name -> JSON-ready value."""
 
 BENCHMARKS = {
     "espm": "aesi.bench.physics.espm",
@@ -26,10 +26,10 @@ Chosen = TypeVar("Chosen")
 
 
 def some_chosen(name: str, cases: Sequence[Chosen], names: Iterable[str]) -> Sequence[Chosen]:
-    """The cases of a benchmark that its options chose.  Raises InputError where there is none: a summary of no case
-    would look like a result.
+    """The chosen cases of a benchmark.  Raises InputError where there is none: a summary without cases would look like
+    a result.
 
-    names : what its option `only` can be.
+    names : possible values of its option `only`.
     """
     if not cases:
         there = ", ".join(dict.fromkeys(names))

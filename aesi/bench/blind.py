@@ -1,9 +1,8 @@
 """Does the tracer name what is missing? Labelled cases that PyBaMM made, the label kept from the tracer.
 
-A row a case, and a summary: the strict rates with their intervals beside the lenient ones, by kind of case; the error
-left over, how well the parameters are met and how often their intervals cover them; the confidence shown against the
-frequency of being right; the confusion matrix. A case that runs out of its processor time, or that the tracer
-refuses, is a miss.
+One row per case, and a summary: strict rates with their intervals and lenient ones, by kind of case; the remaining
+error, the errors of the parameters and the coverage of their intervals; stated confidence against the frequency of
+being right; the confusion matrix. A case that exceeds its processor time, or that the tracer refuses, is a miss.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ from aesi.pipeline.discovery.discover import discovery_content
 from aesi.tracer import discover
 
 LIMIT_S = 180.0
-"""Processor time of a case, after which it counts as not answered."""
+"""Processor time of a case, s, after which it counts as not answered."""
 
 
 def chosen(
@@ -38,10 +37,10 @@ def chosen(
     every: int = 1,
     after: int = 0,
 ) -> Sequence[CaseSpec]:
-    """Cases of the plan, or of the small one that a test can afford.
+    """Cases of the plan, or of the small plan for tests.
 
-    cases : the first so many (None: all).  only : substring of a recipe's name, or a kind of case.
-    every : take each n-th case.  after : without the first so many, which somebody may have looked at.
+    cases : number of cases, from the first (None: all).  only : substring of a recipe's name, or a kind of case.
+    every : take each n-th case.  after : number of first cases left out, since they may have been looked at.
     Raises InputError where none is left.
     """
     specs = small_plan(seed) if small else plan(seed, FULL)
@@ -51,7 +50,7 @@ def chosen(
 
 
 def judged(spec: CaseSpec, cells: str, limit_s: float | None = LIMIT_S) -> dict[str, Any]:
-    """One case made and judged.
+    """The row of one case, generated and judged.
 
     cells : folder of the declared cell files.  limit_s : processor seconds of the tracer; a case that takes longer
     is a miss.
@@ -65,14 +64,14 @@ def judged(spec: CaseSpec, cells: str, limit_s: float | None = LIMIT_S) -> dict[
 
 
 def lost(spec: CaseSpec) -> dict[str, Any]:
-    """The row of a case whose process the system ended: a miss. What there was to be seen is not known."""
+    """The row of a case whose process the system ended: a miss, of unknown detectability."""
     told = {"label": label_of(spec), "unexplained_mv": None, "seen_nats": None}
     return _planned(spec) | told | LOST.row | MISSED | NO_TIME
 
 
 NOT_MADE = "not made"
-"""Verdict of a case that the laboratory cannot make as planned, such as one that meets the limit of the voltage: it
-is counted, and in no rate."""
+"""Verdict of a case that the laboratory cannot make as planned, for example because it reaches a voltage limit: it is
+counted, but not in any rate."""
 
 
 def _planned(spec: CaseSpec) -> dict[str, Any]:
@@ -112,7 +111,7 @@ MISSED: dict[str, Any] = {
     "false_name": False,
     "fitted": False,
 }
-"""What a case scores that gave no answer."""
+"""Scores of a case without an answer."""
 
 
 def _scored(case: BlindCase, content: Mapping[str, Any]) -> dict[str, Any]:
@@ -140,8 +139,8 @@ def _scored(case: BlindCase, content: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _parameters(case: BlindCase, content: Mapping[str, Any]) -> tuple[list[float], list[bool]]:
-    """Relative errors of the parameters whose truth is known under the same name, and whether the 90 % interval
-    holds the truth."""
+    """(relative errors of the parameters whose truth is known under the same name, True where the 90 % interval
+    contains the truth)."""
     errors, covered = [], []
     for candidate in content["candidates"]:
         if candidate["effect"] not in content["effects"]:
@@ -156,7 +155,7 @@ def _parameters(case: BlindCase, content: Mapping[str, Any]) -> tuple[list[float
 
 
 def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Strict rates with intervals beside the lenient ones, medians, calibration, and the confusion matrix."""
+    """Strict rates with intervals and lenient ones, medians, calibration, and the confusion matrix."""
     planned, rows = rows, [r for r in rows if r["verdict"] != NOT_MADE]
     effect = [r for r in rows if r["label"] not in ("none", "unknown")]
     nothing = [r for r in rows if r["label"] == "none"]
@@ -206,7 +205,7 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _confusion(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, int]]:
-    """What was wrong -> what was answered -> how often."""
+    """Label -> answer -> number of cases."""
     counts: dict[str, Counter[str]] = {}
     for row in rows:
         answer = "+".join([row["verdict"] if row["verdict"] != "found" else "", *row["effects"]]).strip("+")
@@ -215,7 +214,8 @@ def _confusion(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, int]]:
 
 
 def table(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """Lines of Markdown, a case a line in a note. `nats`: what the label says of unseen data more than nothing does."""
+    """Lines of Markdown, with one line per case in a note. `nats`: log likelihood of unseen data under the label minus
+    that without effects."""
     lines = [
         '??? note "Each case"',
         "",

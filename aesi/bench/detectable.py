@@ -1,8 +1,8 @@
-"""Can the effects of a labelled case be seen at all? What no finder with this likelihood could name is told apart.
+"""Can the effects of a labelled case be detected at all, by any finder with this likelihood?
 
-A case asks for a change of the voltage of some size, but initial state of charge and own parameters may take most of
-it up, and on a measured cell the errors that models of such cells have. What the hypothesis with all effects of the
-label says of unseen data more than the best one that lacks one of them is what there is to be seen.
+A case specifies a change of the voltage of some size. Initial state of charge and the cell's parameters may absorb most
+of it, and on a measured cell so may the errors of its models. The detectability is the log likelihood of unseen data
+under all effects of the label minus that under the best hypothesis that lacks one of them.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import fitted_hypothesis
 
 SEEN_NATS = 5.0
-"""What an effect has to say to be admitted: 3.8 to 5.4 nats on 14 development cases of `aesi bench blind`, by
-surrogates."""
+"""Gain in log likelihood that an effect needs to be admitted: 3.8 to 5.4 nats on 14 development cases of `aesi bench
+blind`, by surrogates."""
 
 
 def seen_nats(case: BlindCase) -> float | None:
-    """Nats that the label says more of unseen data than the best hypothesis without one of its effects; None for a case
-    without effects, or one that the tracer refuses or the model cannot simulate."""
+    """Log likelihood of unseen data, nats, under the label minus that under the best hypothesis without one of its
+    effects; None for a case without effects, or one that the tracer refuses or the model cannot simulate."""
     if not case.effects:
         return None
     try:
@@ -40,7 +40,7 @@ def seen_nats(case: BlindCase) -> float | None:
 
 
 def label_problem(case: BlindCase) -> InverseProblem:
-    """What the label is fitted to: the case with the model that made it."""
+    """The inverse problem in which the label is fitted: the case with the model that generated it."""
     model: ModelName = "dfn" if case.spec.model == "DFN" else "espm"
     return with_fine_numerics(
         inverse_problem(Cell.from_bpx(case.declared), case.measurements, case.soc0, model=model)
@@ -55,16 +55,16 @@ def seen_on_measured(
     good: Sequence[Measurement] = (),
     holdout: float = 0.3,
 ) -> float | None:
-    """Nats that the best of several right answers says more of unseen data than the declared model, where a model of a
-    measured cell errs as such models do; None where there is no right name, where none of them can be simulated, or
+    """Log likelihood of unseen data, nats, under the best of several right answers minus that under the declared model,
+    with the model error of measured cells. None where there is no right name, where none of them can be simulated, or
     where the tracer refuses the records.
 
-    good : records of the cell that are known to be good.  holdout : last share of the data that is kept back.
+    good : records of the cell that are known to be good.  holdout : last share of the data that is held out.
     """
     try:
         problem = inverse_problem(declared, [data], soc0, holdout, good=good)
         problem = replace(problem, trust="beside" if good else "measured")
-        archive = Archive(None, "")  # of all answers: what they are held against is fitted once
+        archive = Archive(None, "")  # shared: reference hypotheses are fitted once
         said = [_said_more(problem, (name,), archive) for name in answers]
     except AesiError:
         return None
@@ -72,7 +72,7 @@ def seen_on_measured(
 
 
 def _said_more(problem: InverseProblem, effects: tuple[str, ...], archive: Archive) -> float | None:
-    """Than the best hypothesis that lacks one of the effects, nats."""
+    """Log likelihood of unseen data, nats, minus that under the best hypothesis that lacks one of the effects."""
     blocks = blocks_of(problem)
 
     def fit(hypothesis: tuple[str, ...]) -> FittedHypothesis | None:

@@ -1,14 +1,14 @@
-"""What do models of measured cells err by within seconds? Measures what the tracer takes for chance there.
+"""How large is the error of models of measured cells within seconds? Measures the fast model error of the tracer.
 
-Each development control at 25 degC with a current that changes is fitted as the tracer fits a measured cell. Of what is
-left and is gone from its mean over `WINDOW_S` the command tells how large it is, how long it lasts, and how much of it
-is a wrong resistance. Then each effect is fitted, to first order. Nothing was put in, so that sizes over their standard
-deviations scatter by one where as many samples are independent as the tracer takes for it; a lag that the channels of a
-cycler have is left out of that.
+Each development control at 25 degC with a changing current is fitted as the tracer fits a measured cell. For the
+residual minus its mean over `WINDOW_S`, the command prints the size, the correlation time, and the share of a wrong
+resistance. Then each effect is fitted, to first order. No fault was added, so sizes over their standard deviations have
+a standard deviation of one if the tracer assumes the right number of independent samples. The real lag between the
+channels of a cycler is excluded from that.
 
     python -m aesi.bench.fast_error
 
-prints a line a record, and a last one with means over the records.
+prints one line per record, and a last one with means over the records.
 """
 
 from __future__ import annotations
@@ -37,14 +37,14 @@ from aesi.tracer.search.grown import ended, growths_on
 
 RIGHT_TEMPERATURE = ("25degC", "drive_cycle")
 CONSTANT = ("cap_1c",)
-"""Parts of the names of records that are left out, since their current never changes; RIGHT_TEMPERATURE, of those
-that are at the temperature that their file is of."""
+"""Parts of the names of records that are left out, since their current never changes; RIGHT_TEMPERATURE: of records at
+the temperature of their file."""
 THERE = "clock_skew"
-"""The voltage channel of one cycler does lag, by 0.12 s on three records: no chance."""
+"""Effect that is really present: the voltage channel of one cycler lags, by 0.12 s on three records."""
 
 
 def records() -> Iterator[RealCase]:
-    """The development controls that are measured."""
+    """The development controls that are used."""
     for case in chosen(only="control-", development=True):
         if case.good or any(word in case.take.file for word in CONSTANT):
             continue
@@ -53,7 +53,7 @@ def records() -> Iterator[RealCase]:
 
 
 def fast_error(case: RealCase, cells: str = "experiments/cells") -> dict[str, Any]:
-    """Of one record: RMS, mV, correlation time, s, share of the resistance, and sizes over standard deviations."""
+    """Row of one record: RMS, mV, correlation time, s, share of the resistance, and sizes over standard deviations."""
     problem = inverse_problem(declared_cell(case.cell, cells), [record(case.take)], case.soc0, HELD_OUT)
     problem = replace(problem, trust="measured")
     blocks, archive = blocks_of(problem), Archive(None, "")
@@ -75,7 +75,8 @@ def fast_error(case: RealCase, cells: str = "experiments/cells") -> dict[str, An
 
 
 def lasts_s(time_s: Array, error: Array) -> float:
-    """Integral correlation time of an error (n,) at times in s: of every second, up to where it is first zero."""
+    """Integral correlation time, s, of an error (n,) at times in s: from lags of whole seconds up to the first zero of
+    the correlation."""
     every_s = np.arange(time_s[0], time_s[-1])
     e = np.interp(every_s, time_s, error)
     lags = [float(np.mean(e[k:] * e[: len(e) - k])) for k in range(min(len(e), 120))]
@@ -84,7 +85,7 @@ def lasts_s(time_s: Array, error: Array) -> float:
 
 
 def main() -> None:
-    """Print a line a record and the summary."""
+    """Print one line per record and the summary."""
     rows = []
     for case in records():
         rows.append(fast_error(case))

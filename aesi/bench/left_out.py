@@ -1,8 +1,8 @@
-"""Does what is found carry over? Each measured record in turn as the test, the others of its cell as data.
+"""Does a finding generalise? Each measured record in turn is the test, with the others of its cell as data.
 
-The written model (`after`) is held against the declared and the recalibrated one on the record that chose nothing,
-which begins as `ModelState.simulated` says of one that was not fitted. Records with a thermocouple are simulated at its
-temperature. Of drives the first hour is taken.
+The written model (`after`) is compared with the declared and the recalibrated one on the test record, which starts as
+`ModelState.simulated` does for a record that was not fitted. Records with a thermocouple are simulated at its
+temperature. Only the first hour of drives is used.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class MeasuredSet:
     """Records of one measured cell and the file that declares it.
 
     data : name of the data set.  cell : a file in the folder of cell files, or None for the one published with the set.
-    slow : records that are taken whole.  drives : those of which the first hour is taken.
+    slow : records that are used whole.  drives : records of which the first hour is used.
     """
 
     data: str
@@ -60,14 +60,14 @@ SETS = (
 
 @dataclass(frozen=True)
 class LeftOutCase:
-    """One record of a set, left out."""
+    """A record of a set that is left out as the test."""
 
     set: MeasuredSet
     test: str
 
     @property
     def name(self) -> str:
-        """Of the case."""
+        """Name of the case."""
         return f"{self.set.data}/{self.test}"
 
 
@@ -79,7 +79,7 @@ def plan(only: str | None = None) -> Sequence[LeftOutCase]:
 
 
 def judged(case: LeftOutCase, cells: str, limit_s: float | None = LIMIT_S) -> CaseRow:
-    """The row of one case; `verdict` is 'not run' where its data cannot be had.
+    """The row of one case; `verdict` is 'not run' where its data are not available.
 
     cells : folder of the cell files.  limit_s : processor seconds; a case that takes longer has failed.
     """
@@ -118,7 +118,7 @@ def _records(one: MeasuredSet) -> Iterator[tuple[str, Measurement]]:
 
 
 def summary(rows: Sequence[CaseRow]) -> dict[str, Any]:
-    """How often the written model is no worse than leaving the cell alone, the worst case, and what was named."""
+    """Share of cases where the written model is no worse than the declared cell, the worst case, and named effects."""
     ran = [row for row in rows if row["verdict"] != NOT_RUN]
     judged_rows = [row for row in ran if "times_better" in row]
     worst = max(judged_rows, key=lambda row: float(row["times_better"]), default=None)
@@ -135,7 +135,7 @@ def summary(rows: Sequence[CaseRow]) -> dict[str, Any]:
 
 
 def table(rows: Sequence[CaseRow]) -> list[str]:
-    """Lines of Markdown, a record a line, the worst in bold."""
+    """Lines of Markdown, one per record, the worst in bold."""
     worst = max((row.get("times_better", 0.0) for row in rows), default=0.0)
     lines = [
         "| cell | left out | verdict | declared, mV | recalibrated, mV | after, mV | after / better |",

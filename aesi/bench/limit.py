@@ -1,4 +1,4 @@
-"""A limit on the processor seconds of one piece of work, and what a benchmark says of a case that gave no answer."""
+"""A limit on the processor seconds of one piece of work, and the row of a benchmark's case without an answer."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ T = TypeVar("T")
 
 ERROR, OUT_OF_TIME = "error", "out of time"
 NO_ANSWER = (ERROR, OUT_OF_TIME)
-"""Verdicts of cases that gave no answer."""
+"""Verdicts of cases without an answer."""
 NOT_RUN = "not run"
-"""Verdict of a case whose data cannot be had: it is counted, and in no figure."""
+"""Verdict of a case whose data are not available: it is counted, but not in any figure."""
 
 
 class OutOfTime(BaseException):
-    """The processor seconds are used up. No Exception, so that no clause for errors of a fit takes it for one."""
+    """The processor seconds are used up. Not an Exception, so that no handler for errors of a fit catches it."""
 
 
 @contextmanager
 def processor_limit(seconds: float | None) -> Iterator[None]:
-    """Raise OutOfTime in the body once it has used so many processor seconds; None sets no limit.
+    """Raise OutOfTime in the body once it has used `seconds` of processor time; None sets no limit.
 
-    Held where the body runs in the main thread of its process, on systems with interval timers; elsewhere (threads of
+    Effective in the main thread of a process, on systems with interval timers; elsewhere (threads of
     Dask workers, Windows) the body runs without a limit.
     """
     here = threading.current_thread() is threading.main_thread() and hasattr(signal, "setitimer")
@@ -60,7 +60,7 @@ class NoAnswer:
 
     @property
     def row(self) -> CaseRow:
-        """What the row of the case says of it."""
+        """Its entries in the row of the case."""
         return {"verdict": self.verdict, "error": self.error}
 
 
@@ -68,9 +68,9 @@ LOST = NoAnswer(
     ERROR,
     "the system ended the process that worked on it, perhaps for want of memory; fewer workers have more each.",
 )
-"""Of a case whose process was ended from outside."""
+"""Answer of a case whose process was ended from outside."""
 NO_TIME: CaseRow = {"processor_s": 0.0, "ours_s": 0.0}
-"""What a row has in the place of a stopwatch's that was lost with its process."""
+"""Entries of a row in place of those of a stopwatch that was lost with its process."""
 
 
 def answer_of(look: Callable[[], T], limit_s: float | None) -> T | NoAnswer:
@@ -86,14 +86,14 @@ def answer_of(look: Callable[[], T], limit_s: float | None) -> T | NoAnswer:
 
 @dataclass(frozen=True)
 class Stopwatch:
-    """Processor seconds of this process and seconds by the clock, since it was made."""
+    """Processor seconds of this process and wall-clock seconds, since its creation."""
 
     processor_began: float = field(default_factory=time.process_time)
     clock_began: float = field(default_factory=time.perf_counter)
 
     @property
     def row(self) -> CaseRow:
-        """As the row of a case names them."""
+        """The seconds under their names in the row of a case."""
         return {
             "processor_s": time.process_time() - self.processor_began,
             "ours_s": time.perf_counter() - self.clock_began,

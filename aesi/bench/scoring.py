@@ -1,4 +1,4 @@
-"""How an answer is judged: strictly (the exact name, the name in a small group, no name too many) and leniently."""
+"""Scoring of an answer: strictly (the exact name, or the name in a small group, and no further name) and leniently."""
 
 from __future__ import annotations
 
@@ -9,28 +9,28 @@ from typing import Any
 import numpy as np
 
 LARGEST_GROUP = 3
-"""A group of look-alikes with more members than this names nothing."""
+"""A group of look-alikes with more members than this does not count as a name."""
 NOTHING = "reaction_nonuniformity"
-"""What the order reduction leaves out counts as nothing missing on a cell that is as declared."""
+"""Effect of the order reduction: on a cell that is as declared, naming it counts as naming nothing."""
 TWINS = frozenset({frozenset({"leakage_current", "current_sensor_offset"})})
-"""Effects that are one and the same in current and voltage: a current that passes the cell and not the sensor. Naming
-either with the other as its group is exact."""
+"""Effects that are identical in current and voltage: a current through the cell but not the sensor. Naming either, with
+the other in its group, is exact."""
 CERTAIN = 0.95
 """Confidence of every interval of a rate (Clopper and Pearson 1934, exact)."""
 TO_THE_NOISE = 1.1
-"""An error on unseen data of at most so many times the noise is the noise."""
+"""Multiple of the noise up to which an error on unseen data counts as noise."""
 TENTHS = 10
-"""Bins of confidence."""
+"""Number of bins of confidence."""
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """What an answer is worth against the label.
+    """The scores of an answer against the label.
 
-    exact : all effects by their names and nothing else; verdict `none` or `unknown` without a name where that is the
-    label.  grouped : the same, each one possibly as a member of the group of one that is named.
-    named : share of the label's effects that are named or in such a group.  false_names : names of nothing that is
-    there, whatever the verdict.  lenient : also one of the answers that are listed as right as well.
+    exact : all effects by their names and no others; verdict `none` or `unknown` without a name where that is the
+    label.  grouped : the same, where an effect may also be a member of the group of a named one.
+    named : share of the label's effects that are named or in such a group.  false_names : names of effects that are not
+    present, for any verdict.  lenient : as grouped, or one of the other answers listed as right.
     """
 
     exact: bool
@@ -78,10 +78,10 @@ def _twin(name: str, stands_for: Mapping[str, set[str]]) -> bool:
 
 
 def is_right(label: str, also: tuple[str, ...], content: Mapping[str, Any]) -> bool:
-    """Is this the answer of the label, or one of the others that are right as well?
+    """True where the answer matches the label, or one of the other answers listed as right.
 
-    Effects match where each one of the label is named or in the group of one that is, none is named beyond
-    them, and no group has more than three members.
+    Effects match where each effect of the label is named or in the group of a named one, no other is named, and no
+    group has more than three members.
     """
     return any(_matches(answer, content) for answer in (label, *also))
 

@@ -1,13 +1,13 @@
-"""How far are our model and an independent solver of the same cell apart? Measures the prior of the model error that a
-right hypothesis has.
+"""How much do our model and an independent solver of the same cell differ? Measures the prior of the model error under
+the right hypothesis.
 
-The label of each development case of `aesi bench blind` is fitted to what the laboratory made. What it says of unseen
-data at each size of the model error is a likelihood of that size, and the sizes of all cases have a log-normal prior
-whose median and deviation make what was found most likely.
+The label of each development case of `aesi bench blind` is fitted to the laboratory's records. The likelihood of unseen
+data at each size of the model error is a likelihood of that size. The sizes of all cases have a log-normal prior, whose
+median and deviation maximise the likelihood of all cases.
 
     python -m aesi.bench.solver_error --seed 0 --cases 40
 
-prints a line a case and a last one with that prior.
+prints one line per case and a last one with that prior.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import fitted_hypothesis
 
 SIZES_V = 1e-3 * np.geomspace(0.003125, 25.6, 14)
-"""Sizes that are tried, a factor of two apart: two beyond either end of what is found."""
+"""Tried sizes, V, a factor of two apart: two more than needed at both ends."""
 
 
 def said_by_size(case: BlindCase) -> Array | None:
-    """(n_sizes,) nats that the label says of unseen data at each size, less the most of them; None where it cannot be
-    simulated or is outside the catalogue."""
+    """(n_sizes,) log likelihood of unseen data, nats, under the label at each size, minus the largest; None where the
+    label cannot be simulated or is outside the catalogue."""
     if case.label == "unknown":
         return None
     problem = label_problem(case)
@@ -55,9 +55,9 @@ def said_by_size(case: BlindCase) -> Array | None:
 
 
 def most_likely_prior(said: Sequence[Array]) -> tuple[float, float, float]:
-    """Median, V, and deviation of the logarithm under which what was found is most likely, and its log likelihood.
+    """(median, V; standard deviation of the logarithm; log likelihood) of the prior with the largest likelihood.
 
-    said : a case, (n_sizes,) nats.
+    said : (n_sizes,) log likelihoods of each case, nats.
     """
     table, logs = np.array(said), np.log(SIZES_V)
 
@@ -70,16 +70,16 @@ def most_likely_prior(said: Sequence[Array]) -> tuple[float, float, float]:
 
 
 def log_likelihood(said: Array, median_v: float, sd: float) -> float:
-    """Of a prior over the sizes: what all cases say, averaged over it, nats.
+    """Log likelihood, nats, of a log-normal prior over the sizes: the sum over cases of the log of the mean likelihood.
 
-    said : (n_cases, n_sizes).
+    said : (n_cases, n_sizes) log likelihoods, nats.
     """
     prior = -0.5 * (np.log(SIZES_V / median_v) / sd) ** 2
     return float(np.sum(logsumexp(said + (prior - logsumexp(prior)), axis=1)))
 
 
 def row(case: BlindCase) -> dict[str, Any]:
-    """What is printed of one case."""
+    """The printed row of one case."""
     said = said_by_size(case)
     told: dict[str, Any] = {"case": case.spec.name, "cell": case.spec.cell, "label": case.label}
     if said is None:
@@ -91,7 +91,7 @@ def row(case: BlindCase) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Print a line a case and the prior."""
+    """Print one line per case and the prior."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--cases", type=int, default=40)

@@ -77,7 +77,8 @@ def scatter(cell: str, good: str, other: str, cells: str = "experiments/cells") 
 
 
 def ratio(one: Grown) -> tuple[str, float]:
-    """Of the amplitude of the effect that was grown which is furthest from zero; zero where all ended there."""
+    """(name, size over standard deviation) of the effect's amplitude that is furthest from zero; 0 where all ended
+    there."""
     effect = one.hypothesis[-1]
     sds = np.sqrt(np.diagonal(one.score.covariance))
     x = one.point.x + one.score.shift
