@@ -80,7 +80,7 @@ class Vehicle:
     def cell_current_a(self, schedule: Schedule, dt_s: float) -> Array:
         """(n,) A, discharge positive, every dt_s from the start of the schedule to its end, eq. (4).
 
-        The speed is linear between the rows of the schedule; its central differences, interpolated, are the acceleration.
+        The speed is linear between the rows of the schedule; the acceleration is that of its central differences.
         """
         count = round(schedule.duration_s / dt_s) + 1
         time = np.minimum(dt_s * np.arange(count), schedule.duration_s)

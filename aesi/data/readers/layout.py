@@ -221,7 +221,7 @@ def _as_wide_as_the_rows(header: tuple[str, ...], below: Sequence[str], separato
 
 
 def decimal_in(rows: Iterable[Sequence[str]], separator: str) -> str | None:
-    """The decimal sign: a comma where more cells have a comma than a point, else a point; None where no cell has either.
+    """The decimal sign: a comma where more cells have one than a point, else a point; None where no cell has either.
 
     With a comma as separator, such cells are quoted, and the comma may separate thousands: three digits follow it, and
     the number does not begin with 0. Where all cells are so, they are left to be refused.

@@ -43,8 +43,9 @@ TURN = 2.0 * np.pi
 
 
 def _of_the_test(columns: dict[str, AnyArray], notes: list[str]) -> dict[str, AnyArray]:
-    """The columns with the time of the test. batterydf 0.1.0 returns an `.ndax` with the time of the step as that of the
-    test, and with cycles converted to radians; both are corrected where found. Remove with a version without these."""
+    """The columns with the time of the test. batterydf 0.1.0 returns an `.ndax` with the time of the step as that of
+    the test, and with cycles converted to radians; both are corrected where found. Can go with a version that does
+    neither."""
     out = dict(columns)
     if TEST_TIME in columns and STEP in columns:
         time_s, step = (np.asarray(columns[name], dtype=float) for name in (TEST_TIME, STEP))

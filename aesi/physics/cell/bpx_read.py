@@ -1,4 +1,4 @@
-"""The fields of a BPX file to a cell."""
+"""Conversion of the fields of a BPX file to a cell."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from aesi.physics.cell.parts import (
 from aesi.physics.cell.relations import Constant, Relation, relation
 
 DEFAULT_TEMPERATURE_K = 298.15
-"""Where a file names no reference temperature."""
+"""Reference temperature of a file that states none."""
 
 Fields = Mapping[str, Any]
 
@@ -96,7 +96,7 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
         tested_on=_tested_on(user, where),
         fitted_at_k=_by_record(user, FITTED_AT, where),
         fitted_with=_fitted_with(user, where),
-        name=str(header.get("Title") or "cell").rstrip(". ") or "cell",  # it stands within sentences
+        name=str(header.get("Title") or "cell").rstrip(". ") or "cell",  # it is used within sentences
         description=str(header.get("Description") or ""),
         references=str(header.get("References") or ""),
         unread=unread(v1),
@@ -104,7 +104,8 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
 
 
 def _initial_soc(initial: Fields, where: str) -> float:
-    """A simulation is told its own start; what is no share is of another unit, and so may be what is beside it."""
+    """The initial state of charge. A simulation gets its own, but a value outside [0, 1] is in another unit, and then
+    other values of the section may be, too."""
     soc = _optional(initial, INITIAL_SOC)
     if soc is None:
         return 1.0
@@ -116,7 +117,7 @@ def _initial_soc(initial: Fields, where: str) -> float:
 
 
 def _kelvin(fields: Fields, name: str, without: float) -> float:
-    """A temperature, or another where the file names none; one of 0 is refused with all others that no cell has."""
+    """A temperature, K, or `without` where the file states none; 0 is refused with all others that no cell has."""
     value = _optional(fields, name)
     return without if value is None else value
 
@@ -127,7 +128,7 @@ def _optional(fields: Fields, name: str) -> float | None:
 
 
 def _own_number(user: Fields, name: str, where: str) -> float:
-    """A number of the section User-defined, which the schema leaves unchecked; 0 where it has none of that name."""
+    """A number of the section User-defined, which the schema does not check; 0 where the field is missing."""
     value = user.get(name)
     if value is None:
         return 0.0

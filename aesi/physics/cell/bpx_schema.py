@@ -1,8 +1,8 @@
-"""A BPX file as the mapping of BPX 1.x that it holds, checked against the schema before anything reads it.
+"""The content of a BPX file as a mapping of BPX 1.x, checked against the schema before it is used.
 
-The schema is checked by the `bpx` package. Its own check of the stoichiometry limits runs the text of the
-open-circuit potentials as Python code, so these are read by `aesi.physics.cell.expression` first and withheld
-from it.
+The schema is checked by the `bpx` package. Its own check of the stoichiometry limits executes the text of the
+open-circuit potentials as Python code, so these are read by `aesi.physics.cell.expression` first and not passed
+to it.
 """
 
 from __future__ import annotations
@@ -29,17 +29,16 @@ RELATIONS = {
     "Positive electrode": OF_ELECTRODES,
     "Electrolyte": ("Conductivity [S.m-1]", "Diffusivity [m2.s-1]"),
 }
-"""Section -> its fields that may be functions."""
+"""Section -> those of its fields that may be functions."""
 VERSIONS = r"[01]\.\d+(\.\d+)?"
 
 
 def load_bpx(
     source: str | PathLike[str] | Mapping[str, Any],
 ) -> tuple[dict[str, Any], str, tuple[str, ...]]:
-    """The content of a BPX file or mapping as BPX 1.x, what to call it in sentences, and the fields of its cell that
-    BPX 1.x has no place for.
+    """(content of a BPX file or mapping as BPX 1.x, its name for messages, fields of its cell that BPX 1.x lacks).
 
-    Raises CellError for what cannot be read, fails the schema, or describes a cell that is not modelled.
+    Raises CellError for content that cannot be read, fails the schema, or describes a cell that is not modelled.
     """
     raw, where = _load(source)
     v1 = _as_v1(raw, where)
@@ -49,7 +48,7 @@ def load_bpx(
 
 
 def _left_behind(raw: Mapping[str, Any], v1: Mapping[str, Any]) -> tuple[str, ...]:
-    """The fields of a cell in BPX 0.x that became none of BPX 1.x."""
+    """The fields of a cell in BPX 0.x that have no counterpart in BPX 1.x."""
     state = v1.get("State") or {}
     kept = {*v1["Parameterisation"]["Cell"], *(name for section in state.values() for name in section or {})}
     return tuple(name for name in raw["Parameterisation"]["Cell"] if name not in kept)
@@ -85,7 +84,7 @@ def _load(source: str | PathLike[str] | Mapping[str, Any]) -> tuple[dict[str, An
 
 
 def _of_text(text: str) -> str:
-    """What a file that is no JSON rather is, by how it begins; the end of a sentence."""
+    """End of a message on a file that is not JSON: its likely fault, from its beginning."""
     if not text.strip():
         return ": it is empty; copy or export it again."
     if text.lstrip().startswith(("{", "[")):
@@ -94,11 +93,11 @@ def _of_text(text: str) -> str:
 
 
 class _Twice(Exception):
-    """A name that an object of JSON has twice."""
+    """Raised for a name that occurs twice in a JSON object."""
 
 
 def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Of two values of one name `json` takes the last, and tells nobody."""
+    """The pairs as a dict.  Raises _Twice for a repeated name, of which `json` would silently take the last."""
     content: dict[str, Any] = {}
     for name, value in pairs:
         if name in content:
@@ -173,7 +172,7 @@ def _check_schema(v1: dict[str, Any], where: str) -> None:
 
 def _first_fault(error: Any) -> str:
     faults = error.errors()
-    # Where several forms of an electrode were tried, the faults of a missing field name the field itself.
+    # Where several forms of an electrode were tried, only the faults of a missing field name the field itself.
     first = min(faults, key=lambda fault: fault["type"] != "missing")
     known = _known_fields()
     place = _place(first, known)
@@ -201,7 +200,7 @@ def _first_fault(error: Any) -> str:
 
 
 def _place(fault: Mapping[str, Any], known: set[str]) -> str:
-    """The sections and the field; where a field may be of several types, pydantic has each of them below it."""
+    """Text with the sections and the field of a fault, without the types that pydantic lists below a field."""
     parts = [str(part) for part in fault["loc"]]
     while len(parts) > 1 and fault["type"] != "extra_forbidden" and parts[-1] not in known:
         parts.pop()

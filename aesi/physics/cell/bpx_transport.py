@@ -16,32 +16,34 @@ from aesi.numerics.typing import Array
 from aesi.physics.cell.parts import CellParameters, Electrode
 
 POINTS = 101
-"""Stoichiometries between empty and full at which relations are looked at."""
+"""Number of stoichiometries between empty and full at which relations are evaluated."""
 HALF_FULL = 0.5
-"""sqrt(x (1 - x)) where it is largest, at x = 1/2."""
+"""Largest value of sqrt(x (1 - x)), at x = 1/2."""
 SEPARATOR_M = (1e-6, 1e-3)
-"""Thickness: 12 to 25 um in the shipped files and in twelve published sets (of PyBaMM), 0.7 mm at most in laboratory
-cells (glass fibre); 0.012 in mm, 12 in um."""
+"""Range of the separator's thickness: 12 to 25 um in the shipped files and in twelve published sets (of PyBaMM), 0.7 mm
+at most in laboratory cells (glass fibre). In another unit the number would be 0.012 (mm) or 12 (um)."""
 ELECTROLYTE_S_M = (0.05, 8.5)
-"""Conductivity: 0.88 to 2.05 S/m in the shipped files and the same sets, which is 0.009 to 0.02 S/cm and 9 to 20 mS/cm;
-a calibration may move it by a factor of four."""
+"""Range of the electrolyte's conductivity: 0.88 to 2.05 S/m in the shipped files and the same sets, which is 0.009 to
+0.02 S/cm and 9 to 20 mS/cm; a calibration may change it by a factor of four."""
 LARGEST_SALT_M2_S = 1e-8
-"""Diffusivity of the salt: 2.5e-11 to 7.5e-10 m2/s there, which is 2.5e-7 to 7.5e-6 cm2/s; half way on a logarithmic
-scale."""
+"""Largest diffusivity of the salt: it is 2.5e-11 to 7.5e-10 m2/s there, which is 2.5e-7 to 7.5e-6 cm2/s; the limit is
+halfway between on a logarithmic scale."""
 SHORTEST_DIFFUSION_S = 1.0
-"""Radius squared over the median diffusivity in an electrode's window: 2.9 s in one (0.5 um, Kim 2011) and 100 to
-25,000 s in the others of the shipped files and the same sets; with a diffusivity in cm2/s a ten-thousandth of it."""
+"""Least (radius squared over the median diffusivity in an electrode's window): 2.9 s in one (0.5 um, Kim 2011) and 100
+to 25,000 s in the others of the shipped files and the same sets; with a diffusivity in cm2/s, 1e-4 of that."""
 LARGEST_SOLID_DROP_V = 0.2
-"""Ohmic drop in an electrode's solid at the nominal capacity in an hour, I L / (3 A sigma): 0.7 uV to 7 mV in the
-shipped files and in twelve published sets (of PyBaMM), most in the 0.18 S/m of Chen et al., J. Electrochem. Soc. 167
-(2020) 080534, which is 0.0018 S/cm and makes 0.7 V."""
+"""Largest ohmic drop in an electrode's solid at 1C, I L / (3 A sigma): 0.7 uV to 7 mV in the shipped files and in
+twelve published sets (of PyBaMM). The largest is for the 0.18 S/m of Chen et al., J. Electrochem. Soc. 167 (2020)
+080534; its 0.0018 S/cm read as S/m would make 0.7 V."""
 LEAST_EXCHANGE_1_H = 2e-3
-"""Exchange current of a half-full electrode over nominal capacity: 0.05 to 470 1/h there, and 0.2 and more without the
-one of sodium; 0.0009 at most in the slower electrode with a rate constant in mol/(cm2 s), and less with one in m/s."""
+"""Least exchange current of a half-full electrode over nominal capacity: 0.05 to 470 1/h there, and 0.2 or more without
+the set of sodium. In the slower electrode it would be at most 0.0009 with a rate constant in mol/(cm2 s), and less with
+one in m/s."""
 
 
 def check_transport(cell: CellParameters, where: str) -> None:
-    """Lengths in m, diffusivities in m2/s, the electrolyte's conductivity in S/m: raises CellError, naming `where`."""
+    """Raises CellError, naming `where`, for values that cannot be lengths in m, diffusivities in m2/s, or an
+    electrolyte's conductivity in S/m."""
     least, most = SEPARATOR_M
     if not least <= cell.separator.thickness_m <= most:
         raise CellError(
@@ -76,7 +78,8 @@ def check_transport(cell: CellParameters, where: str) -> None:
 
 
 def _check_solid(cell: CellParameters, electrode: Electrode, what: str) -> None:
-    """A current that runs empty along the electrode's thickness meets a third of its solid's resistance."""
+    """Raises CellError for a drop above LARGEST_SOLID_DROP_V: a current that decreases linearly to zero across the
+    electrode has a drop of a third of the solid's resistance times the current."""
     current_a_m2 = cell.nominal_capacity_ah / (cell.electrode_area_m2 * cell.electrode_pairs)
     drop_v = current_a_m2 * electrode.thickness_m / (3.0 * electrode.conductivity_s_m)
     if drop_v > LARGEST_SOLID_DROP_V:
@@ -87,7 +90,7 @@ def _check_solid(cell: CellParameters, electrode: Electrode, what: str) -> None:
 
 
 def check_kinetics(cell: CellParameters, where: str) -> None:
-    """Rate constants in mol/(m2 s): raises CellError, naming `where`."""
+    """Raises CellError, naming `where`, for rate constants not in mol/(m2 s)."""
     area_m2 = cell.electrode_area_m2 * cell.electrode_pairs
     for side, electrode in (("Negative", cell.negative), ("Positive", cell.positive)):
         surface_m2 = electrode.area_per_volume_1_m * electrode.thickness_m * area_m2

@@ -1,4 +1,4 @@
-"""What a BPX file declares and no simulation here takes, in sentences for who gave the file."""
+"""Sentences for the user on fields of a BPX file that no simulation here uses."""
 
 from __future__ import annotations
 
@@ -36,19 +36,19 @@ OWN_FIELDS = {
         for field in fields.values()
     ),
 }
-"""Of the section `User-defined` that are read."""
+"""Fields of the section `User-defined` that are read."""
 POINTS = 401
-"""At which relations are looked at."""
+"""Number of points at which relations are evaluated."""
 OTHER_CAPACITY = 1.5
-"""Times, either way, that the declared capacity may be of what an electrode holds between its limits: 0.94 to 1.01 in
-the files of ten cells."""
+"""Largest factor, in both directions, between the declared capacity and that of an electrode between its limits: 0.94
+to 1.01 in the files of ten cells."""
 HYSTERESIS_STATE = "Initial hysteresis state"
-"""Begins the names of the two fields, one an electrode."""
+"""Beginning of the names of the two fields, one per electrode."""
 BRANCHES = ("OCP (lithiation) [V]", "OCP (delithiation) [V]")
 
 
 def unread(v1: Mapping[str, Any]) -> tuple[str, ...]:
-    """Sentences on the fields of a BPX 1.x mapping that are passed over and would change a simulation."""
+    """Sentences on the fields of a BPX 1.x mapping that are ignored but would change a simulation."""
     parts, said = v1["Parameterisation"], []
     branched = [
         side
@@ -86,7 +86,7 @@ def unread(v1: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def of_version_0(names: Sequence[str]) -> tuple[str, ...]:
-    """A sentence on fields of a cell in BPX 0.x that have no place in 1.x."""
+    """A sentence on fields of a cell in BPX 0.x that have no counterpart in 1.x."""
     if not names:
         return ()
     own = (
@@ -98,7 +98,7 @@ def of_version_0(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def other_capacity(cell: CellParameters) -> tuple[str, ...]:
-    """A sentence where the nominal capacity is far from what an electrode holds between its stoichiometry limits."""
+    """A sentence where the nominal capacity is far from that of an electrode between its stoichiometry limits."""
     for side, electrode in (("negative", cell.negative), ("positive", cell.positive)):
         held = (electrode.theta_max - electrode.theta_min) * cell.electrode_capacity_ah(electrode)
         ratio = cell.nominal_capacity_ah / held
@@ -112,7 +112,7 @@ def other_capacity(cell: CellParameters) -> tuple[str, ...]:
 
 
 def replaced_relations(cell: CellParameters) -> tuple[str, ...]:
-    """Sentences on relations that are not simulated as they are declared, where surfaces or the salt may come."""
+    """Sentences on relations that are not simulated as declared somewhere in the range of the surfaces or the salt."""
     said = []
     stoichiometry = np.linspace(0.0, 1.0, POINTS)
     for side, electrode in (("negative", cell.negative), ("positive", cell.positive)):

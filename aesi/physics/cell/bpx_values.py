@@ -1,6 +1,6 @@
 """Checks of the values in a cell's file; an error is one sentence on the first value that no cell has.
 
-The limits are wide: they tell a wrong unit or sign, not a poor parametrisation.
+The limits are wide: they detect a wrong unit or sign, not a poor parametrisation.
 """
 
 from __future__ import annotations
@@ -29,32 +29,35 @@ from aesi.physics.cell.parts import (
 from aesi.physics.cell.relations import Relation
 
 OTHER_UNIT = 10.0
-"""Nominal capacity over that of an electrode's window, or that of a record over the file's, and the other way round:
-units differ by thousands and per cent by a hundred, cells by less."""
+"""Largest ratio, in both directions, of the nominal capacity to that of an electrode's window, or of the capacity of a
+record to that of the file: units differ by thousands and per cent by a hundred, cells by less."""
 
 FARTHEST_V = 1.0
-"""Of the open-circuit voltage of a full cell from the upper cut-off: 0.01 to 0.05 V as looked at in the shipped files,
-0.18 V in LFP's, which falls steeply there; who cycles a part of the range cuts off some 0.6 V less. Swapped electrodes
-are 5.9 V off and more."""
+"""Largest distance of a full cell's open-circuit voltage from the upper cut-off: 0.01 to 0.05 V in the shipped files,
+0.18 V in LFP's, which is steep there; for cycling in a part of the range the cut-off is some 0.6 V lower. With swapped
+electrodes it is 5.9 V or more."""
 LEAST_ENERGY_J_MOL = 600.0
-"""Of an activation energy that is declared: 4 to 89 kJ/mol in the shipped files that are no fits and in twelve
-published sets (of PyBaMM), which without the kilo are 4 to 89; this is the middle of 89 and 4,000 on a logarithmic
-scale. A fit may end on any, down to none."""
+"""Least declared activation energy: 4 to 89 kJ/mol in the shipped files that are no fits and in twelve published sets
+(of PyBaMM). In kJ/mol the numbers would be 4 to 89; the limit is the middle of 89 and 4,000 on a logarithmic scale. A
+fit may end at any value down to 0."""
 KILO = 1000.0
 LARGEST_ENTROPIC_V_K = 0.01
-"""Within the window of an electrode 4e-5 to 6e-4 V/K in the shipped files and in four published sets (of PyBaMM) and
-0.0036 V/K in a fifth, whose formula rises at its end (Mohtat 2020); in mV/K the least of them is 0.04."""
+"""Largest entropic coefficient in the window of an electrode: 4e-5 to 6e-4 V/K in the shipped files and in four
+published sets (of PyBaMM), and 0.0036 V/K in a fifth, whose formula rises at its end (Mohtat 2020). In mV/K the
+smallest number would be 0.04."""
 HEAT_J_K_AH = (0.5, 1000.0)
-"""Heat capacity over nominal capacity: 9 to 52 J/(K Ah) in the shipped files, 7 to 27 by the layers of eight published
-sets (of PyBaMM), and a thousand times more or less where one of its factors is in another unit."""
+"""Range of heat capacity over nominal capacity: 9 to 52 J/(K Ah) in the shipped files, 7 to 27 by the layers of eight
+published sets (of PyBaMM), and a thousand times more or less where one of its factors is in another unit."""
 LEAST_LAYER_F_M2 = 1e-4
-"""Of a double layer that is declared: a layer of molecules has 0.05 to 0.5 F/m2, fits 1.6 to 31 in the shipped files,
-and 20 uF/cm2 as 2e-5 F/cm2 are below."""
+"""Least declared capacity of a double layer: a molecular layer has 0.05 to 0.5 F/m2, fits in the shipped files 1.6 to
+31; 20 uF/cm2 written as 2e-5 F/cm2 are below the limit."""
 CONDUCTS_W_M_K = (0.01, 100.0)
-"""Across a winding 0.15 to 0.2 W/(m K) as measured (Drake et al. 2014), 0.18 to 0.69 in the shipped files. Air that
-stands still has 0.026 and foils along themselves some 30; in W/(cm K) or mW/(m K) they are outside."""
+"""Range of the thermal conductivity across a winding: 0.15 to 0.2 W/(m K) as measured (Drake et al. 2014), 0.18 to 0.69
+in the shipped files. Still air has 0.026, foils along their plane some 30. In W/(cm K) or mW/(m K) values are outside.
+"""
 LEAST_CUT_OFF_V = 0.1
-"""Lower cut-offs are 1 V and more (LFP|LTO), which is 0.001 kV; 0.06 V is half way to the 0.004 kV of the highest."""
+"""Least lower cut-off: they are 1 V or more (LFP|LTO), which is 0.001 kV; 0.06 V is halfway between 1 and the 0.004 kV
+of the highest."""
 
 
 def check_values(cell: CellParameters, where: str) -> None:
@@ -105,9 +108,9 @@ def check_values(cell: CellParameters, where: str) -> None:
 
 
 def _check_own_fields(cell: CellParameters, what: str) -> None:
-    """Contacts, films, double layers and rate factors, and the capacities and days of records."""
-    # A cell whose contacts alone took it from one cut-off to the other at 1C would be of no use, whatever its size.
-    # Those of the shipped files take 0.001 to 0.02 of that window, and 1.5 to 20 times it where they are in milliohms.
+    """Check contacts, films, double layers and rate factors, and the capacities and days of records."""
+    # A cell whose contacts drop the whole voltage window at 1C would be useless at any size. Those of the shipped files
+    # drop 0.001 to 0.02 of the window; with milliohms read as ohms it would be 1.5 to 20 times the window.
     drop_v = cell.contact_resistance_ohm * cell.nominal_capacity_ah
     window_v = cell.upper_voltage_v - cell.lower_voltage_v
     if drop_v > window_v:
@@ -137,10 +140,10 @@ def _check_own_fields(cell: CellParameters, what: str) -> None:
 
 
 def _check_surface(cell: CellParameters, electrode: Electrode, side: str, window_v: float, what: str) -> None:
-    """Films and double layers by what they do on all of the reactive surface, as contacts: no film takes the cell from
-    one cut-off to the other at 1C, and no double layer holds as much charge as the cell over that voltage.
+    """Check films and double layers by their effect over the whole reactive surface, as contacts: no film drops the
+    whole voltage window at 1C, and no double layer stores as much charge as the cell over that window.
 
-    In the shipped files films take 0.0006 to 0.008 of that window, double layers hold 0.0004 to 0.009 of the charge.
+    In the shipped files films drop 0.0006 to 0.008 of the window, double layers store 0.0004 to 0.009 of the charge.
     """
     reactive_m2 = cell.total_area_m2 * electrode.thickness_m * electrode.area_per_volume_1_m
     film = float(np.median(electrode.film_ohm_m2(inside_window(electrode))))
@@ -160,7 +163,7 @@ def _check_surface(cell: CellParameters, electrode: Electrode, side: str, window
 
 
 def _check_capacity(cell: CellParameters, where: str) -> None:
-    """Each electrode holds about the nominal capacity."""
+    """Check that each electrode holds about the nominal capacity."""
     for label, electrode in (("negative", cell.negative), ("positive", cell.positive)):
         window = (electrode.theta_max - electrode.theta_min) * cell.electrode_capacity_ah(electrode)
         if not 1.0 / OTHER_UNIT <= cell.nominal_capacity_ah / window <= OTHER_UNIT:
@@ -172,7 +175,7 @@ def _check_capacity(cell: CellParameters, where: str) -> None:
 
 
 def _check_full(cell: CellParameters, where: str) -> None:
-    """The potentials of the full cell make about the upper cut-off."""
+    """Check that the open-circuit voltage of the full cell is about the upper cut-off."""
     full = 1.0 - 1.0 / POINTS  # potentials may be infinite at the very end
     positive, negative = cell.positive, cell.negative
     theta_p = positive.theta_max - full * (positive.theta_max - positive.theta_min)
@@ -186,7 +189,8 @@ def _check_full(cell: CellParameters, where: str) -> None:
 
 
 def _check_temperature_dependence(cell: CellParameters, where: str) -> None:
-    """Activation energies of J/mol and not less, entropic coefficients in V/K."""
+    """Check that activation energies are not negative and not a thousand times too large, and that entropic
+    coefficients are in V/K."""
     for name, value in _energies(cell).items():
         if not value >= 0.0:
             raise CellError(f"{where}: {name} = {value:g} has to be 0 or more: with warmth all of them rise.")
@@ -205,7 +209,7 @@ def _check_temperature_dependence(cell: CellParameters, where: str) -> None:
 
 
 def check_energies(cell: CellParameters, where: str) -> None:
-    """Activation energies that are declared are not in kJ/mol: raises CellError, naming `where` and the value."""
+    """Raises CellError, naming `where` and the value, for declared activation energies in kJ/mol."""
     for name, value in _energies(cell).items():
         if 0.0 < value < LEAST_ENERGY_J_MOL:
             raise CellError(
@@ -214,7 +218,7 @@ def check_energies(cell: CellParameters, where: str) -> None:
 
 
 def _energies(cell: CellParameters) -> dict[str, float]:
-    """Activation energies by section and field."""
+    """Section and field -> activation energy, J/mol."""
     out = {}
     for side, electrode in (("Negative", cell.negative), ("Positive", cell.positive)):
         section = f"{side} electrode"
@@ -228,8 +232,8 @@ def _energies(cell: CellParameters) -> dict[str, float]:
 
 
 def _check_thermal(cell: CellParameters, where: str) -> None:
-    """What is there of mass, heat capacity and surface is positive, and together that of a cell; nothing cools by less
-    than zero."""
+    """Check that the given ones of mass, heat capacity and surface are positive and together those of a cell, and that
+    the heat transfer is not negative."""
     declared = {
         "Density [kg.m-3]": cell.density_kg_m3,
         "Specific heat capacity [J.K-1.kg-1]": cell.specific_heat_j_kg_k,
@@ -293,7 +297,7 @@ def _check_share(what: str, name: str, value: float) -> None:
 
 
 def _check_positive(relation: Relation, x: Array, what: str, unit: str, *, none: bool = False) -> None:
-    """none : 0 is admissible, too."""
+    """Raises CellError for a relation that is not positive at x.  none : 0 is admissible, too."""
     values = relation(x)
     wrong = ~(values >= 0.0 if none else values > 0.0) | ~np.isfinite(values)
     if wrong.any():

@@ -1,4 +1,4 @@
-"""A cell to the content of a BPX file; what BPX has no field for goes where `bpx_read` looks for it."""
+"""Conversion of a cell to the content of a BPX file; values without a BPX field are written where `bpx_read` looks."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from aesi.physics.cell.relations import to_bpx
 
 BPX_VERSION = "1.1.0"
 ELECTROLYTE_TABLE_MOL_M3 = (1.0, 4000.0)
-"""Range of the table that a function becomes which BPX cannot write."""
+"""Range of the table that replaces a function which BPX cannot express."""
 
 
 def write_bpx(cell: CellParameters) -> dict[str, Any]:
@@ -83,7 +83,7 @@ def _write_electrolyte(electrolyte: Electrolyte) -> dict[str, Any]:
 
 
 def _own_fields(cell: CellParameters) -> dict[str, Any]:
-    """What BPX has no field for, as far as the cell has it."""
+    """The cell's values for which BPX has no field."""
     own: dict[str, Any] = {
         CONTACT_RESISTANCE: cell.contact_resistance_ohm,
         THERMAL_CONDUCTIVITY: cell.thermal_conductivity_w_m_k,

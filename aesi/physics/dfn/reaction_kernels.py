@@ -77,7 +77,7 @@ def sum_units(p, y, given):  # type: ignore[no-untyped-def]
 
 @compiled
 def evaluate_units(p, e, t, n, spread, thermal, rise, first, y, theta, psi, given, salt):  # type: ignore[no-untyped-def]
-    """Salt at the places; potential of every unit and its slopes in y and salt; their sums at each place."""
+    """Salt at the places; potential of every unit, its slopes in y and in the salt; their sums at each place."""
     places, half = psi.shape[0], psi.shape[0] // 2
     for r in range(places):
         n.slack[r], n.shift[r], n.conductance[r] = 0.0, 0.0, 0.0

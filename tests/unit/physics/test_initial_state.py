@@ -428,7 +428,8 @@ def test_a_rest_on_which_a_testers_zero_is_read_stays_that_rest():
     zero_current = record(time[rests], np.zeros(rests.sum()), after.voltage_v[rests])
     true, offset_a = float(after.series["soc"][-1]), 1e-3 * LG_M50.capacity_ah
     plain, off = (
-        initial_state(LG_M50, replace(zero_current, current_a=zero_current.current_a + a)) for a in (0, offset_a)
+        initial_state(LG_M50, replace(zero_current, current_a=zero_current.current_a + a))
+        for a in (0, offset_a)
     )
     assert plain.soc == pytest.approx(true, abs=2e-3)
     assert off.soc == pytest.approx(true, abs=2e-3)
