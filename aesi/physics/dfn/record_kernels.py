@@ -59,7 +59,6 @@ def run_porous(  # type: ignore[no-untyped-def]
             length = min(length, math.floor(reached + ROUND_OFF) + 1.0 - reached)
             dt = whole / parts * length
             share = (reached + length) / parts
-            i0 = t.total[0] * e.area
             i1 = current[k] if drive.backward else current[k - 1] + (current[k] - current[k - 1]) * share
             set_currents(t, i1, e.area)
             start_k, around_k = t_k, e.heat[2]
@@ -106,7 +105,7 @@ def run_porous(  # type: ignore[no-untyped-def]
                 if steps > 0 and fault_at < 0 and left_range(theta_n, theta_p, state.c, s.c0) == 0:
                     voltage = voltage_of(s, e, state, t, phi_n, phi_p, t.total[0])
                     power = heat_power(p, e, state, half, i1, voltage, t_k)
-                t_k = heated(start_k, mean_heat(watts, power, i0, i1), dt, e.heat, around_k)
+                t_k = heated(start_k, mean_heat(watts, power, t.before[0], t.total[0]), dt, e.heat, around_k)
                 watts = power
         voltage = voltage_of(s, e, state, t, phi_n, phi_p, t.total[0])
         if k == 0 and e.heat[0] > 0.0:
