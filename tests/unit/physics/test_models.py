@@ -108,6 +108,21 @@ def test_the_heat_of_a_held_current_hung_on_the_last_digit_of_it_over_the_area()
     np.testing.assert_allclose(scaled, kelvin, rtol=0, atol=1e-9)
 
 
+def test_a_double_layer_hung_on_the_rounding_of_rows_on_a_straight_line():
+    layers = CATALOGUE["double_layer"].activate(negative_f_m2=1.0, positive_f_m2=3.0)
+    time = np.arange(0.0, 40.0)
+    current = np.interp(time, [0.0, 8.0, 16.0, 24.0, 32.0, 39.0], [0.0, 45.0, -30.0, 60.0, -60.0, 10.0])
+    lags_s = 0.3 + 1e-4 * np.arange(6)
+    voltages = [
+        simulate(
+            CELL, time, current, 0.6, [layers, CATALOGUE["clock_skew"].activate(lag_s=lag)], 10.0, model="dfn"
+        )
+        for lag in lags_s.tolist()
+    ]
+    bends = np.diff([run.voltage_v for run in voltages], n=2, axis=0)
+    assert np.abs(bends).max() < 1e-4
+
+
 def test_a_saved_model_keeps_which_one_it_is(tmp_path):
     HybridModel(CELL, soc0=0.7, model="dfn").save(tmp_path / "model")
     current = tmp_path / "current.csv"
