@@ -32,7 +32,7 @@ class DataError(InputError):
 
 
 class DataAway(DataError):
-    """Data that are not on this machine cannot be fetched now: nothing is wrong with what was asked."""
+    """Data that are not on this machine cannot be fetched now. The request itself was right."""
 
     exit_code = 1
 
@@ -56,15 +56,15 @@ class SimulationError(AesiError, RuntimeError):
 
 
 class NoNumberError(SimulationError):
-    """A function of a user's own gives no number at these values of its parameters: a search passes them by."""
+    """A user's own function returns no finite number at these parameter values; a search skips them."""
 
     exit_code = 2
 
 
 class OwnEffectError(RuntimeError):
-    """A function of a user's own cannot be run, or gives what it may not.
+    """A user's own function fails, or returns something unusable.
 
-    No AesiError: a search passes those by, and this has to end it.
+    It is no AesiError, since a search would skip these; this error has to end the search.
     """
 
     exit_code = 2
@@ -75,7 +75,7 @@ class FitError(AesiError, RuntimeError):
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """How a sentence about an unknown name goes on: the known one that is spelt most like it, where there is one."""
+    """End of a sentence about an unknown name: the known name with the most similar spelling, or a full stop."""
     from difflib import get_close_matches
 
     near = get_close_matches(name, list(known), n=1)
@@ -83,13 +83,14 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 OF_A_LIST = ("list_type", "tuple_type", "sequence_str", "is_instance_of")
-"""Faults of a value that is no list; of Python's types fields of a schema take sequences alone."""
+"""Pydantic's error types for a value that is no list. Sequences are the only Python type that a schema's fields check
+for by "is_instance_of"."""
 
 
 def wanted(fault: Mapping[str, Any]) -> str:
-    """How a sentence about a value goes on that a schema refuses: "has to be less than 1".
+    """End of a sentence about a value that a schema refuses, such as "has to be less than 1".
 
-    fault : as pydantic's ValidationError.errors() has it.
+    fault : an item of pydantic's ValidationError.errors().
     """
     if fault["type"] in OF_A_LIST:
         return "has to be a list, in [ ]"

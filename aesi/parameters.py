@@ -14,12 +14,12 @@ from aesi.errors import ParameterError, did_you_mean
 
 @dataclass(frozen=True)
 class Spread:
-    """By how much a declared parameter is off in cell files: standard deviations, of the natural logarithm where the
-    parameter is logarithmic.
+    """Error of a declared parameter in cell files: standard deviations, of the natural logarithm where the parameter is
+    logarithmic.
 
-    tight : of a careful parametrisation of this very cell, None where it leaves nothing open.
-    loose : of one of a cell of the same make, or of one that was not checked, None where even that leaves nothing open.
-    source : where the two are from.
+    tight : in a careful parametrisation of this very cell; None where the parameter is fixed there.
+    loose : in a parametrisation of another cell of the same make, or an unchecked one; None where it is fixed even
+    there.  source : of the two values.
     """
 
     tight: float | None
@@ -31,23 +31,24 @@ class Spread:
 class Parameter:
     """One scalar parameter.
 
-    default : the value at which an effect is typically seen.
-    bounds : the least and the greatest value, in `unit`; source : where they are from.
-    log : a search goes on a logarithmic scale.
-    even : the voltage moves with its square, as with a standard deviation. A fit then moves the square: from nought it
-    could not move the parameter itself.
-    neutral : the value at which an effect vanishes, None where it has none.
-    expected : standard deviation of the distance from neutral (or from the default; of the logarithm where `log`)
-    where small ones are likelier than large ones, None where all within bounds are alike.
-    capacity_power : the power of the capacity that `expected` and `spread`, which are those of a cell of one
-    ampere-hour, go with: of a current 1, of a resistance -1.
-    linear : the voltage is all but linear in it, so that a fit need not take its slope anew at every step.
-    low_is_limit : the lower bound stands for nought, which a logarithmic scale does not reach. To end there is a value
-    like others, and nought itself may be given.
-    spread : by how much cell files are off in it, so that a hypothesis about something else may move it by that much.
-    counted : how a value stands to what the cell file declares of the same: by itself, `added` to it, or a `share` of
-    it.
-    shift_of : what it is a shift of, as a discovery writes that with its unit (`declared_degc`); empty where of none.
+    default : a typical value where the effect is present.
+    bounds : (smallest, largest) value, in `unit`.  source : of the bounds.
+    log : True for a logarithmic scale in fits and searches.
+    even : True where the voltage depends on its square (a standard deviation). A fit then moves the square, since the
+    slope over the parameter itself vanishes at zero.
+    neutral : value at which the effect vanishes; None where there is none.
+    expected : prior standard deviation of the distance from neutral (or from the default; of the logarithm where
+    `log`); None for a uniform prior within the bounds.
+    capacity_power : `expected` and `spread` hold for a cell of 1 Ah and scale with this power of the capacity: 1 for a
+    current, -1 for a resistance.
+    linear : True where the voltage is nearly linear in it, so that a fit need not update its slope at every step.
+    low_is_limit : True where the lower bound stands for zero, which a logarithmic scale does not reach. Zero may then
+    be given, and a fit that ends on this bound is an ordinary result.
+    spread : error of cell files in this parameter; hypotheses about other effects may move it within this spread.
+    counted : relation of a value to the one that the cell file declares: the value `itself`, `added` to it, or a
+    `share` of it.
+    shift_of : name of the declared quantity that it shifts, with its unit (`declared_degc`), as a discovery writes it;
+    empty where there is none.
     """
 
     default: float
@@ -89,9 +90,9 @@ class Parameter:
             self.check("neutral", self.neutral, own)
 
     def check(self, name: str, value: float, otherwise: str = "") -> float:
-        """Return `value` if it lies within the bounds, or is the nought that the lower one stands for.
+        """Return `value` if it lies within the bounds, or is zero where `low_is_limit`.
 
-        otherwise : what can be done where the value is meant.
+        otherwise : advice for a user who needs the value.
         Raises ParameterError naming the value, the range and its source.
         """
         low, high = self.bounds
@@ -106,7 +107,7 @@ class Parameter:
 def checked(
     parameters: Mapping[str, Parameter], values: Mapping[str, float], otherwise: str = ""
 ) -> dict[str, float]:
-    """Defaults overlaid with `values`, each within its bounds; otherwise : what can be done where one is not.
+    """Defaults updated with `values`, each within its bounds.  otherwise : advice for a value out of bounds.
 
     Raises ParameterError for an unknown name (with the nearest match), no number, or a value out of bounds.
     """

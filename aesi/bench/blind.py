@@ -17,10 +17,10 @@ import numpy as np
 
 from aesi.bench import some_chosen
 from aesi.bench.detectable import SEEN_NATS, seen_nats
-from aesi.bench.limit import NO_ANSWER, NoAnswer, Stopwatch, answer_of
+from aesi.bench.limit import LOST, NO_ANSWER, NO_TIME, NoAnswer, Stopwatch, answer_of
 from aesi.bench.scoring import TO_THE_NOISE, calibration, judge, rate
 from aesi.constants import MV_PER_V
-from aesi.data.blind import FULL, BlindCase, CaseSpec, cells_in, generate, plan, small_plan
+from aesi.data.blind import FULL, BlindCase, CaseSpec, cells_in, generate, label_of, plan, small_plan
 from aesi.errors import SimulationError
 from aesi.physics import Cell
 from aesi.pipeline.discovery.discover import discovery_content
@@ -62,6 +62,12 @@ def judged(spec: CaseSpec, cells: str, limit_s: float | None = LIMIT_S) -> dict[
     except SimulationError as error:
         return {**_planned(spec), "verdict": NOT_MADE, "error": str(error), **spent.row}
     return _judged(case, limit_s)
+
+
+def lost(spec: CaseSpec) -> dict[str, Any]:
+    """The row of a case whose process the system ended: a miss. What there was to be seen is not known."""
+    told = {"label": label_of(spec), "unexplained_mv": None, "seen_nats": None}
+    return _planned(spec) | told | LOST.row | MISSED | NO_TIME
 
 
 NOT_MADE = "not made"
@@ -224,7 +230,7 @@ def table(rows: Sequence[dict[str, Any]]) -> list[str]:
             row["model"],
             row["records"],
             row["label"].replace("+", ", "),
-            f"{row['unexplained_mv']:.1f}",
+            "" if row["unexplained_mv"] is None else f"{row['unexplained_mv']:.1f}",
             "" if nats is None else f"{nats:.1f}",
             row["verdict"] + (f": {', '.join(row['effects'])}" if row["effects"] else ""),
             "yes" if row["exact"] else "no",

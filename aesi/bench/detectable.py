@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from aesi.data.blind import BlindCase
+from aesi.errors import AesiError
 from aesi.physics import Cell
 from aesi.physics.simulation import ModelName
 from aesi.records import Measurement
@@ -29,10 +30,13 @@ surrogates."""
 
 def seen_nats(case: BlindCase) -> float | None:
     """Nats that the label says more of unseen data than the best hypothesis without one of its effects; None for a case
-    without effects, or one that the model cannot simulate."""
+    without effects, or one that the tracer refuses or the model cannot simulate."""
     if not case.effects:
         return None
-    return _said_more(label_problem(case), case.effects, Archive(None, ""))
+    try:
+        return _said_more(label_problem(case), case.effects, Archive(None, ""))
+    except AesiError:
+        return None
 
 
 def label_problem(case: BlindCase) -> InverseProblem:
@@ -52,14 +56,18 @@ def seen_on_measured(
     holdout: float = 0.3,
 ) -> float | None:
     """Nats that the best of several right answers says more of unseen data than the declared model, where a model of a
-    measured cell errs as such models do; None where there is no right name, or none of them can be simulated.
+    measured cell errs as such models do; None where there is no right name, where none of them can be simulated, or
+    where the tracer refuses the records.
 
     good : records of the cell that are known to be good.  holdout : last share of the data that is kept back.
     """
-    problem = inverse_problem(declared, [data], soc0, holdout, good=good)
-    problem = replace(problem, trust="beside" if good else "measured")
-    archive = Archive(None, "")  # of all answers: what they are held against is fitted once
-    said = [_said_more(problem, (name,), archive) for name in answers]
+    try:
+        problem = inverse_problem(declared, [data], soc0, holdout, good=good)
+        problem = replace(problem, trust="beside" if good else "measured")
+        archive = Archive(None, "")  # of all answers: what they are held against is fitted once
+        said = [_said_more(problem, (name,), archive) for name in answers]
+    except AesiError:
+        return None
     return max((nats for nats in said if nats is not None), default=None)
 
 

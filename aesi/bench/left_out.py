@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from aesi.bench import CaseRow, some_chosen
-from aesi.bench.limit import NoAnswer, Stopwatch, answer_of
+from aesi.bench.limit import LOST, NO_TIME, NOT_RUN, NoAnswer, Stopwatch, answer_of
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.data import read_measurement
 from aesi.data.catalogue import locate
@@ -84,13 +84,13 @@ def judged(case: LeftOutCase, cells: str, limit_s: float | None = LIMIT_S) -> Ca
     cells : folder of the cell files.  limit_s : processor seconds; a case that takes longer has failed.
     """
     spent = Stopwatch()
-    row: CaseRow = {"case": case.name, "cell": case.set.data, "record": case.test}
+    row = _asked(case)
     try:
         records = dict(_records(case.set))
         path = Path(cells) / case.set.cell if case.set.cell else locate(case.set.data, "cell.bpx.json")
         cell = Cell.from_bpx(path)
     except DataError as error:
-        return row | {"verdict": "not run", "error": str(error), **spent.row}
+        return row | {"verdict": NOT_RUN, "error": str(error), **spent.row}
     test = records.pop(case.test)
     content = answer_of(lambda: discovery_content(discover(cell, list(records.values()), [test])), limit_s)
     if isinstance(content, NoAnswer):
@@ -99,6 +99,15 @@ def judged(case: LeftOutCase, cells: str, limit_s: float | None = LIMIT_S) -> Ca
     better = min(left["before_mv"], left["recalibrated_mv"])
     told = {"verdict": content["verdict"], "effects": content["effects"]}
     return row | told | left | {"times_better": left["after_mv"] / better, **spent.row}
+
+
+def lost(case: LeftOutCase) -> CaseRow:
+    """The row of a case whose process the system ended: it has failed."""
+    return _asked(case) | LOST.row | NO_TIME
+
+
+def _asked(case: LeftOutCase) -> CaseRow:
+    return {"case": case.name, "cell": case.set.data, "record": case.test}
 
 
 def _records(one: MeasuredSet) -> Iterator[tuple[str, Measurement]]:
@@ -110,7 +119,7 @@ def _records(one: MeasuredSet) -> Iterator[tuple[str, Measurement]]:
 
 def summary(rows: Sequence[CaseRow]) -> dict[str, Any]:
     """How often the written model is no worse than leaving the cell alone, the worst case, and what was named."""
-    ran = [row for row in rows if row["verdict"] != "not run"]
+    ran = [row for row in rows if row["verdict"] != NOT_RUN]
     judged_rows = [row for row in ran if "times_better" in row]
     worst = max(judged_rows, key=lambda row: float(row["times_better"]), default=None)
     return {

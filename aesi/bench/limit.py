@@ -19,6 +19,8 @@ T = TypeVar("T")
 ERROR, OUT_OF_TIME = "error", "out of time"
 NO_ANSWER = (ERROR, OUT_OF_TIME)
 """Verdicts of cases that gave no answer."""
+NOT_RUN = "not run"
+"""Verdict of a case whose data cannot be had: it is counted, and in no figure."""
 
 
 class OutOfTime(BaseException):
@@ -60,6 +62,15 @@ class NoAnswer:
     def row(self) -> CaseRow:
         """What the row of the case says of it."""
         return {"verdict": self.verdict, "error": self.error}
+
+
+LOST = NoAnswer(
+    ERROR,
+    "the system ended the process that worked on it, perhaps for want of memory; fewer workers have more each.",
+)
+"""Of a case whose process was ended from outside."""
+NO_TIME: CaseRow = {"processor_s": 0.0, "ours_s": 0.0}
+"""What a row has in the place of a stopwatch's that was lost with its process."""
 
 
 def answer_of(look: Callable[[], T], limit_s: float | None) -> T | NoAnswer:

@@ -1,7 +1,7 @@
-"""Calibrate: fit the parameters of a cell's file to records, and say what these determine and what they leave open.
+"""`calibrate`: fit the parameters of a cell's file to records, with intervals and the combinations left undetermined.
 
-A first descent starts from the file as it is. What it finds tells how much heat the cell makes; a second descent goes
-on from there with that heat.
+A first descent starts from the file as it is. From its result the heat of the cell is computed; a second descent
+continues from there with this heat.
 """
 
 from __future__ import annotations
@@ -56,22 +56,22 @@ from aesi.physics.depletion import ran_out
 from aesi.records import Measurement, Spectrum, measured_on_case
 
 EVALUATIONS = 100
-"""Most evaluations of a descent: those to the shipped files of the Panasonic NCR18650PF and of the LG 18650HG2 end
-before."""
+"""Most evaluations of one descent. The fits behind the shipped files of the Panasonic NCR18650PF and the LG 18650HG2
+need fewer."""
 GAIN = 1e-5
-"""Least gain of a step, as a share of the cost, before a descent ends. With ten times as much the first descent to
-an LG 18650HG2 ends a deviation of the priors away, at a cost of 344.7 instead of 340.1."""
+"""Relative reduction of the cost below which a descent ends. With ten times as much the first descent for an LG
+18650HG2 ends a prior standard deviation away, at a cost of 344.7 instead of 340.1."""
 NOTED_ZERO = 0.02
-"""Share of a record's typical current above which a cycler's zero is noted."""
+"""Share of a record's typical current above which a note reports the offset of its cycler's current."""
 NOTED_AGE = 0.01
-"""Share of its active material by which a record's cell has to differ from the file's to be noted."""
+"""Relative difference of a record's active material from the file's above which a note reports it."""
 NOTED_SILICON = 0.05
-"""The same for the silicon, which gives a sixth of such a cell's charge."""
+"""The same for the silicon, which holds a sixth of such a cell's charge."""
 NOTED_DEVIATIONS = 2.0
 """A fit that ends more than this many standard deviations from a prior that the user gave contradicts it. A
 convention."""
 OnStep = Callable[[int, float], None]
-"""Told at each step of a fit: their number so far, and the share of the misfit of the start that is left."""
+"""Called at each step of a fit with the number of steps so far, and the present misfit over that of the start."""
 OF_ROWS_LEFT_OUT = (
     "the state of charge that was given is that of its first row, which is not fitted; it starts where its "
     "voltage says."
@@ -87,13 +87,15 @@ def calibrate(
     on_step: OnStep | None = None,
 ) -> Calibration:
     """Fit the parameters of a cell's file to records by maximum a posteriori: capacities, stoichiometry windows,
-    potentials, diffusion, kinetics, electrolyte and contacts, with temperature. Gives the new cell, values with 95 %
-    intervals (Laplace's approximation), what stays undetermined, and the errors of each record before and after.
+    potentials, diffusion, kinetics, electrolyte and contacts, with their temperature dependence. Returns the new cell,
+    values with 95 % intervals (Laplace's approximation), undetermined combinations, and each record's errors before and
+    after.
 
-    records : at least one, current_a in A, positive on discharge, and of any temperatures: their column, or by
-    `conditions`, or the cell file's (degC); those that share a name are numbered in what comes back.
-    evaluations : of each descent, at most.
-    Raises DataError for records that do not fit a cell; FitError where the start cannot be simulated.
+    records : at least one, current_a in A, positive on discharge. A record's temperature (degC) is its column, else
+    that of `conditions`, else the cell file's. Records of the same name are numbered in the result.
+    conditions : what is known of records and cell beyond the data; None for nothing.
+    evaluations : most of each descent.  on_step : called at each step of a descent.
+    Raises DataError for records that do not belong to the cell; FitError where the start cannot be simulated.
     """
     began = time.perf_counter()
     conditions = conditions or Conditions()
@@ -124,20 +126,20 @@ def calibrate(
 
 
 class _Told:
-    """A model whose descents pass on where they stand.  on_step : or nobody is told."""
+    """A model that reports the progress of its descents.  on_step : callback, or None."""
 
     def __init__(self, model: Model, on_step: OnStep | None) -> None:
         self.model, self._on_step = model, on_step
         self._steps, self._first, self._last = 0, 0.0, 0.0
 
     def residual(self, x: Array) -> Array:
-        """The model's, remembered by its size."""
+        """The model's residual; its size is kept for the report."""
         residual = self.model.residual(x)
         self._last = float(residual @ residual)
         return residual
 
     def jacobian(self, x: Array) -> Array:
-        """The model's, which a descent asks for once a step, where it has taken it."""
+        """The model's jacobian. A descent evaluates it once per accepted step, so that progress is reported here."""
         self._first = self._first or self._last
         if self._on_step is not None:
             self._on_step(self._steps, self._last / self._first if self._first else 1.0)
@@ -146,16 +148,17 @@ class _Told:
 
 
 def _fitted_twice(told: _Told, evaluations: int) -> tuple[Array, Cell, tuple[str, ...]]:
-    """Where the descents end, the cell there with what its temperatures tell of heat, and a sentence on that.
+    """(working vector at the end of the descents, cell there with the heat fitted to its temperatures, sentences on
+    that).
 
-    Where no record tells of heat, a second descent would begin with what the first one had, and there is none.
+    The second descent is skipped where no record determines the heat, since nothing would change.
     """
     model = told.model
     x = _descended(told, evaluations, np.zeros(model.layout.size))
     plain = rewound(model, x)
     found, of_heat = with_heat(plain, model.records)
     if found is not plain:
-        # How fast a winding follows its case is of the file, which is fitted as it is simulated.
+        # The thermal lag of the winding behind its case is part of the file, so that the fit has to include it.
         model.take_heat_of(found)
         x = _descended(told, evaluations, x)
         found = rewound(model, x)
@@ -165,11 +168,10 @@ def _fitted_twice(told: _Told, evaluations: int) -> tuple[Array, Cell, tuple[str
 def _with_what_it_is_of(
     found: Cell, declared: Cell, model: Model, shares: Mapping[str, float], days: Mapping[str, date]
 ) -> Cell:
-    """The fitted cell as it is written, with the model and the records that it was fitted with.
+    """The fitted cell as it is written, with the name of the model and the records of the fit.
 
-    declared : at whose temperature records without one were taken.  shares : record -> share of the capacity that is
-    written.
-    days : by record name, of those that have one.
+    declared : start cell; records without a temperature have its initial one.  shares : record -> its capacity over the
+    written one.  days : record -> day of its test, where known.
     """
     return replace(
         found,
@@ -263,9 +265,9 @@ def _checked_records(
 
 
 def _sized(cell: Cell, records: Sequence[Measurement], same_cell: bool) -> tuple[Cell, Zero, tuple[str, ...]]:
-    """The cell of the size that the records tell, the zero of their cycler, and sentences on the size.
+    """(cell of the size that the records indicate, zero offset of their cycler's current, sentences on the size).
 
-    Each needs the other: a first size gives the zero, and currents without that the size that is taken.
+    Each needs the other: a first size gives the offset, and currents without the offset give the final size.
     """
     if same_cell:
         return cell, zero_of(cell, records), ()
@@ -276,15 +278,15 @@ def _sized(cell: Cell, records: Sequence[Measurement], same_cell: bool) -> tuple
 
 
 def _of_size(cell: Cell, sized_cell: Cell) -> Cell:
-    """The start file at the size that the records tell, without the typical values that a fit fills in: the limits
-    beyond which a record contradicts its temperature were set with files as they are."""
+    """The start file at the size that the records indicate, without the typical values that a fit fills in. The limits
+    beyond which a record contradicts its temperature were set with such files."""
     return of_area(
         cell, sized_cell.electrode_area_m2 / cell.electrode_area_m2, sized_cell.nominal_capacity_ah
     )
 
 
 def _of_small_span(span_k: float, n_records: int) -> tuple[str, ...]:
-    """A sentence where the records lie too close together in temperature (K) to tell how the cell answers to it."""
+    """A sentence where the records span too few kelvin to determine the temperature dependence; else empty."""
     if span_k > SPAN_K:
         return ()
     apart = (
@@ -319,7 +321,7 @@ STATE_WORDS: dict[FitState, str] = {
 
 
 def _ran_out(model: Model, states: Mapping[FitState, tuple[Cell, Array]]) -> tuple[str, ...]:
-    """A sentence for each record that a state of the cell runs out on."""
+    """A sentence for each record on which the cell runs out of lithium or salt in one of the states."""
     out = []
     for i, record in enumerate(model.records):
         found = {words: model.ran_out_s(i, *states[name]) for name, words in STATE_WORDS.items()}
@@ -341,7 +343,7 @@ def _of_priors(model: Model, x: Array) -> tuple[str, ...]:
 
 
 def _of_own(model: Model, x: Array) -> tuple[str, ...]:
-    """Sentences on what a record has of its own: its cycler's zero, its active material and its silicon."""
+    """Sentences on the parameters of single records: offset of the current, active material and silicon."""
     out = []
     zero_a = model.zero.at(float(x[model.layout.zero]))
     for i, record in enumerate(model.records):

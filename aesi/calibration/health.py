@@ -44,22 +44,12 @@ def health_of(cell: Cell) -> Health:
     negative, positive = (cell.electrode_capacity_ah(e) for e in (cell.negative, cell.positive))
     theta_n, theta_p = cell.stoichiometries(1.0)
     return Health(
-        resistance_mohm=MILLI * (cell.contact_resistance_ohm + _films_ohm(cell)),
+        resistance_mohm=MILLI * cell.contacts_and_films_ohm,
         inventory_ah=negative * theta_n + positive * theta_p,
         negative_ah=negative,
         positive_ah=positive,
         capacity_ah=cell.capacity_ah,
     )
-
-
-def _films_ohm(cell: Cell) -> float:
-    """Resistance of both electrodes' films over the whole cell, ohm, half charged and at the reference temperature."""
-    half = cell.stoichiometries(0.5)
-    ohm = 0.0
-    for electrode, theta in zip((cell.negative, cell.positive), half, strict=True):
-        surface_m2 = electrode.area_per_volume_1_m * electrode.thickness_m * cell.total_area_m2
-        ohm += float(electrode.film_ohm_m2(np.array([theta]))[0]) / surface_m2
-    return ohm
 
 
 def health_intervals(found: Calibration) -> Mapping[str, tuple[float, float]]:

@@ -1,4 +1,4 @@
-"""What a calibration gives back, and what its records determine: intervals, combinations that stay open, bounds."""
+"""The result of a calibration: intervals, undetermined combinations of parameters, parameters on bounds, errors."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
 NINETY_FIVE = 1.96
-"""Standard deviations either side of a 95 % interval."""
+"""Half width of a 95 % interval, in standard deviations."""
 ROUND_OFF = 1e-9
-"""Share of a parameter's interval: a value nearer to nought is nought. A convention."""
+"""Share of a parameter's interval: a value closer to zero is set to zero. A convention."""
 BOUND_SHARE = 0.02
 """A parameter closer to a bound than this share of its range is reported to have ended there."""
 NOTABLY = 1.05
-"""Times the start file's error from which on a file errs by more. A fit to a record of the start file itself, with 1 mV
-of noise, ends at 1.02 times: it begins with films and double layers, and the priors hold it there."""
+"""Ratio of a file's error to the start file's above which it counts as larger. A fit to a record of the start file
+itself, with 1 mV of noise, ends at 1.02: it begins with films and double layers, and the priors hold it there."""
 FAR_SD = 3.0
-"""Deviations of a prior from the literature, beyond which no cell is expected: that a fit ends there says something of
-the model. A convention. The double layers of the calibrated files of the repository ended within 2.9; discharges of an
-LFP cell at three rates drive its negative one 3.5 from the prior."""
+"""Distance from a prior of the literature, in standard deviations, beyond which no cell is expected: a fit that ends
+there indicates a fault of the model. A convention. The double layers of the calibrated files of the repository ended
+within 2.9; discharges of an LFP cell at three rates drive its negative one 3.5 from the prior."""
 
 
 @dataclass(frozen=True)
 class Interval:
-    """A parameter with its 95 % interval, its unit and where its prior is from."""
+    """A parameter with its 95 % interval, its unit and the source of its prior."""
 
     value: float
     low: float
@@ -49,8 +49,8 @@ class Interval:
 class RecordError:
     """RMSE of one record's rows, V.
 
-    before_v : by the start file.  after_v : by the fit, with what the record has of its own.  simulated_v : without
-    that, as the written file is simulated on the currents as measured.
+    before_v : with the start file.  after_v : with the fit, including the record's own parameters.  simulated_v : with
+    the written file, without these parameters, on the currents as measured.
     """
 
     name: str
@@ -64,8 +64,8 @@ class RecordError:
 class Open:
     """A combination of parameters that the data do not determine.
 
-    weights : of the parameters in it, in deviations of their priors.  narrowed : what the data leave of the prior's
-    deviation along it (1: nothing was learnt).
+    weights : (parameter, weight) in units of prior standard deviations.  narrowed : posterior over prior standard
+    deviation along it, 0 to 1 (1: the data determine nothing).
     """
 
     weights: tuple[tuple[str, float], ...]
@@ -80,13 +80,13 @@ class Open:
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """A calibrated cell, and how sure it is.
+    """A calibrated cell, with its uncertainty.
 
-    parameters : name -> value with its interval.  undetermined : combinations that the data leave open.
-    at_bounds : parameters that ended on a bound.  errors : of each record.  capacities : share of the cell's capacity
-    that each record's has.  size_assumed : that no record told the size of the cell, as a sentence, or ''.
-    x, covariance : working vector and its covariance, for the posterior.
-    against_temperature : a sentence on each record whose voltage contradicts the temperature that it was fitted at.
+    cell : calibrated.  declared : start.  parameters : name -> value with its interval.  undetermined : combinations
+    that the data do not determine.  at_bounds : names of parameters that ended on a bound.  errors : of each record.
+    capacities : record -> its capacity over that of the cell.  size_assumed : a sentence where no record determined the
+    size of the cell, else ''.  x, covariance : working vector and its covariance, for the posterior.
+    against_temperature : a sentence for each record whose voltage contradicts the temperature that it was fitted at.
     """
 
     cell: Cell
@@ -106,9 +106,9 @@ class Calibration:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Reasons why the cell may have been bent to what is not its own, a sentence each: a temperature or a given
-        state of charge that the voltage contradicts; records on which the fit, or the file that is written, errs by
-        more than the start file, which is rare with one cell; and parameters that stand in for what the model lacks."""
+        """Reasons why the fitted parameters may be wrong, a sentence each: a temperature or a given state of charge
+        that the voltage contradicts; records on which the fit, or the written file, errs more than the start file,
+        which is rare with records of one cell; and parameters that stand in for something that the model lacks."""
         against = (r.start for r in self.model.records if r.start.against_voltage)
         return (
             *self.against_temperature,
@@ -141,7 +141,7 @@ class Calibration:
         return f"Calibration(cell {self.cell.name!r}, {errors})"
 
     def to_frame(self) -> pd.DataFrame:
-        """The parameters with their 95 % intervals, units and where their priors are from."""
+        """The parameters with their 95 % intervals, units and the sources of their priors."""
         import pandas as pd
 
         rows = {name: asdict(interval) for name, interval in self.parameters.items()}
@@ -161,7 +161,7 @@ class Calibration:
 
 
 def _stand_ins(model: Model, x: Array) -> tuple[str, ...]:
-    """A sentence on the parameters that ended further from their priors than a cell's are, if there are any."""
+    """A sentence on the parameters that ended more than `FAR_SD` from their priors, if there are any."""
     far = [
         f"{free.name} = {free.value(float(z)):.3g} {free.unit} ({abs(z):.1f} standard deviations "
         f"{'above' if z > 0.0 else 'below'} {free.start:.3g})"
@@ -178,14 +178,14 @@ def _stand_ins(model: Model, x: Array) -> tuple[str, ...]:
 
 
 def information_weights(model: Model, x: Array) -> Array:
-    """(rows + 2 frequencies + n,) factors on `Model.residual`, at most 1, that make it count as much as it says of its
-    own.
+    """(rows + 2 frequencies + n,) factors on `Model.residual`, at most 1, that give it the weight of its independent
+    samples.
 
-    What is left of a record after the fit repeats itself: n rows of first autocorrelation rho are as many as
-    n (1 - rho)/(1 + rho). A record says no more than it counted for in the fit, however little is left of it: the
-    priors pulled the parameters against that weight, and intervals of a larger one lie about a point that is not
-    theirs. Of twelve drives of virtual cells with 1 mV of noise, which the fit counts 15 times less than that, 95 %
-    intervals of the whole weight left out the true diffusivity of the electrolyte eight times, those of the fit's none.
+    The residual of a record after the fit is autocorrelated: n rows of first autocorrelation rho have the information
+    of n (1 - rho)/(1 + rho) independent ones. A record never gets more weight than in the fit, however small its
+    residual: the priors pulled the parameters against that weight, and intervals from a larger one lie about another
+    optimum. Of twelve drives of virtual cells with 1 mV of noise, which the fit counts 15 times less than that, 95 %
+    intervals of the full weight missed the true diffusivity of the electrolyte eight times, those of the fit's none.
     """
     out = []
     for record, error, weight in zip(model.records, model.errors(x), model.weights, strict=True):
@@ -213,10 +213,10 @@ def intervals(model: Model, x: Array, covariance: Array) -> dict[str, Interval]:
 
 
 def undetermined(model: Model, jacobian: Array) -> tuple[Open, ...]:
-    """Combinations of global parameters along which the records say less than the priors.
+    """Combinations of global parameters about which the records have less information than the priors.
 
-    Eigenvectors of the information of the records on the global parameters, with all others marginalised, in units of
-    the priors: an eigenvalue below one is less than the prior's own.
+    They are eigenvectors of the records' information matrix for the global parameters, with all others marginalised, in
+    units of the priors. An eigenvalue below one is less than the information of the prior.
     """
     n = len(model.free)
     information = jacobian.T @ jacobian
@@ -229,14 +229,16 @@ def undetermined(model: Model, jacobian: Array) -> tuple[Open, ...]:
             break
         vector = vector * np.sign(vector[np.argmax(np.abs(vector))])
         order = np.argsort(-np.abs(vector))
-        heavy = [j for j in order if abs(vector[j]) > 0.3] or [order[0]]  # of many, none need stand out
+        heavy = [j for j in order if abs(vector[j]) > 0.3] or [
+            order[0]
+        ]  # with many parameters all may be small
         weights = tuple((model.free[j].name, float(vector[j])) for j in heavy)
         out.append(Open(weights, float(1.0 / np.sqrt(1.0 + max(value, 0.0)))))
     return tuple(out)
 
 
 def at_bounds(model: Model, x: Array) -> tuple[str, ...]:
-    """Names of the parameters that ended on a bound of their range; nought is where a resistance may end."""
+    """Names of the parameters that ended on a bound of their range; a resistance of zero does not count."""
     width = BOUND_SHARE * (model.high - model.low)
     return tuple(
         f.name

@@ -1,4 +1,4 @@
-"""A file on disk becomes a Measurement, or one sentence that says why not."""
+"""Read a file into a Measurement; a refusal is one sentence that gives the reason."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from aesi.data.channels.checks import Columns, Context, check_alive, check_finite, check_ranges, check_time
 from aesi.data.channels.columns import QUANTITIES, REQUIRED, Mapped
-from aesi.data.channels.gaps import without_gaps
+from aesi.data.channels.gaps import untold_charge, without_gaps
 from aesi.data.channels.glitches import glitch_doubts, glitches
 from aesi.data.channels.implausible import check_scale, check_sign, check_signed
 from aesi.data.channels.load_columns import keep_rows, load_columns
@@ -49,20 +49,21 @@ def read_measurement(
 ) -> Measurement:
     """Read one continuous test: CSV (also gzip), Excel, Parquet, BDF, or a cycler's export or own file.
 
-    columns : quantity -> the file's name for it, for those not named time_s, current_a, voltage_v,
-        temperature_degc (optional), as in BDF or as in a known cycler's export; None leaves the temperature out,
-        and a number states it, in every row, in degC or as `units` says.
-    sign : which direction of the file's current is positive; None: as the known export has it, else discharge.
-        BDF's is charge positive.
-    max_rows : more rows than this are decimated (interval averages); None keeps all.
+    columns : quantity (time_s, current_a, voltage_v, temperature_degc) -> name of the file's column, for columns that
+        are named neither so nor as in BDF or a known cycler's export. The temperature is optional: None leaves it out,
+        and a number sets it in every row, in degC or in the unit of `units`.
+    sign : direction in which the file's current is positive; None takes that of the known export, else discharge.
+        In BDF it is charge.
+    max_rows : most rows; more are decimated (interval averages). None keeps all.
     units : quantity -> unit of the file's column, where it is not SI: {"current_a": "mA", "time_s": "h:m:s"}.
-    state : the column that says which way a current without a sign flows.
-    cycle, step : keep the rows of this number (or "from:to").  start_s, stop_s : keep rows between these times.
-    duplicates : which row of several with one stamp to keep; None refuses, but keeps the first in known exports.
+    state : name of the column with the direction of a current that has no sign.
+    cycle, step : keep the rows with this number (or "from:to").  start_s, stop_s : keep rows between these times, s.
+    duplicates : which of several rows with the same time to keep; None refuses them, but keeps the first in known
+        exports.
 
-    Returns a Measurement with discharge-positive current; its `notes` say all that was mapped, converted, dropped
-    or averaged. Raises DataError, one sentence with file, column and first row, for anything else; InputError for what
-    is no file.
+    Returns a Measurement with discharge-positive current; its `notes` list all that was mapped, converted, dropped
+    or averaged. Raises DataError, one sentence with file, column and first row, where the content cannot be used;
+    InputError where `path` is no file.
     """
     if not isinstance(path, str | PathLike):
         raise InputError(
@@ -87,7 +88,7 @@ def read_measurement(
 def read(
     path: str | Path, reading: Reading, max_rows: int | None = MAX_ROWS, name: str | None = None
 ) -> Measurement:
-    """`read_measurement` with all that is said of the file in one object."""
+    """`read_measurement` with all options in one object."""
     table = open_table(path, [given for given in reading.columns.values() if given])
     return measurement_in(table, reading, max_rows, name)
 
@@ -144,6 +145,7 @@ def _examine(
     data, context = without_gaps(data, context, notes)
     check_alive(data, context)
     notes.extend(time_doubts(data))
+    notes.extend(untold_charge(data))
     notes.extend(temperature_doubts(data, context))
     found = glitches(data)
     notes.extend(glitch_doubts(found, data, context))
@@ -156,7 +158,7 @@ def _examine(
 
 
 def _examine_course(data: Columns, context: Context, header: Sequence[str], sign_advice: str) -> None:
-    """What current, voltage and time tell together, of the rows that are the cell's."""
+    """Check current, voltage and time against each other."""
     check_dead(data, context)
     check_scale(data, context)
     check_signed(data, context, header)

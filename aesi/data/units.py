@@ -37,24 +37,28 @@ DATE = "date"
 SPELLINGS = {
     "time_s": {
         "s": ("s", "sec", "secs", "second", "seconds"),
-        "ms": ("ms", "msec", "milliseconds"),
-        "us": ("us", "µs", "μs"),
+        "ms": ("ms", "msec", "millisecond", "milliseconds"),
+        "us": ("us", "µs", "μs", "microsecond", "microseconds"),
         "min": ("min", "mins", "minute", "minutes"),
         "h": ("h", "hr", "hrs", "hour", "hours"),
         "d": ("d", "day", "days"),
         CLOCK: ("h:m:s", "h:min:s", "h:min:s.ms", "hh:mm:ss", "hh:mm:ss.ms", "hh:mm:ss.fff"),
     },
     "current_a": {
-        "A": ("a", "amp", "amps", "ampere"),
-        "mA": ("ma",),
-        "uA": ("ua", "µa", "μa"),
-        "kA": ("ka",),
+        "A": ("a", "amp", "amps", "ampere", "amperes"),
+        "mA": ("ma", "milliamp", "milliamps", "milliampere", "milliamperes"),
+        "uA": ("ua", "µa", "μa", "microampere", "microamperes"),
+        "kA": ("ka", "kiloampere"),
     },
-    "voltage_v": {"V": ("v", "volt", "volts"), "mV": ("mv",), "uV": ("uv", "µv", "μv")},
+    "voltage_v": {
+        "V": ("v", "volt", "volts"),
+        "mV": ("mv", "millivolt", "millivolts"),
+        "uV": ("uv", "µv", "μv", "microvolt", "microvolts"),
+    },
     "temperature_degc": {
         "degC": ("degc", "°c", "c", "celsius", "℃", "�c", "øc"),
         "K": ("k", "kelvin"),
-        "degF": ("f", "degf", "°f"),
+        "degF": ("f", "degf", "°f", "fahrenheit"),
     },
 }
 """How headers and users write each unit, in lower case."""

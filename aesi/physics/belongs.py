@@ -4,13 +4,15 @@ A voltage far beyond the file's limits is another cell's. At every row the volta
 rests within a drop d of it that no cell exceeds, so that its state of charge lies between z- = z(V - d) and
 z+ = z(V + d), with z(U) the inverse of the open-circuit voltage of the file:
 
-    d = (DROP_V + DROP_V_PER_C i) (1 + (COLD_FACTOR - 1) c)                        (1)
+    d = (DROP_V + DROP_V_PER_C i + v) (1 + (COLD_FACTOR - 1) c)                    (1)
     i = max(|I|, AFTER_SHARE I') / C_nominal       1/h; I' the largest current of the AFTER_S before          (2)
     c = (COLD_DEGC - T) / COLD_SPAN_K, held within 0 and MOST_SPANS                (3)
 
-(Where the current is turned, what I' left counts less by it, on the side that it left alone.) The charge Q_ij that
-leaves the cell between two rows bounds the capacity C from both sides, and a declared capacity well outside these
-bounds is another cell's, or the record's current or time is in another unit:
+v is what the current drops at the contacts and films of the file beyond OHMIC_V_PER_C: of a cell that was calibrated
+with its leads they take most of its drop. |I| is the largest within ROWS_APART. (Where the current is turned, what I'
+left counts less by it, on the side that it left alone.) The charge Q_ij that leaves the cell between two rows bounds
+the capacity C from both sides, and a declared capacity well outside these bounds is another cell's, or the record's
+current or time is in another unit:
 
     Q_ij / max(z+_i - z-_j, FEWEST_SOC) <= C <= Q_ij / (z-_i - z+_j)               (4)
 
@@ -27,6 +29,7 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError
@@ -59,6 +62,9 @@ measured records stay within 0.05 V; with 0.03 a C/20 discharge is refused by it
 DROP_V_PER_C = 0.25
 """V h, of a warm cell per C-rate. The measured records stay within 0.2 V; with 0.15 the pulses of an LG M50T are
 refused by their own file."""
+OHMIC_V_PER_C = 0.06
+"""V h, per C-rate, of the contacts and films of a file: DROP_V_PER_C holds so much of them, 0.053 at most in the files
+that the measured records were judged by. A cell on two wires of 0.15 ohm has 0.35."""
 COLD_DEGC = 15.0
 """Above it a cell is warm: with 5 a drive at 0 degC wants 1/1.11 times the capacity of its own file, with 10 or 25 no
 measured record more than now."""
@@ -73,6 +79,9 @@ MOST_SPANS = 2.0
 AFTER_S = 1800.0
 """s that a current is felt after it, by slow diffusion. With 0 a drive at 0 degC is refused by its own file, from 300
 to 3600 no measured record is judged otherwise."""
+ROWS_APART = 1
+"""By which loggers write a current beside another row's voltage: the largest current within them is what flowed. With 0
+the pulses of an 18650 are refused by its own file for one row, of 0 A beside the voltage under 4.6 A."""
 AFTER_SHARE = 0.3
 """Of the largest current of that time, which counts as if it flowed still. With 0 a drive at 0 degC is refused by its
 own file, with 0.15 a record wants 1.1 times the capacity of its own; from 0.3 to 1 none is judged otherwise."""
@@ -369,8 +378,11 @@ def _largest_drop_v(cell: Cell, record: Measurement, rows: IntArray, sign: float
         ]
     )
     after_a = AFTER_SHARE * before_a
-    here_a = np.where(turned, after_a + flows[rows], np.maximum(np.abs(flows[rows]), after_a))
-    drop = DROP_V + DROP_V_PER_C * np.maximum(here_a, 0.0) / cell.nominal_capacity_ah
+    beside_a = maximum_filter1d(np.abs(flows), 1 + 2 * ROWS_APART, mode="nearest")[rows]
+    here_a = np.where(turned, after_a + flows[rows], np.maximum(beside_a, after_a))
+    further_v_per_c = max(cell.contacts_and_films_ohm * cell.nominal_capacity_ah - OHMIC_V_PER_C, 0.0)
+    c_rate = np.maximum(here_a, 0.0) / cell.nominal_capacity_ah
+    drop = DROP_V + (DROP_V_PER_C + further_v_per_c) * c_rate
     measured = record.temperature_degc
     degc = np.asarray(_declared_degc(cell)) if measured is None else measured[rows]
     cold = np.clip((COLD_DEGC - degc) / COLD_SPAN_K, 0.0, MOST_SPANS)

@@ -1,4 +1,4 @@
-"""What an effect is: what it says about itself, and the pure functions by which it acts.
+"""The definition of an effect: its description, and the pure functions by which it acts.
 
 An effect acts at one or more of four places, each a function of plain values that returns changed copies:
 
@@ -7,9 +7,9 @@ An effect acts at one or more of four places, each a function of plain values th
     on_voltage   (Trace, **parameters) -> Contribution        a voltage in series with the cell, with own states
     on_reading   (Trace, **parameters) -> (n,) V              the voltage as the instrument wrote it
 
-What a Record or a Trace holds can be read and not written: it is the caller's own, and other effects read it too.
-Nothing in the core knows an effect by name: a new one is a file, a line of registration and a test, or a
-file of the user's own that `load_effect` reads.
+The arrays of a Record or a Trace are read-only: they belong to the caller, and other effects read them too. No part of
+the core refers to an effect by name. A new effect is a file, a line of registration and a test, or a user's own file
+that `load_effect` reads.
 """
 
 from __future__ import annotations
@@ -31,23 +31,25 @@ from aesi.physics.model import EspmModel
 Acted = TypeVar("Acted")
 Kind = Literal["physics", "parameter", "instrument"]
 Measurable = Literal["temperature"]
-"""Quantities that a record may hold beside current and voltage."""
+"""Quantities that a record may hold in addition to current and voltage."""
 Refinement = Literal["discretisation", "reduction"]
-"""Approximations between the declared porous electrode and what is solved."""
+"""Approximations between the declared porous electrode and the equations that are solved."""
 
 
 SAME_INSTANT_S = 1e-6
-"""A reading this close to a row is of that row: t - lag is rounded, and a current that jumps there has two values."""
+"""A reading this close to a row, s, belongs to that row: t - lag has round-off, and a current that jumps at the row has
+two values there."""
 SAME_LENGTH = 0.01
-"""Of a row: another that is as long but for this, as stamps jitter, moves the charge of this one under its current."""
+"""Relative difference in the lengths of two rows up to which they count as equally long, since time stamps jitter."""
 
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """What the cell saw: (n,) s, (n,) A discharge positive, (n,) K or None where the model finds it.
+    """The load that the cell saw: time (n,) s, current (n,) A, discharge positive, temperature (n,) K or None where the
+    model computes it.
 
-    read_s : (n,) s, when the voltage of each row was in truth at the terminals; None: with its current. Before the
-    first row the current is that of the first, behind the last that of the last.
+    read_s : (n,) s, true time at which the voltage of each row was at the terminals; None: that of the current. Before
+    the first row the current is that of the first row, after the last that of the last.
     """
 
     time_s: Array
@@ -56,19 +58,20 @@ class Record:
     read_s: Array | None = None
 
     def __post_init__(self) -> None:
-        """What it holds becomes read-only views of what it is given."""
+        """The arrays become read-only views."""
         _lock(self, "time_s", "current_a", "temperature_k", "read_s")
 
     def current_at(self, time_s: Array, backward: bool) -> Array:
-        """(m,) A at instants (m,) s.  backward : a row's current holds since the row before, else straight lines."""
+        """(m,) A, current at times (m,) s.  backward : True where a row's current holds since the row before, else
+        straight lines."""
         if not backward:
             return np.asarray(np.interp(time_s, self.time_s, self.current_a))
         return np.asarray(self.current_a[self._row_of(time_s)])
 
     def with_readings(self, backward: bool) -> tuple[Record, IntArray]:
-        """The same current with a row at each reading of the voltage too, and which rows (n,) these are.
+        """(record with an additional row at each reading of the voltage, numbers (n,) of these rows).
 
-        Rows between readings are left out where the current just goes on.
+        Rows between readings are left out where the current does not change.
         """
         read = self._snapped()
         now, steps = self.current_a, np.diff(self.current_a) != 0.0
@@ -82,10 +85,10 @@ class Record:
         return Record(time, now, kelvin), np.searchsorted(time, read)
 
     def beside_voltage(self, backward: bool) -> Record:
-        """The record with one row a reading of the voltage, and the current that flowed there.
+        """The record with one row per reading of the voltage, and the current that flowed there.
 
-        Of a current that is held, a row that is another than the one it is read in, as where a pulse begins after a
-        long row, has what moves its charge.
+        Where a held current changes within a row (a pulse begins after a long row), the row has the mean current that
+        moves its charge.
         """
         if self.read_s is None:
             return self
@@ -101,7 +104,7 @@ class Record:
         return Record(read, current, None if kelvin is None else np.interp(read, self.time_s, kelvin))
 
     def _snapped(self) -> Array:
-        """(n,) s, the readings, on a row where they are as good as there."""
+        """(n,) s, times of the readings, snapped to a row within `SAME_INSTANT_S`."""
         assert self.read_s is not None
         after = np.clip(np.searchsorted(self.time_s, self.read_s), 1, max(len(self.time_s) - 1, 1))
         near = np.minimum(after, len(self.time_s) - 1)
@@ -111,11 +114,11 @@ class Record:
         return np.where(np.abs(row - self.read_s) < SAME_INSTANT_S, row, self.read_s)
 
     def _row_of(self, time_s: Array) -> IntArray:
-        """(m,) the row that is over at an instant or ends next."""
+        """(m,) number of the row that ends at a time or next after it."""
         return np.minimum(np.searchsorted(self.time_s, time_s), len(self.time_s) - 1)
 
     def _charge(self, time_s: Array) -> Array:
-        """(m,) A s that a held current has moved since the first row, up to instants (m,) s."""
+        """(m,) A s, charge that a held current has moved from the first row to times (m,) s."""
         since, now = self.time_s, self.current_a
         moved = np.concatenate([[0.0], np.cumsum(now[1:] * np.diff(since))])
         outside = now[0] * np.minimum(time_s - since[0], 0.0) + now[-1] * np.maximum(time_s - since[-1], 0.0)
@@ -124,9 +127,10 @@ class Record:
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """A finished simulation as voltage effects see it.
+    """A finished simulation, the input of voltage effects.
 
-    time_s, current_a : what the cell saw.  voltage_v : (n,) V so far.  series : states by name, see `Run`.
+    time_s, current_a : (n,) s, A, as the cell saw them.  voltage_v : (n,) V, with the effects applied before.
+    series : states by name, see `Run`.
     backward : True where a row's current holds since the row before.
     """
 
@@ -138,14 +142,14 @@ class Trace:
     backward: bool = False
 
     def __post_init__(self) -> None:
-        """What it holds becomes read-only views of what it is given."""
+        """The arrays become read-only views."""
         _lock(self, "time_s", "current_a", "voltage_v")
         object.__setattr__(self, "series", {name: _read_only(state) for name, state in self.series.items()})
 
 
 @dataclass(frozen=True, eq=False)
 class Contribution:
-    """Voltage to add (n,) V, and states to report by name."""
+    """Voltage to add (n,) V, and states by name, (n,) each, to report."""
 
     voltage_v: Array
     series: Mapping[str, Array] = field(default_factory=dict)
@@ -153,22 +157,21 @@ class Contribution:
 
 @dataclass(frozen=True, eq=False)
 class Effect:
-    """One effect; `doc` is the docstring of its file: summary, equation, where it holds, source.
+    """One effect, inactive: its description and functions, without parameter values.
 
-    file, code : of a user's own, where it was read and what stood there.
-    infers : the quantity that the effect supplies where it was not measured; with the measurement it has nothing to
-    say and does not compete.
-    refines : the approximation of the model itself that the effect takes back; it is settled before anything is sought
-    in the cell.
-    of_design : True for what a cell is made with and keeps (potentials, geometry, transport, kinetics); a file that was
-    fitted to this very cell has it right, as far as the model goes.
-    of_every_record : True for physics by constants of the cell: what no record is without where another one has it.
-    of_material : True for what is laid over the stoichiometry window of an electrode and belongs to its material, as
-    U(x) and D(x): it acts on the windows that the file declares, before what moves these.
-    of_age : True for what a cell loses or gains as it ages: all records of the same days have it.
-    ohmic : True for a drop that follows the current at once, as the declared resistance of contacts does: beside such
-    an effect nothing else says that the file is off in it.
-    experiment : which one shows it.  told_apart : id of another effect -> which one tells the two apart.
+    doc : docstring of its file: summary, equation, range of validity, source.  file, code : path and text of a user's
+    own effect; empty otherwise.
+    infers : quantity that the effect supplies where it was not measured; where it was, the effect does not compete.
+    refines : approximation of the model that the effect undoes; this is decided before a search for other effects.
+    of_design : True for the design of a cell (potentials, geometry, transport, kinetics); a file that was fitted to
+    this very cell has it right, within the accuracy of the model.
+    of_every_record : True for physics with constants of the cell: if one record shows it, every record does.
+    of_material : True for a function of an electrode's stoichiometry that belongs to the material (U(x), D(x)). It acts
+    on the windows that the file declares, before effects that move these.
+    of_age : True for a change by ageing; all records of the same days have it.
+    ohmic : True for a voltage drop proportional to the current, like the declared contact resistance. With such an
+    effect in the hypothesis, no separate error of the file's resistance is assumed.
+    experiment : one that shows the effect.  told_apart : id of another effect -> experiment that tells the two apart.
     """
 
     id: str
@@ -196,11 +199,11 @@ class Effect:
 
     @property
     def kind_told(self) -> str:
-        """Its kind for a reader: what refines the discretisation alone is no fault of an instrument."""
+        """The kind as reported to a user: an effect that refines the discretisation is "numerics", no instrument."""
         return "numerics" if self.refines == "discretisation" else self.kind
 
     def activate(self, **values: float) -> ActiveEffect:
-        """This effect with the given parameters, defaults elsewhere.
+        """The active effect with the given parameter values, defaults for the others.
 
         Raises ParameterError for an unknown name or a value out of bounds.
         """
@@ -210,13 +213,13 @@ class Effect:
             raise ParameterError(f"{self.id}: {error}") from None
 
     def activate_only(self, **values: float) -> ActiveEffect:
-        """This effect with the given parameters, and the others at their neutral values, where they have one."""
+        """The active effect with the given parameter values; the others at neutral or, without one, at default."""
         still = {name: p.neutral for name, p in self.parameters.items() if p.neutral is not None}
         return self.activate(**{**still, **values})
 
     @property
     def _wider(self) -> str:
-        """What to do for a value beyond the bounds: those of the catalogue are no user's to change."""
+        """Advice for a value out of bounds; a user cannot change the bounds of the catalogue."""
         if self.file is not None:
             return f"If the cell warrants it, widen the bounds in {self.file}"
         return (
@@ -236,14 +239,14 @@ class Effect:
 
     @property
     def validity(self) -> str:
-        """What is left out and where it holds."""
+        """What the effect leaves out, and its range of validity."""
         return " ".join(
             p.replace("\n", " ") for p in self._paragraphs if p.startswith(("Leaves out", "Holds"))
         )
 
     @property
     def source(self) -> str:
-        """Where it is from."""
+        """The literature source."""
         found = [p for p in self._paragraphs if p.startswith("Source:")]
         return found[0].removeprefix("Source:").replace("\n", " ").strip() if found else ""
 
@@ -254,10 +257,10 @@ class Effect:
 
 @dataclass(frozen=True)
 class ActiveEffect:
-    """An effect with values for all of its parameters: what `simulate` takes.
+    """An effect with values for all of its parameters, as `simulate` takes it.
 
-    Equal to another of the very same effect with the same values. Effects are not told apart by their ids: one that was
-    written anew under its id acts differently, and what was computed with the other has to be computed again.
+    Two are equal if they have the same effect object and the same values. The id alone does not count: an effect that
+    was rewritten under its id acts differently, and cached results of the old one must not be reused.
     """
 
     effect: Effect
@@ -277,10 +280,10 @@ class ActiveEffect:
         return dict(self.values)
 
     def act(self, function: Callable[..., Acted], given: object) -> Acted:
-        """What one of the effect's functions makes of what it is given.
+        """The result of one of the effect's functions for the input `given`.
 
-        Of a user's own, raises OwnEffectError where it fails or gives what cannot be used, NoNumberError where there is
-        no number, each with file and line; an AesiError that it raises itself is left as it is.
+        For a user's own effect raises OwnEffectError where the function fails or returns something unusable, and
+        NoNumberError where a value is not finite, each with file and line; an AesiError that it raises itself passes.
         """
         if self.effect.file is None:
             return function(given, **self.parameters)
@@ -297,7 +300,7 @@ class ActiveEffect:
         return acted
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON-ready; `aesi.physics.effects.active_effect` gives it back."""
+        """Plain JSON values; `aesi.physics.effects.active_effect` restores the effect."""
         out: dict[str, Any] = {"effect": self.effect.id, "parameters": self.parameters}
         if self.effect.file is not None:
             out["file"] = self.effect.file
@@ -305,17 +308,18 @@ class ActiveEffect:
 
 
 def instruments_first(effects: Iterable[ActiveEffect]) -> tuple[ActiveEffect, ...]:
-    """What was recorded has to be set right before the cell can answer to it."""
+    """The effects, those of instruments first: the record has to be corrected before the cell responds to it."""
     return tuple(sorted(effects, key=lambda e: e.effect.kind != "instrument"))
 
 
 def materials_first(effects: Iterable[ActiveEffect]) -> tuple[ActiveEffect, ...]:
-    """What a material answers at a stoichiometry does not depend on how electrodes of it are balanced."""
+    """The effects, those `of_material` first: properties of a material at a stoichiometry do not depend on the balance
+    of the electrodes."""
     return tuple(sorted(effects, key=lambda e: not e.effect.of_material))
 
 
 def as_cell_saw(record: Record, effects: Iterable[ActiveEffect]) -> Record:
-    """What the cell really saw where `record` was written, by the effects in their order."""
+    """The load that the cell really saw, from the `record` as written, by the effects in their order."""
     for active in effects:
         if active.effect.on_record is not None:
             record = active.act(active.effect.on_record, record)
@@ -323,7 +327,7 @@ def as_cell_saw(record: Record, effects: Iterable[ActiveEffect]) -> Record:
 
 
 def check_states(effect: Effect, added: Contribution, trace: Trace) -> None:
-    """Raises OwnEffectError where an effect of a user's own gives a state that the run has already."""
+    """Raises OwnEffectError where a user's own effect returns a state with a name that the run has already."""
     clash = [name for name in added.series if name in trace.series]
     if clash and effect.file is not None:
         raise OwnEffectError(
@@ -332,7 +336,7 @@ def check_states(effect: Effect, added: Contribution, trace: Trace) -> None:
 
 
 def _failure(file: str, error: BaseException) -> str:
-    """What a function of the file raised: in which of its lines, and what."""
+    """A sentence on an error that a function of the file raised, with its line."""
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
     where = f"{file}, line {frames[-1].lineno}, in {frames[-1].name}" if frames else file
     said = str(error).rstrip(".")
@@ -342,7 +346,8 @@ def _failure(file: str, error: BaseException) -> str:
 
 
 def _check_acted(effect: Effect, function: Callable[..., Any], given: Any, acted: Any) -> None:
-    """Raises OwnEffectError for what no function of a user's own may give, NoNumberError for a row without numbers."""
+    """Check the result of a user's own function.  Raises OwnEffectError for a wrong type or shape, NoNumberError for
+    values that are not finite."""
     if function is effect.on_reading:
         _check_rows(effect, "on_reading", {"": acted}, given.time_s)
         return

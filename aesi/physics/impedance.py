@@ -2,16 +2,16 @@
 
     V(w) = -Z(w) I(w)     about a cell at rest, I > 0 on discharge
 
-A particle of stoichiometry x answers to a current y with its surface, through the modes of solid diffusion; the salt
-answers with the modes of the electrolyte; kinetics are a resistance R T/(F j0) with that of the film after it, and a
-double layer beside both where one is in:
+The surface stoichiometry x of a particle responds to a current y through the modes of solid diffusion, the salt through
+the modes of the electrolyte. Kinetics are a resistance R T/(F j0), in series with that of the film; a double layer,
+where there is one, is parallel to both:
 
     x_u = -(lump/(jw) + sum gains/(jw + rates)) y_u,      phi_u = U' x_u + R_u y_u,      i_r = sum_u y_u + jw C phi_r
 
-All regions of an electrode see one potential, as in time; the porous electrode is in `dfn.linear`. Leaves out what has
-no linear answer at rest: hysteresis (a small sine turns within it), plating, and the heat of losses, which is of second
-order. That of entropy is of first, T (dU/dT)**2 / (jw C + G) of a cell that warms itself, and is left out too: 0.03
-mohm at 0.1 mV/K and 0.1 W/K, below the thermal time constant.
+All regions of an electrode share one potential, as in the time domain; the porous electrode is in `dfn.linear`. Left
+out is all that has no linear response at rest: hysteresis (a small sine stays within the loop), plating, and the heat
+of losses, which is of second order. The heat of entropy is of first order, T (dU/dT)**2 / (jw C + G) for a cell that
+warms itself, and is left out too: 0.03 mohm at 0.1 mV/K and 0.1 W/K, below the thermal time constant.
 
 Source: Meddings et al., J. Power Sources 480 (2020) 228742, doi:10.1016/j.jpowsour.2020.228742, for the practice.
 """
@@ -42,11 +42,11 @@ from aesi.records import Run
 from aesi.records.checked import numbers
 
 SLOPE_STEP = 1e-4
-"""Of stoichiometry: tables of potentials have steps of 1.2e-4."""
+"""Step of stoichiometry for the slope of a potential: tables of potentials have steps of 1.2e-4."""
 INSTANT_S = np.array([0.0, 1e-9])
-"""Over which a current has moved no charge to speak of."""
+"""Times, s, so close that a current moves no appreciable charge between them."""
 SMALL_A = 1e-6
-"""Current whose response is a slope: far below any exchange current, far above round-off."""
+"""Current, A, for a linear response: far below any exchange current, far above round-off."""
 
 
 def impedance(
@@ -60,17 +60,17 @@ def impedance(
 ) -> ComplexArray:
     """Impedance of `cell` at rest.
 
-    frequency_hz : (n,) Hz, positive.  soc : state of charge by the declared windows; where an effect moved these, the
-    cell rests at the same voltage in the new ones, as in `simulate`.  temperature_degc : of the whole cell, 25 unless
-    given, whatever its file declares.  effects : as in `simulate`; of one that acts on the voltage, what it answers to
-    a current at once. A fault of the instruments that write a record is none of the cell, and leaves Z as it is.
-    model : as there, "espm" unless another is named.
+    frequency_hz : (n,) Hz, positive.  soc : state of charge, 0 to 1, in the declared stoichiometry windows; where an
+    effect moves these, the cell rests at the same voltage in the new ones, as in `simulate`.  temperature_degc : of the
+    whole cell, degC; the default is 25, not the temperature in the file.  effects : as in `simulate`. An effect on the
+    voltage counts with its immediate response to a current; faults of the instruments leave Z unchanged.
+    model : "espm" (default) or "dfn".
     Returns (n,) ohm, complex; the imaginary part is negative where capacitive.
-    Raises DataError for frequencies or a state that have none, InputError for what is no Cell, no effect, no state of
-    charge or no temperature of a cell.
+    Raises DataError for frequencies that are not positive and for a state of charge outside the electrodes' range;
+    InputError for a wrong type of cell, effect, state of charge or temperature; SimulationError for lithium plating.
     """
     check_cell(cell)
-    if soc is None:  # which check_soc lets pass, of records whose voltage tells it
+    if soc is None:  # check_soc accepts None, for records whose voltage gives the state of charge
         raise InputError(
             "soc = None is no state of charge; give a share of the capacity, so that 90 % is 0.9."
         )
@@ -106,7 +106,7 @@ def impedance(
 
 
 def _checked_frequency(frequency_hz: Numbers) -> Array:
-    """(n,) Hz.  Raises DataError for what is no row of positive numbers."""
+    """(n,) Hz, checked.  Raises DataError for anything but a row of positive numbers."""
     frequency = np.atleast_1d(numbers(frequency_hz, "frequency_hz"))
     if frequency.ndim != 1 or not (
         np.isfinite(frequency).all() and (frequency > 0.0).all() and len(frequency)
@@ -116,7 +116,7 @@ def _checked_frequency(frequency_hz: Numbers) -> Array:
 
 
 def _checked_kelvin(temperature_degc: float) -> float:
-    """K.  Raises InputError for several temperatures, and for one that no cell has."""
+    """The temperature, K, checked.  Raises InputError for several temperatures, and for one that no cell has."""
     degc = numbers(temperature_degc, "temperature_degc")
     if degc.ndim:
         raise InputError(
@@ -129,8 +129,8 @@ def _checked_kelvin(temperature_degc: float) -> float:
 def slowest_diffusion_hz(
     cell: Cell, soc: float, temperature_degc: float = 25.0, effects: Iterable[ActiveEffect] = ()
 ) -> float:
-    """Hz, at which the slowest diffusion of `cell` at rest, of a particle or of the salt, lags by an eighth of a turn:
-    its rate over 2 pi. Well below it all diffusion keeps up with the current, and Z is that of a capacity.
+    """Frequency, Hz, of the slowest diffusion of `cell` at rest (in a particle or in the salt): its rate over 2 pi,
+    where it lags by 45 degrees. Well below it diffusion follows the current, and Z is that of a capacitance.
 
     Arguments as of `impedance`; both models have the same particles and salt.
     """
@@ -144,7 +144,7 @@ def slowest_diffusion_hz(
 
 
 def _at_rest(cell: Cell, model: EspmModel, soc: float) -> Array:
-    """(2,) stoichiometries at rest, of the cell that effects made of it."""
+    """(2,) rest stoichiometries of the cell with the effects applied, at the rest voltage of `cell`."""
     return np.array(model.cell.stoichiometries(same_rest(cell, model.cell, soc)))
 
 
@@ -232,7 +232,7 @@ class _Linear:
         return out
 
     def _salt(self, s: ComplexArray) -> ComplexArray:
-        """(frequencies, 2 regions, 2 regions) ohm m2: potential of a region's salt per current that enters a region."""
+        """(frequencies, 2 regions, 2 regions) ohm m2: potential of the salt in one region per current into another."""
         regions, e, stack = self.model.regions, self.model.cell.electrolyte, stack_of(self.model)
         rates = _salt_rates(self.model, self.kelvin)
         enters = (1.0 - e.transference) / FARADAY_C_MOL * stack.gain[:, 1:]
@@ -244,7 +244,7 @@ class _Linear:
         return cast(ComplexArray, chi * np.einsum("rk,fk,vk->frv", seen, modes, enters))
 
     def _ohm(self) -> Array:
-        """(2 regions, 2 regions) ohm m2, as in time."""
+        """(2 regions, 2 regions) ohm m2, ohmic drop of the electrolyte, as in the time domain."""
         regions = self.model.regions
         e = self.model.cell.electrolyte
         warmer = rate_factor(e.conductivity_ea_j_mol, self.kelvin, self.model.cell.reference_temperature_k)
@@ -274,7 +274,7 @@ def _slope(relation: Relation, at: float) -> float:
 
 
 def _shifted(effects: tuple[ActiveEffect, ...], kelvin: float) -> float:
-    """The temperature that the cell really has."""
+    """The true temperature of the cell, K: `kelvin` after the effects that change it."""
     record = as_cell_saw(Record(np.zeros(1), np.zeros(1), np.array([kelvin])), effects)
     return float(cast(Array, record.temperature_k)[0])
 
@@ -282,9 +282,9 @@ def _shifted(effects: tuple[ActiveEffect, ...], kelvin: float) -> float:
 def _series_ohm(
     model: EspmModel, active: ActiveEffect, function: Callable[..., Contribution], rest: Run
 ) -> float:
-    """Ohm of an effect that acts on the voltage: what it answers to a small current at once.
+    """Resistance of an effect on the voltage, ohm: its immediate response to a small current.
 
-    rest : of the cell without a current, over `INSTANT_S`.
+    rest : run of the cell without current, over `INSTANT_S`.
     """
     at_rest, driven = (
         active.act(function, Trace(model, rest.time_s, current, rest.voltage_v, dict(rest.series), True))

@@ -1,8 +1,8 @@
-"""State of charge at the first row of a record, what it is uncertain by, and on what it rests.
+"""State of charge at the first row of a record, its standard deviation, and its source.
 
-One rule for every command. In this order:
+Every command uses the same rule: the first of these that applies.
 
-    given         the user says it
+    given         by the user
     full charge   the cell rests within `CHARGED_V` below its upper cut-off voltage: a charge that ended there is state
                   of charge 1 by definition, whatever the open-circuit potentials of the cell file say
     rest          the open-circuit voltage that the cell relaxes to, at the temperature of the record; under a slow
@@ -10,13 +10,13 @@ One rule for every command. In this order:
     load          the open-circuit voltage after the drop of the model over the first minutes; the current may have
                   begun with the record or long before it, and another before: these minutes tell how likely either is
 
-A rest that a load ends before it has told where it settles is read by these minutes too, if they leave less doubt. A
-full charge may also lie before a load whose drop is known well enough, and never before a charge that still flows.
+A rest that a load ends before it has settled is read by these minutes too, if they leave less uncertainty. A full
+charge is also recognised before a load whose voltage drop is known well enough, but never while a charge still flows.
 
-The current, time and temperature are those that the cell saw: where the effects of its model say that the record has
-others, as by the offset of a sensor or a leak, a rest is a rest and a load a load by theirs, as in `simulate`.
+Current, time and temperature are those that the cell saw: the effects of its model (a sensor's offset, a leak) are
+taken off the record first, as in `simulate`, and decide whether it rests.
 
-A voltage is as good as the open-circuit potentials, so that a flat potential gives a wide state of charge.
+A reading is as accurate as the open-circuit potentials: where a potential is flat, the state of charge is uncertain.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from aesi.physics.effect import ActiveEffect, Record, as_cell_saw, instruments_f
 from aesi.physics.rest.open_circuit import CHARGED_V, GIVEN_SD, GOOD_READING_V, READING_V, OpenCircuit
 from aesi.physics.rest.voltage import first_rows_v, freed_of_instruments, freed_of_series
 from aesi.physics.simulation import ModelName, model_with
-from aesi.physics.start.charge import told_by_charge
+from aesi.physics.start.charge import carried_from, told_by_charge
 from aesi.physics.start.load import DROP_ERROR, FLOWED_S, LoadedStart
 from aesi.physics.start.relaxing import Rest, resting_rows, settled_voltage
 from aesi.physics.start.state import Basis, InitialState
@@ -79,19 +79,20 @@ def initial_state(
     model: ModelName = "espm",
     potentials_v: float = READING_V,
 ) -> InitialState:
-    """State of charge at the first row of `record`: as given, or what its voltage says.
+    """State of charge at the first row of `record`: as given, or read from its voltage.
 
-    In this order: given; full, where the cell rests at its upper cut-off voltage after a charge; the open-circuit
-    voltage of a rest; the same after the drop of the model under the current that flows.
+    The first of these that applies: given; full, where the cell rests at its upper cut-off voltage after a charge; the
+    open-circuit voltage of a rest; the open-circuit voltage under load, after the voltage drop of the model.
 
-    record : its temperature is used where it was measured.  soc0 : given by the user, for this record, or (`shared`)
-    for several, so that one whose voltage contradicts it starts where its voltage says.
-    hold : how the current runs between rows.  effects : what the cell and its instruments have beyond the file, as in
-    `simulate`.  model : that a loaded start is simulated with.  potentials_v : V, how far the potentials of the file
-    are off, one standard deviation; a fit that moves them takes `GOOD_READING_V`.
-    Where the voltage is not known from some row on, the rows before it say where the record starts.
-    Raises DataError where the voltage belongs to no state of this cell, or there is neither voltage nor `soc0`;
-    InputError for what is no state of charge.
+    record : its temperature is used where it was measured.  soc0 : state of charge given by the user, 0 to 1.
+    shared : True where `soc0` was given for several records; one whose voltage contradicts it is then read instead,
+    unless the charge that the record moves allows `soc0` and not the state of charge that is read.
+    hold : how the current runs between rows.  effects : active effects of cell and instruments, as in `simulate`.
+    model : for the simulation of a start under load.  potentials_v : standard deviation of the file's open-circuit
+    voltage, V; a fit that moves the potentials takes `GOOD_READING_V`.
+    Where the voltage is missing from some row on, only the rows before it are used.
+    Raises DataError where the voltage belongs to no state of this cell, or where there is neither voltage nor `soc0`;
+    InputError for a `soc0` that is no state of charge.
     """
     check_soc(soc0)
     if not len(record):
@@ -118,14 +119,15 @@ def initial_state(
                 words = _given(record, soc0, read).sentence
                 return InitialState(soc0, GIVEN_SD, "given", words, doubt=doubt, doubted=True)
             return replace(_given(record, soc0, None), doubt=doubt)
-        if shared:
+        held, other = (carried_from(soc, seen, hold, cell.capacity_ah) for soc in (soc0, read.soc))
+        if shared and (other or not held):
             return _read_instead(read, soc0)
         return replace(_given(record, soc0, read), doubt=abs(read.soc - soc0))
     return start.read()
 
 
 def _as_cell_saw(record: Measurement, effects: tuple[ActiveEffect, ...], hold: Hold) -> Measurement:
-    """Each row's voltage beside what the cell saw there; the record itself where no effect acts on it."""
+    """The record with the current, time and temperature that the cell saw; itself where no effect acts on it."""
     if all(active.effect.on_record is None for active in effects):
         return record
     degc = record.temperature_degc
@@ -176,7 +178,7 @@ class _Start:
         self.load = LoadedStart(self.open_circuit, record, hold, model_name)
 
     def read(self) -> InitialState:
-        """From the voltage, and under load from the charge that the record moves, too."""
+        """The state read from the voltage and, under load, also from the charge that the record moves."""
         read = self._at_rest() if self._rests() else self._under_load()
         # The reading of a rest is its likeliest state, not a mean that what is cut off would move.
         return (
@@ -236,7 +238,7 @@ class _Start:
         return f"{words}{'; give --soc0 if it is known' if sd > OTHER_STATE else ''}."
 
     def _rise_v(self, ocv_v: float, moved: float) -> float:
-        """V that the open-circuit voltage lay above `ocv_v` before `moved` of the charge had flowed."""
+        """How far the open-circuit voltage was above `ocv_v`, V, before the share `moved` of the charge had flowed."""
         soc = self.open_circuit.soc_at(ocv_v)
         return self.open_circuit.voltage_at(soc + moved) - self.open_circuit.voltage_at(soc)
 
@@ -250,7 +252,7 @@ class _Start:
         return self.load.drop(ocv_v, float(rest.rows.current_a.mean()), FLOWED_S[-1])
 
     def _first_voltages(self) -> tuple[float, float]:
-        """V of the first row, without what instruments do, and without what effects add in series, too."""
+        """(first voltage without instrument faults, the same without effects in series either), V."""
         terminal = freed_of_instruments(self.model, self.effects, float(self.record.voltage_v[0]))
         return terminal, self._freed_of_series(terminal, self.current_a)
 

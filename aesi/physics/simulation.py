@@ -42,18 +42,18 @@ from aesi.records import Hold, Run
 from aesi.records.checked import check_row, check_times, numbers
 
 ModelName = Literal["espm", "dfn"]
-"""Which of the two models of a cell is solved: `model` to a user, and `model_name` where an `EspmModel`, which is what
-either of them solves, is called `model`."""
+"""Name of the model that is solved. The argument is `model` in public functions, and `model_name` in functions where
+`model` is an `EspmModel`, the parameters that either solver takes."""
 MODEL_WORDS: Mapping[str, str] = {"espm": "the single particle (espm)", "dfn": "the porous electrode (dfn)"}
 """How reports call the models."""
 OnDepletion = Literal["raise", "clip"]
 MOST_ROWS = 20_000
-"""Of a record whose solutions are remembered; those of longer ones would fill the memory."""
+"""Longest record, rows, whose solutions are cached; longer ones would fill the memory."""
 Solution = tuple[Array, dict[str, Array], int, int]
-"""What a solver gives back: (rows, further, fault_at, fault).
+"""The result of a solver: (rows, further, fault_at, fault).
 
-rows : (7, n), as those of `plain.run_plain`.  further : other states by name, (n,) each.  fault_at : the first row at
-which the cell has run out, -1 for none.  fault : what ran out there, as `depletion.sentence` takes it.
+rows : (7, n), as those of `plain.run_plain`.  further : other states by name, (n,) each.  fault_at : first row at
+which lithium or salt has run out, -1 for none.  fault : which one, as `depletion.sentence` takes it.
 """
 
 
@@ -74,32 +74,34 @@ def simulate(
     """Terminal voltage and states of `cell` under a current.
 
     time_s : (n,) s, strictly increasing, any sampling.  current_a : (n,) A, positive on discharge.
-    soc0 : state of charge at rest before the first sample, by the declared windows; where an effect moved these,
-    the cell starts from the same rest voltage in the new ones. None takes it from `rest_voltage_v`, as `initial_state`
-    reads that of a cell at rest: within `CHARGED_V` below the upper cut-off voltage it is a full charge.
-    effects : what the cell has beyond its file; instrument faults act first, then what belongs to a material by its
-    stoichiometry (U(x), D(x)), which no loss moves, the others in the order given.
-    temperature_degc : (n,) or one value: the measured temperature of the cell's case, which the winding follows (see
-    `aesi.physics.model.of_record`); None leaves it to the cell file's initial temperature, or to the heat balance where
-    an effect brings one.
+    soc0 : state of charge at rest before the first sample, 0 to 1, in the declared stoichiometry windows. Where an
+    effect moves the windows, the cell starts from the same rest voltage in the new ones. None reads it from
+    `rest_voltage_v` (V), as `initial_state` does for a cell at rest: within `CHARGED_V` below the upper cut-off voltage
+    the cell is full.
+    effects : active effects in addition to the cell file. Instrument faults act first, then functions of an electrode's
+    stoichiometry (U(x), D(x)), then the others in the order given.
+    temperature_degc : (n,) or one value, degC, measured on the cell's case; the winding follows it (see
+    `aesi.physics.model.of_record`). None takes the cell file's initial temperature, or the heat balance of an effect.
     hold : "linear" joins the samples by straight lines; "backward" holds each row's value since the row before.
-    on_depletion : what happens where a surface stoichiometry leaves [0, 1] or the electrolyte runs dry.
-    "raise" is for users; "clip" is for searches: kinetics are held at the edge, open-circuit potentials go on
-    at 10 V per unit of stoichiometry, and `series["depleted"]` is 1 from the first such sample on.
-    model : "espm", one particle an electrode, or "dfn", the porous electrode; the same effects act on both. Without it
-    "espm", also for a cell whose file was fitted with the other (`Cell.fitted_with`), which commands take by default.
-    profiles : of "dfn" alone: what runs across the electrodes, see `Run.profiles`.
+    on_depletion : action where a surface stoichiometry leaves [0, 1] or the electrolyte runs dry. "raise" raises
+    SimulationError. "clip" (for searches) holds the kinetics at the limit, continues open-circuit potentials with 10 V
+    per unit of stoichiometry, and sets `series["depleted"]` to 1 from the first such sample on.
+    model : "espm", one particle per electrode, or "dfn", the porous electrode; the same effects act on both. The
+    default is "espm" even for a cell whose file was fitted with "dfn" (`Cell.fitted_with`); the commands follow the
+    file.
+    profiles : "dfn" only: whether to return profiles across the electrodes, see `Run.profiles`.
 
     Returns a Run with series c_sp, c_sn (mol/m3), c_e0, c_eL (mol/m3), soc, temperature_k.
-    Raises SimulationError naming time and electrode, or where a clipped simulation has no solution either; DataError
-    for arrays that cannot be simulated, and a rest voltage that no state of the cell has; InputError for another model,
-    hold or on_depletion, for what is no Cell, no effect, no state of charge or no temperature of a cell, and for an
-    effect that the model holds of itself; CellError for one that needs what the cell's file does not declare.
+    Raises SimulationError with time and electrode where the cell runs out, or where a clipped simulation has no
+    solution; DataError for arrays that cannot be simulated, and for a rest voltage that no state of the cell has;
+    InputError for an unknown model, hold or on_depletion, for a wrong type of cell, effect, state of charge or
+    temperature, and for an effect that the model already contains; CellError for an effect that needs a value which
+    the cell's file does not declare.
     """
     check_cell(cell)
     check_choice("hold", hold, Hold)
     check_choice("on_depletion", on_depletion, OnDepletion)
-    if on_depletion == "raise":  # a search may pass by states that no cell has
+    if on_depletion == "raise":  # a search may try states that no cell has
         check_soc(soc0)
     time, current = _checked_record(time_s, current_a)
     active = instruments_first(checked_effects(effects))
@@ -139,7 +141,7 @@ def simulate(
 
 
 def model_with(cell: Cell, effects: Iterable[ActiveEffect]) -> EspmModel:
-    """The model of `cell` after what the effects do to it, in their order but for `materials_first`."""
+    """The model of `cell` with the effects applied, in the order of `materials_first`."""
     return _model_with(cell, materials_first(effects))
 
 
@@ -154,7 +156,7 @@ def _model_with(cell: Cell, effects: tuple[ActiveEffect, ...]) -> EspmModel:
 
 @lru_cache(maxsize=256)
 def _changed(model: EspmModel, active: ActiveEffect) -> EspmModel:
-    """One effect's change; the records of a case share all but the last of them."""
+    """The model with one effect applied. Cached: the records of a case share all effects but the last."""
     assert active.effect.on_model is not None
     return active.act(active.effect.on_model, model)
 
@@ -164,9 +166,9 @@ Solver = Callable[[EspmModel, Array, Array, Array | None, float, Hold], Solution
 
 
 def solver(model_name: str, profiles: dict[str, Array] | None = None) -> Solver:
-    """What solves the model of that name; it is imported, and its compiled code read, when it is first used.
+    """The solver of the model of that name. It is imported, and its compiled code loaded, at the first use.
 
-    profiles : a dict that the solver fills with what `Run.profiles` names.  Raises InputError for another name.
+    profiles : a dict that the solver fills with the arrays of `Run.profiles`.  Raises InputError for an unknown name.
     """
     if model_name == "espm":
         if profiles is not None:
@@ -182,7 +184,7 @@ def solver(model_name: str, profiles: dict[str, Array] | None = None) -> Solver:
 
 
 def _solved(solve: Solver, model: EspmModel, record: Record, soc0: float, hold: Hold) -> Solution:
-    """One solution; a temperature that does not move becomes that of the cell."""
+    """One solution; a constant temperature column becomes the initial temperature of the cell."""
     temperature = record.temperature_k
     if temperature is not None and np.ptp(temperature) == 0.0:
         model = model.with_cell(initial_temperature_k=float(temperature[0]))
@@ -193,13 +195,13 @@ def _solved(solve: Solver, model: EspmModel, record: Record, soc0: float, hold: 
 
 
 def _own(row: Array) -> Array:
-    """The row as kernels are compiled for: contiguous and writable, which the arrays that effects are given are not."""
+    """A contiguous, writable copy of a row, as the kernels need it; the arrays that effects return are read-only."""
     return np.require(row, float, ["C", "W"])
 
 
 @dataclass(frozen=True)
 class _KeyedRecord:
-    """A record as a key of a cache: equal to another where their arrays hold the same numbers."""
+    """A record as a cache key: equal to another one where their arrays hold the same numbers."""
 
     digest: bytes
     record: Record = field(compare=False)
@@ -216,18 +218,18 @@ class _KeyedRecord:
 def _remembered(
     model_name: ModelName, model: EspmModel, keyed: _KeyedRecord, soc0: float, hold: Hold
 ) -> Solution:
-    """One solution, as it was found before: effects on the voltage and on readings leave what happens in the cell as it
-    is, so that 14 to 32 % of the solutions that four blind cases ask for were asked for already."""
+    """One solution, from a cache: effects on the voltage and on readings do not change the states of the cell, so that
+    14 to 32 % of the solutions in four blind cases were computed before."""
     return _solved(solver(model_name), model, keyed.record, soc0, hold)
 
 
 def forget_solutions() -> None:
-    """Empty the memory of solutions, for benchmarks: what is asked for again is solved again."""
+    """Empty the cache of solutions, for benchmarks."""
     _remembered.cache_clear()
 
 
 def _copied(solution: Solution) -> Solution:
-    """The caller's own arrays, which may be written to without changing what is remembered."""
+    """A copy of a solution, which the caller may write to without changing the cache."""
     rows, further, fault_at, fault = solution
     return rows.copy(), {name: values.copy() for name, values in further.items()}, fault_at, fault
 
@@ -245,7 +247,7 @@ def _run_espm(
 
 
 def _depleted(fault_at: int, n: int) -> Array:
-    """(n,) 1 from the row at which the cell ran out on, 0 before; `fault_at` is -1 where it did not."""
+    """(n,) 0 before row `fault_at`, at which the cell ran out, and 1 from there on; all 0 for -1."""
     if fault_at < 0:
         return np.zeros(n)
     return (np.arange(n) >= fault_at).astype(float)
@@ -270,9 +272,9 @@ def _with_effects_in_series(
     series: dict[str, Array],
     backward: bool,
 ) -> Array:
-    """(n,) V at the terminals: the model's voltage, then all effects on it.
+    """(n,) V at the terminals: the model's voltage with all voltage effects added.
 
-    series : is given the states that the effects bring.
+    series : dict to which the states of these effects are added.
     """
     for active in effects:
         if active.effect.on_voltage is not None:
@@ -292,7 +294,7 @@ def _as_read(
     series: dict[str, Array],
     backward: bool,
 ) -> Array:
-    """(n,) V, what the instrument writes of the voltage at the terminals.  record : one row a reading."""
+    """(n,) V, the terminal voltage as the instrument records it.  record : one row per reading."""
     for active in effects:
         if active.effect.on_reading is not None:
             trace = Trace(model, record.time_s, record.current_a, voltage, series, backward)
@@ -326,7 +328,7 @@ def _kelvin(temperature_degc: Numbers | None, time: Array) -> Array | None:
 def _soc_from_rest(
     model: EspmModel, effects: Sequence[ActiveEffect], kelvin: Array | None, rest_voltage_v: float | None
 ) -> float:
-    """State of charge from the rest voltage at the first temperature, freed of what effects add to it."""
+    """State of charge from the rest voltage at the first temperature, without the part that effects add to it."""
     if rest_voltage_v is None:
         raise DataError("give soc0, or rest_voltage_v measured at rest before the record.")
     terminal_v = freed_of_instruments(model, effects, rest_voltage_v)

@@ -1,4 +1,4 @@
-"""`aesi.discover` and `aesi.calibrate`: what the commands of that name do, over files or records, in Python."""
+"""`aesi.discover` and `aesi.calibrate`: the commands of the same names as Python functions, over files or records."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ FileOrSpectrum = str | PathLike[str] | Spectrum
 Spectra = FileOrSpectrum | Sequence[FileOrSpectrum]
 """One or several spectra, or files of impedance spectra."""
 MOST_HOLDOUT, MOST_EFFECTS = 0.9, 10
-"""Upper limits, those of `--holdout` and `--max-effects`."""
+"""Upper limits of `holdout` and `max_effects`, as of `--holdout` and `--max-effects`."""
 
 
 def discover(
@@ -62,22 +62,26 @@ def discover(
     out: str | PathLike[str] | None = None,
     progress: Progress | None = None,
 ) -> Finding:
-    """Find what a cell's model lacks to explain measurements.
+    """Find the effects that a cell's model lacks to explain measurements.
 
     cell : a BPX file, the folder of a saved model, a Cell or a HybridModel.
-    data : measurements that may be looked at, less the last `holdout` share of each (None: 0.3) where
-    there are no `tests`.
-    tests : measurements that choose nothing.
-    soc0 : state of charge at the first sample; None takes it from the voltage.
-    hold : how the current runs between rows; None takes what the records say.
-    effect_files : Python files with effects of your own; they are run, so name only files that you trust.
-    only, without : ids of effects that alone are tried, or that are not; what else they stand for is held.
-    model : "espm" or "dfn" for every hypothesis; None takes the porous electrode where it differs notably.
-    soh : share of the cell file's capacity that the cell had then, or the day of the test; None takes all of it.
-    good : measurements of the same cell that are known to be good: what is sought is what `data` have beside them.
-    out : a folder for discovery.json, report.html and model/, and for fits, so that an interrupted search goes on.
+    data : measurements to fit, one or several. Without `tests`, the last `holdout` share of each (0 to 0.9 of its time;
+    None: 0.3) is kept back for the test.
+    tests : measurements for the test only; nothing is fitted to them.
+    soc0 : state of charge at the first sample, 0 to 1; None reads it from the voltage.
+    max_effects : most effects that may be added, 0 to 10.  seed : of the bootstrap intervals.
+    hold : how the current runs between rows; None takes the declaration of each record.
+    effect_files : Python files with effects of your own; they are executed, so name only files that you trust.
+    only, without : ids of the effects to try, or not to try; parameters that excluded effects restate stay fixed.
+    model : "espm" or "dfn" for every hypothesis; None takes the porous electrode where it differs notably from the
+    single particle.
+    soh : capacity of the cell then over that in its file, or the day of the test; None takes 1.
+    good : measurements of the same cell that are known to be good. The search is then for differences of `data` from
+    these.
+    out : folder for discovery.json, report.html, model/ and the stored fits with which an interrupted search resumes.
+    progress : called after each hypothesis.
 
-    Raises AesiError, one sentence, for what cannot be read, decided or be of this cell.
+    Raises AesiError, one sentence, for data that cannot be read, cannot decide anything, or are not of this cell.
     """
     _check_asked(soc0, holdout, max_effects, seed)
     folder = None if out is None else _folder(out)
@@ -122,20 +126,20 @@ def calibrate(
     hold: Hold | None = None,
     model: ModelName | None = None,
 ) -> Calibration:
-    """Fit the parameters that a cell's file declares to measurements; the fitted cell is `.cell` of what comes back.
+    """Fit the parameters that a cell's file declares to measurements; the fitted cell is `.cell` of the result.
 
-    cell, data, soc0, hold : as for `discover`; the records may be of any temperatures together.
-    temperatures_degc : of records without a temperature column, by name.  dates : days of the records, by name; those
-    of other days may be of another age.  as_of : day of the file's state; None takes the last with a load.
+    cell, data, soc0, hold : as for `discover`; the records may have different temperatures.
+    temperatures_degc : record name -> degC, for records without a temperature column.  dates : record name -> day of
+    the test; records of different days may have different ages.  as_of : day whose state of the cell is written; None
+    takes the last day with a load.
     cut_offs_v : (lower, upper) V between which this cell is cycled; None takes those of its file.
-    priors : (value, standard deviation) of parameters that are known from elsewhere, by their names in the report and
-    in its units (of a factor, times the start file's); the deviation is that of the natural logarithm for factors,
-    double layers and the thermal conductivity.
-    spectra : impedance of this very cell, fitted beside the records as `--fit-impedance` does: files of spectra, or
+    priors : parameter -> (value, standard deviation), for parameters that are known from elsewhere, with the names and
+    units of the report (a factor is relative to the start file). The standard deviation is that of the natural
+    logarithm for factors, double layers and the thermal conductivity.
+    spectra : impedance spectra of this very cell, fitted together with the records, as with `--fit-impedance`: files or
     `aesi.records.Spectrum`s, one or several.
-    model : that is fitted, "espm" or "dfn"; None takes that of a saved model, or that the file was fitted with, else
-    "espm".
-    Raises AesiError, one sentence, for what cannot be used.
+    model : "espm" or "dfn"; None takes that of a saved model, or the one that the file was fitted with, else "espm".
+    Raises AesiError, one sentence, for arguments or data that cannot be used.
     """
     check_soc(soc0)
     _check_by_name("temperatures_degc", temperatures_degc)
@@ -163,7 +167,7 @@ def calibrate(
 
 
 def _read_spectra(given: Spectra) -> tuple[Spectrum, ...]:
-    """The spectra of files, and those that were read before.  Raises InputError for what is neither."""
+    """The spectra, read from files or given as such.  Raises InputError for any other object."""
     several = isinstance(given, Sequence) and not isinstance(given, str)
     found: list[Spectrum] = []
     listed = list(given) if several else [given]  # type: ignore[arg-type]
@@ -185,7 +189,7 @@ def _names(ids: str | Sequence[str]) -> tuple[str, ...]:
 
 
 def _check_asked(soc0: float | None, holdout: float | None, max_effects: int, seed: int) -> None:
-    """Raises InputError for a number that no search can be run with."""
+    """Raises InputError for a number that a search cannot use."""
     check_soc(soc0)
     if holdout is not None and not 0.0 <= holdout <= MOST_HOLDOUT:
         raise InputError(
@@ -199,13 +203,13 @@ def _check_asked(soc0: float | None, holdout: float | None, max_effects: int, se
 
 
 def _check_by_name(what: str, given: object) -> None:
-    """Raises InputError for what is said of records without their names."""
+    """Raises InputError where an argument is no dict by record names."""
     if given is not None and not isinstance(given, Mapping):
         raise InputError(f"{what} = {given!r} names no record; give a dict by the records' names.")
 
 
 def _check_priors(priors: object) -> None:
-    """Raises InputError for what is no (value, standard deviation) by parameter."""
+    """Raises InputError where `priors` is no dict of (value, standard deviation) by parameter."""
     form = "a dict of (value, standard deviation) by the parameters' names in the report"
     if priors is not None and not isinstance(priors, Mapping):
         raise InputError(f"priors = {priors!r} names no parameter; give {form}.")
@@ -216,7 +220,7 @@ def _check_priors(priors: object) -> None:
 
 
 def _check_days(dates: Mapping[str, date], as_of: date | None) -> None:
-    """Raises InputError for a day that is given as text or number."""
+    """Raises InputError for a day that is no datetime.date."""
     days = {f"dates[{name!r}]": day for name, day in dates.items()} | {"as_of": as_of}
     for name, day in days.items():
         if day is not None and not isinstance(day, date):
@@ -224,7 +228,7 @@ def _check_days(dates: Mapping[str, date], as_of: date | None) -> None:
 
 
 def _folder(out: str | PathLike[str]) -> Path:
-    """The folder for the results, made before the work where it is missing, so that what takes minutes can be kept."""
+    """The folder for the results, created before the search, so that minutes of work are not lost for want of it."""
     folder = Path(out)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -257,9 +261,9 @@ def _read_all(records: Sequence[FileOrRecord], hold: Hold | None) -> list[Measur
 
 
 def _checked(found: Measurement, hold: Hold | None) -> Measurement:
-    """The record with how its current was declared to run; one that no reader examined is examined as a file is.
+    """The record with the declared hold. One that no reader examined passes the checks of a file first.
 
-    Raises DataError where a voltage is missing, and for what a file would be refused for.
+    Raises DataError where a voltage is missing, and where a file with these rows would be refused.
     """
     if len(found) < 2:
         raise DataError(f"{found.name} has too few rows ({len(found)}); a record needs at least two.")

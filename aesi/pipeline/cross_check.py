@@ -1,9 +1,9 @@
-"""The same cell in PyBaMM, so that the physics model can be held against an independent one in one call.
+"""The same cell in PyBaMM: compare the physics model with an independent one in one call.
 
-PyBaMM reads the cell as BPX, so what is checked includes the file that `Cell.to_bpx` writes. Its solver is stopped
-wherever the current bends, since it would step over a pulse otherwise, and the charge that it passed is compared
-with the integral of the current. Contacts, for which BPX has no field, are handed over beside it; what else of a
-calibrated cell PyBaMM does not read is left out of both models, and named.
+PyBaMM reads the cell as BPX, so that the file written by `Cell.to_bpx` is checked too. Its solver is stopped wherever
+the slope of the current changes, since it could step over a pulse, and the charge that it passed is compared with the
+integral of the current. The contact resistance, for which BPX has no field, is passed separately. Other parameters of a
+calibrated cell that PyBaMM does not read are left out of both models, and named.
 """
 
 from __future__ import annotations
@@ -37,17 +37,19 @@ DEFAULT_MESH = {"x_n": 20, "x_s": 20, "x_p": 20, "r_n": 20, "r_p": 20}
 FINE_MESH = {"x_n": 30, "x_s": 20, "x_p": 30, "r_n": 60, "r_p": 60}
 """Points of PyBaMM's mesh: its default of 20 radial points moves the voltage of a drive by millivolts."""
 STRETCH = 2.0
-"""Stretch of a graded mesh: the points of a particle stand e^2 times closer at its surface than at its centre."""
+"""Stretch of a graded mesh: the points of a particle are e^2 times closer at its surface than at its centre."""
 TOLERANCE = 1e-6
 CHARGE_SHARE = 1e-5
-"""Share of the nominal capacity by which PyBaMM's charge may differ from the current's integral."""
+"""Largest difference of PyBaMM's charge from the integral of the current, as a share of the nominal capacity."""
 BEND = 1e-9
-"""Share of the largest current by which a row may leave the line through its neighbours."""
+"""Largest distance of a row from the line through its neighbours, as a share of the largest current, for the current to
+count as straight there."""
 
 
 @dataclass(frozen=True, eq=False)
 class PybammRun:
-    """voltage_v : (n,) at the times asked for.  seconds : of the processor, in the solver.  solution : PyBaMM's."""
+    """A PyBaMM simulation.  voltage_v : (n,) V at the requested times.  seconds : processor time of the solver.
+    solution : PyBaMM's own object."""
 
     voltage_v: Array
     seconds: float
@@ -56,9 +58,11 @@ class PybammRun:
 
 @dataclass(frozen=True, eq=False)
 class CrossCheck:
-    """Two models of one cell.  ours_v, pybamm_v : (n,) V.  rmse_mv, max_mv : of their difference.
+    """The comparison of two models of one cell.
 
-    left_out : what the cell has and neither of the two was given, since PyBaMM does not read it.
+    time_s : (n,) s.  ours_v, pybamm_v : (n,) V.  rmse_mv, max_mv : RMS and largest absolute difference of the two, mV.
+    solution : PyBaMM's own object.  left_out : names of parameters that were left out of both models, since PyBaMM does
+    not read them.
     """
 
     time_s: Array
@@ -72,7 +76,7 @@ class CrossCheck:
         return f"CrossCheck({extent(self.time_s)}, {self.rmse_mv:.3g} mV RMS, {self.max_mv:.3g} mV at most{without})"
 
     def to_frame(self) -> pd.DataFrame:
-        """Both voltages as a table, one row a sample."""
+        """Both voltages as a table, one row per sample."""
         import pandas as pd
 
         return pd.DataFrame({"time_s": self.time_s, "ours_v": self.ours_v, "pybamm_v": self.pybamm_v})
@@ -95,14 +99,14 @@ class CrossCheck:
 def cross_check(
     cell: Cell, time_s: Numbers, current_a: Numbers, soc0: float, model: PybammModel = "SPMe"
 ) -> CrossCheck:
-    """Simulate the cell with this package and with PyBaMM: "SPMe" holds "espm" against it, "DFN" holds "dfn".
+    """Simulate the cell with this package and with PyBaMM.
 
-    time_s : (n,) s, rising.  current_a : (n,) A, discharge positive, a straight line between rows.
-    soc0 : state of charge at the first row.
-    What PyBaMM does not read of a calibrated cell (films, rates over stoichiometry, double layers) is left out of both,
-    and named in the result.
-    Raises SimulationError where PyBaMM ends early or loses charge, DataError and InputError as `simulate`, for a single
-    row and for another model.
+    time_s : (n,) s, strictly increasing, n at least 2.  current_a : (n,) A, discharge positive, linear between rows.
+    soc0 : state of charge at the first row, 0 to 1.  model : "SPMe" is compared with "espm", "DFN" with "dfn".
+    Parameters of a calibrated cell that PyBaMM does not read (films, rates over stoichiometry, double layers) are left
+    out of both models, and named in the result.
+    Raises SimulationError where PyBaMM ends early or loses charge; DataError and InputError as `simulate`; DataError
+    for a single row, InputError for an unknown model.
     """
     check_choice("model", model, PybammModel)
     time, current = numbers(time_s, "time_s"), numbers(current_a, "current_a")
@@ -127,16 +131,15 @@ def pybamm_run(
     model: PybammModel = "SPMe",
     graded: bool = False,
 ) -> PybammRun:
-    """PyBaMM's model of a BPX content, and of the cell's contacts, under a current that is a straight line between
-    break points.
+    """PyBaMM's simulation of a BPX content, with the contact resistance of `cell`, under a piecewise linear current.
 
-    breaks_s, current_a : (k,) s and A, from the first to the last of time_s (n,) s.  mesh : points by dimension.
-    graded : the points in a particle stand closer towards its surface.
+    breaks_s, current_a : (k,) s and A, break points from the first to the last of time_s (n,) s.  mesh : number of
+    points by dimension.  graded : True for points in a particle that are closer towards its surface.
     """
     import pybamm
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of its parser and its solver, about what nobody here can change
+        warnings.simplefilter("ignore")  # from PyBaMM's parser and solver; nothing here can avoid them
         values = pybamm.ParameterValues.create_from_bpx_obj(copy.deepcopy(dict(content)))  # bpx fills it in
         values.update(_overrides(pybamm, cell, breaks_s, current_a, soc0))
         options, contacts = pybamm_contacts(cell)
@@ -191,7 +194,7 @@ def _require_whole(solution: Any, cell: Cell, breaks_s: Array, current_a: Array,
 
 
 def _bends(time: Array, current: Array) -> IntArray:
-    """Rows where the current is no straight line, with both ends."""
+    """Numbers of the rows at which the slope of the current changes, with the first and the last row."""
     slopes = np.diff(current) / np.diff(time)
     step = np.minimum(np.diff(time)[:-1], np.diff(time)[1:])
     bent = np.abs(np.diff(slopes)) * step > BEND * max(float(np.abs(current).max()), 1e-12)

@@ -403,7 +403,7 @@ def _of_band(record: Measurement, prediction: Prediction, model: HybridModel, me
         low, high = prediction.lower_v[banded], prediction.upper_v[banded]
         inside = _within(record.voltage_v[banded], low, high)
         said.append(
-            f"{record.name}: the {100 * prediction.nominal:.0f} % band holds {100 * np.mean(inside):.1f} % of the "
+            f"{record.name}: the {100 * prediction.nominal:g} % band holds {100 * np.mean(inside):.1f} % of the "
             f"measured voltage; it is {MV_PER_V * float(np.mean(high - low)):.1f} mV wide in the mean."
         )
         if measured:

@@ -34,9 +34,9 @@ def assumed_hold(time_s: Array) -> Hold:
 def hold_sentence(
     name: str, hold: Hold, declared: bool, option: str = "--hold {}", *, saved: bool = False
 ) -> str:
-    """What was taken, for a reader.
+    """A sentence on the hold that was used.
 
-    option : what takes it otherwise, {} for how.  saved : it is that of a saved model.
+    option : how a user sets another hold, with {} in its place.  saved : whether the hold is that of a saved model.
     """
     words = {"linear": "in straight lines between rows", "backward": "constant since the row before"}
     if declared:
@@ -47,12 +47,13 @@ def hold_sentence(
 
 
 def measured_on_case(temperature_degc: Array) -> bool:
-    """Was this column (n,) measured? One that never moves was stated: a chamber's, or what a cell was taken at."""
+    """True where this temperature column (n,) was measured. One that never changes was stated: a chamber's set point,
+    or an assumed temperature."""
     return bool(np.ptp(temperature_degc) > 0.0)
 
 
 def at_its_temperature(temperature_degc: Array) -> str:
-    """What a record with this column (n,) is taken at, for a reader."""
+    """A clause on the temperature at which a record with this column (n,) is simulated."""
     low, high = float(np.min(temperature_degc)), float(np.max(temperature_degc))
     if not measured_on_case(temperature_degc):
         return f"at {low:.4g} degC in every row, as its column states"
@@ -73,12 +74,12 @@ def _rows(column: Array) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """One continuous test of one cell; what is given as lists or pandas columns is kept as arrays of floats.
+    """One continuous test of one cell; lists and pandas columns are converted to arrays of floats.
 
     time_s, current_a, voltage_v : (n,) s (strictly increasing), A (discharge positive), V (NaN where it is unknown).
     temperature_degc : (n,) degC, or None where it was not measured.
     notes : what a reader dropped, mapped or resampled, one sentence each.
-    hold : how the current runs between rows, where it was declared; `hold_taken` is it, or what `assumed_hold` tells.
+    hold : declared course of the current between rows, or None; `hold_taken` falls back on `assumed_hold`.
     examined_digest : content hash of the rows that a reader examined; empty where none did.
     """
 
@@ -108,8 +109,8 @@ class Measurement:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        """Raises DataError, naming column and row, for columns that are no rows of numbers or of different lengths, and
-        for a hold that is none."""
+        """Raises DataError, naming column and row, for columns that are not numbers or differ in length, and for an
+        unknown hold."""
         if self.hold is not None and self.hold not in get_args(Hold):
             words = " or ".join(map(repr, get_args(Hold)))
             raise DataError(f"{self.name}: hold = {self.hold!r} is not known; give {words}, or leave it out.")
@@ -142,19 +143,19 @@ class Measurement:
 
     @property
     def charge_ah(self) -> float:
-        """Charge taken out over the record, its current in straight lines between rows."""
+        """Charge taken out over the record, Ah, with the current in straight lines between rows."""
         return float(np.trapezoid(self.current_a, self.time_s)) / SECONDS_PER_HOUR
 
     def discharged_ah(self, hold: Hold) -> Array:
-        """(n,) Ah taken out since the first row, less what was put in.
+        """(n,) Ah, charge taken out since the first row, minus the charge put in.
 
-        Exact for a current that runs as `hold` says: where rows are minutes apart, straight lines make a triangle of a
-        pulse.
+        Exact for a current that runs as `hold` says. This matters where rows are minutes apart: straight lines turn a
+        pulse into a triangle.
         """
         return np.concatenate([[0.0], np.cumsum(self.steps_as(hold))]) / SECONDS_PER_HOUR
 
     def steps_as(self, hold: Hold) -> Array:
-        """(n - 1,) A s taken out between rows, as `discharged_ah` sums them."""
+        """(n - 1,) A s, charge taken out between rows; `discharged_ah` is their sum."""
         mean = self.current_a[1:] if hold == "backward" else 0.5 * (self.current_a[1:] + self.current_a[:-1])
         return mean * np.diff(self.time_s)
 
@@ -163,7 +164,7 @@ class Measurement:
         return f"Measurement({self.name!r}, {extent(self.time_s)}{warm})"
 
     def to_frame(self) -> pd.DataFrame:
-        """The columns as a table, one row a sample; the temperature where it was measured."""
+        """The columns as a table, one row per sample; the temperature only where it was measured."""
         import pandas as pd
 
         columns = {
@@ -185,11 +186,12 @@ class Measurement:
 
     @property
     def was_examined(self) -> bool:
-        """Whether a reader examined these very rows: a part of them, or another current, tells what they did not."""
+        """True where a reader examined exactly these rows; a part of them, or a changed current, has to be examined
+        again."""
         return self.examined_digest == self.digest
 
     def held(self, hold: Hold | None) -> Measurement:
-        """The record with how its current was declared to run between rows."""
+        """The record with this hold as the declared one; None declares none."""
         return replace(self, hold=hold)
 
     def take(self, rows: slice | Array) -> Measurement:
@@ -214,7 +216,7 @@ class Spectrum:
     """One impedance spectrum of a cell at rest.
 
     frequency_hz : (n,) Hz.  z_ohm : (n,) ohm, the imaginary part negative where capacitive.
-    soc or discharged_ah (since full) : the state.  temperature_degc, voltage_v : None where not measured.
+    soc or discharged_ah (Ah since full) : the state of charge.  temperature_degc, voltage_v : None where not measured.
     """
 
     name: str

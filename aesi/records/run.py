@@ -1,4 +1,4 @@
-"""What a simulation gives back."""
+"""The result of a simulation."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One simulation: voltage and the internal states, a value a sample.
+    """One simulation: voltage and internal states, one value per sample.
 
     series : name -> (n,) array. Always there: c_sp, c_sn (surface, mol/m3), c_e0, c_eL (electrolyte at the
     negative and the positive current collector, mol/m3), soc, temperature_k (of the winding); effects add their own.
-    profiles : across the electrodes, where they were asked for: x_m (places,) from the negative collector, and by
-    sample and place (n, places): surface_stoichiometry, reaction_a_m2 of particle surface (delithiation positive),
-    electrolyte_mol_m3, and potential_v of the solid against the electrolyte.
+    profiles : name -> array across the electrodes; empty where they were not asked for. x_m (places,) is the distance
+    from the negative collector; (n, places) have surface_stoichiometry, reaction_a_m2 (per particle surface,
+    delithiation positive), electrolyte_mol_m3, and potential_v of the solid against the electrolyte.
     """
 
     time_s: Array
@@ -38,7 +38,7 @@ class Run:
         return f"Run({extent(self.time_s)}, {low:.3f} to {high:.3f} V, states {', '.join(self.series)})"
 
     def to_frame(self) -> pd.DataFrame:
-        """Time, current, voltage and states as a table, one row a sample."""
+        """Time, current, voltage and states as a table, one row per sample."""
         import pandas as pd
 
         columns = {"time_s": self.time_s, "current_a": self.current_a, "voltage_v": self.voltage_v}
@@ -53,7 +53,7 @@ class Run:
 
     @property
     def states(self) -> pd.DataFrame:
-        """The series as a table, one row a sample."""
+        """The series as a table, one row per sample."""
         import pandas as pd
 
         return pd.DataFrame(self.series)

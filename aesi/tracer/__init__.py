@@ -1,40 +1,44 @@
-"""The loop closed on measured data: competing hypotheses, selection, verdict.
+"""Which effect a declared model lacks: competing hypotheses are fitted to measured data, selected and judged.
 
-From `discover` to the verdict, in the order of the calls (each folder imports only those named after it here: report,
-decide, search, likelihood, case):
+From `discover` to the verdict, in the order of the calls. A folder imports only those that follow it in this list:
+report, decide, search, likelihood, case.
 
     case/records           measurements with their noise and initial state, thinned     -> PreparedRecord
-    case/trust             how far the cell's file is believed
-    case/problem           these, the cell, and what hypotheses may move                -> InverseProblem
-    decide/model_choice    single particle or porous electrode: with each that is tried
-    decide/evidence        searches at several trusts, judged, and the model written    -> Evidence
-      (decide/beside         the same beside records that are known to be good)
-      (decide/shared         what these have too, which is no difference)
+    case/trust             how far the values in the cell file are believed
+    case/problem           records, cell, and the parameters that hypotheses may move   -> InverseProblem
+    decide/model_choice    which model of the cell: single particle or porous electrode
+    decide/evidence        searches at several trusts, verdict, and the written model   -> Evidence
+      (decide/beside         the same, where good records are given for comparison)
+      (decide/shared         effects that the good records show too are no difference)
     search/forward         one search: effects grown, fitted, admitted, one by one      -> Path
     search/grown           which effects are grown on which hypotheses
-    likelihood/growth      one effect more on a hypothesis, the rest to first order     -> Grown
-    likelihood/fit         a hypothesis with the whole model                            -> FittedHypothesis
-    likelihood/gaussian    what either says of data that it has not seen                -> PredictiveScore
-    likelihood/surrogates  what chance says, which an effect has to exceed
-    decide/verdict         found, none or unknown, of a Path                            -> Verdict
-    decide/written         the model that is written where it is unknown                -> ModelState
-    report/                what is told of it                                           -> Discovery
+    likelihood/growth      adds one effect to a hypothesis, the rest to first order     -> Grown
+    likelihood/fit         fits a hypothesis with the whole model                       -> FittedHypothesis
+    likelihood/gaussian    log predictive density of left-out data for either           -> PredictiveScore
+    likelihood/surrogates  the gain by chance, which an effect has to exceed
+    decide/verdict         found, none or unknown, from a Path                          -> Verdict
+    decide/written         the model that is written where the verdict is unknown       -> ModelState
+    report/                the results as they are reported                             -> Discovery
 
 Words that mean one thing throughout:
 
-    hypothesis       the declared model and the effects, by id, that it has beside that
-    own parameter    of the declared model, moved by every hypothesis within a prior: what the file declares, and the
-                     initial state of each record
+    file             the cell file, where not said otherwise
+    hypothesis       the declared model with zero or more added effects, listed by id
+    own parameter    a parameter of the declared model: a value of the cell file, or the initial state of a record.
+                     Every hypothesis moves it within a prior
     trust            how far the declared parameters are believed: widths of the own priors, and size of the model error
-    good             of a record: nothing is sought in it, but in others what they have beside it (trust `beside`)
-    competing        of an effect that may be named; addable : to a hypothesis that has not named it
+    good             of a record: known to lack nothing. The other records are searched for what differs from it
+                     (trust `beside`)
+    competing        of an effect: a hypothesis may name it.  addable : competing, and not yet in the hypothesis
     owner            id of the effect that a parameter belongs to, with an ending where good records share it
-                     (`OF_ALL_RECORDS`); a word of its own for what belongs to a record (`OF_ONE_RECORD`)
-    x                coordinate of a parameter: from the centre of its prior, in standard deviations of it
+                     (`OF_ALL_RECORDS`); one of `OF_ONE_RECORD` for a parameter of a single record
+    x                coordinate of a parameter: distance from the centre of its prior, in prior standard deviations
     size             standard deviation of the model error, V
     block            rows that are left out together.  fold : blocks left out at once.  partition : folds of one kind
-    to say           log predictive density of what was left out, nats: `score.total`; a gain is a difference of two
-    beyond noise     root of a mean square less that of the white noise, V
+    to say           a hypothesis says n nats of data: n is the log predictive density of these data while they are left
+                     out, `score.total`.  gain : difference of two of these
+    to leave         a model leaves v of a record: v is the RMS of its residual there, V
+    beyond noise     root of (mean square of the residual less that of the white noise), V
 """
 
 from aesi.tracer.discovery import Discovery, discover

@@ -1,4 +1,4 @@
-"""Close the loop on one case: which effect does the declared model lack, and what does adding it bring?"""
+"""`discover`: find the effects that a declared model lacks, and by how much they lower the error."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ from aesi.tracer.search.archive import Archive, context_of
 
 @dataclass(frozen=True, eq=False)
 class TriedHypothesis:
-    """One hypothesis as it was tried.
+    """One hypothesis that was tried.
 
     effects : ids, in the order in which they were added.  trust : in the declared parameters, see `case.trust.Trust`.
-    gain_nats : what it says more of unseen data than its parent.  rmse_v : what it leaves of what was fitted.
-    delta_v : size of the model error at which it says most.  values : owner -> name -> value of what it moved.
-    simulations : spent on it.
+    gain_nats : gain in log predictive density of unseen data over its parent.  rmse_v : RMS residual on the fitted
+    rows, V.  delta_v : size of the model error at which its score is highest, V.  values : owner -> name -> value of
+    each moved parameter.  simulations : number spent on it.
     """
 
     effects: tuple[str, ...]
@@ -71,8 +71,8 @@ Progress = Callable[[TriedHypothesis], None]
 
 @dataclass(frozen=True, eq=False)
 class ResidualStructure:
-    """What a residual depends on (share of its variance by family of variables), and what a sparse correction could
-    explain of it."""
+    """shares : family of variables -> share of the residual's variance that it explains, 0 to 1.
+    yardstick : how much of the residual a sparse correction could explain."""
 
     shares: Mapping[str, float]
     yardstick: Yardstick
@@ -82,29 +82,29 @@ class ResidualStructure:
 class Discovery:
     """The outcome of one case.
 
-    Three models are told of: as declared, recalibrated (own parameters refitted, no effect), and after (what is
-    written: what was found, or what carries over best where nothing explains the data).
+    It compares three models. "before" is the declared one. "recalibrated" has its own parameters refitted and no
+    effect. "after" is the written one: with the effects that were found or, where nothing explains the data, the model
+    that carries over best.
 
-    cell, held, model_effects : the model after: a cell with all that a cell file can hold, the effects that its values
-    hold, and those that they cannot.
-    soc0, hold : of the first record: its state of charge at the first row, as fitted, in the windows of `cell`, and how
-    its current runs between rows.
-    written : the effects of the model after by id, with their parameters; not those of the verdict where these do
-    not carry over.  own : of the models recalibrated and after, the declared parameters that were open, and where they
-    ended.
-    candidates : each effect that was simulated, as it competed, best first.  files : errors by file and part.
-    noise_floor_v : root mean square of the records' white noise.  before, after : what the residuals of the models as
-    declared and after show.
-    effects : by id, all that may be tried or moved.  tried : ids of those that competed, none where none may be added.
-    experiments : (group of look-alikes, what would tell them apart).  choice : of the model of the cell.
-    not_adopted : why the written model has not what the verdict names, or is not the refit that errs less.
-    notes : what was assumed, and what a reader should know of the records and the search.
-    contradicted : whether what explains the data leaves more of the test part than a right explanation may.
-    warnings : that, records that contradict their own temperature, where the written model does worse than another one
-    on the test part or on what was fitted, and where the test part has no load.
-    other_temperature : names of the records, those that judge among them, that contradict their own, and that nothing
-    fitted at it explains.
-    seconds : spent.  simulations : of the hypotheses that were tried, without what judges them.
+    cell, held, model_effects : the written model: its cell, the effects that the cell's values contain, and the effects
+    that a cell file cannot hold.
+    soc0, hold : of the first record: fitted state of charge at the first row, in the stoichiometry windows of `cell`,
+    and how the current runs between rows.
+    written : effects of the written model by id, with their parameters; they differ from the verdict's where these do
+    not carry over.  own : model -> the declared parameters that were fitted, and their values.
+    candidates : each effect that was simulated, best first.  files : errors by file and part.
+    noise_floor_v : RMS of the records' white noise, V.  before, after : what the residuals of the declared and of the
+    written model depend on.
+    effects : by id, all that may be tried or moved.  tried : ids of those that competed, empty where none may be added.
+    experiments : (group of look-alikes, experiment that would tell them apart).  choice : which model of the cell.
+    not_adopted : why the written model lacks the effects of the verdict, or is not the refit with the smallest error.
+    notes : assumptions, and remarks on the records and the search.
+    contradicted : whether an explanation of the data leaves a larger error on the test part than a right one may.
+    warnings : sentences on that; on records that contradict their own temperature; on a written model that is worse
+    than another one, on the test part or on the fitted rows; and on a test part without load.
+    other_temperature : names of the records, tests included, that contradict their temperature and that no model
+    fitted at that temperature explains.
+    seconds : spent.  simulations : spent on the hypotheses that were tried, not on judging them.
     """
 
     cell: Cell
@@ -149,16 +149,18 @@ def discover(
     model: ModelName | None = None,
     good: Sequence[Measurement] = (),
 ) -> Discovery:
-    """Find what `cell` lacks to explain the measurements.
+    """Find the effects that the model of `cell` lacks to explain the measurements.
 
-    measurements : what may be looked at, less the last `holdout` share of each where no `tests` are given.
-    tests : files that choose nothing.  soc0 : state of charge at the first sample; None takes it from the
-    rest voltage.
-    effects : what may be tried.  given : effects that the declared model has already.  archive : a file that
-    keeps fits, so that an interrupted search resumes.  model : "espm" or "dfn" for every hypothesis; None takes the
-    porous electrode where it differs notably from the single particle.
-    good : records of the same cell that are known to be good. What is sought then is what the measurements have that
-    these have not.
+    measurements : records to fit. Without `tests`, the last `holdout` share (0 to 1, of the time) of each is kept back
+    for the test.  tests : records for the test only; nothing is fitted to them.  soc0 : state of charge at the first
+    sample; None reads it from the rest voltage.
+    max_effects : most effects that may be added.  seed : of the bootstrap intervals.
+    effects : those that may be tried, by id.  given : effects that the declared model has already.  archive : file that
+    stores fits, so that an interrupted search resumes.  progress : called with each hypothesis after it was tried.
+    model : "espm" or "dfn" for every hypothesis; None takes the porous electrode where it differs notably from the
+    single particle.
+    good : records of the same cell that are known to be good. The search then is for effects that act on the
+    measurements and not on these.
 
     Raises DataError where the data cannot decide anything or do not belong to the cell.
     """
@@ -206,9 +208,9 @@ def inverse_problem(
     model: ModelName = "espm",
     good: Sequence[Measurement] = (),
 ) -> InverseProblem:
-    """What `discover` searches; the arguments are its own.
+    """The problem that `discover` searches, from the same arguments.
 
-    Raises DataError where a record has too little to decide anything, and for the id of an effect that is taken.
+    Raises DataError where a record is too short or holds no load, and where an effect's id is reserved.
     """
     records = prepare_all(cell, measurements, soc0, holdout, given, good)
     for record in records:
@@ -224,7 +226,8 @@ def inverse_problem(
 
 
 def _own(effects: Mapping[str, Effect]) -> set[str]:
-    """Effects that restate declared parameters: to have them already does not keep them from being off again."""
+    """Ids of the effects that restate declared parameters. They may be tried even where they are given: a parameter
+    that was corrected once may still be off."""
     return {e.id for e in effects.values() if any(p.spread is not None for p in e.parameters.values())}
 
 
@@ -254,7 +257,7 @@ def _discovery_of(
     rng: np.random.Generator,
     seconds: float,
 ) -> Discovery:
-    """The finding.  rng : of the intervals.  simulations, seconds : spent on the search."""
+    """The outcome as reported.  rng : of the bootstrap intervals.  simulations, seconds : spent on the search."""
     problem, verdict = evidence.path.problem, evidence.verdict
     records, declared = problem.records, ModelState(problem)
     fitted = _fitted(evidence)
@@ -262,7 +265,9 @@ def _discovery_of(
     at_other = {records[k].name: other for k, other in others.items()} | of_unseen(fitted, tested)
     evidence = _without_fault(evidence, others)
     fits: States = {"before": declared, "recalibrated": evidence.recalibrated, "after": evidence.after}
-    states = {name: state.of_one_age() for name, state in fits.items()}  # errors are told of what is written
+    states = {
+        name: state.of_one_age() for name, state in fits.items()
+    }  # errors are those of the written models
     files = outcomes(records, states, tested, rng)
     inside, soc0 = evidence.after.settled()
     left = _structure_of(records, states["after"])
@@ -298,13 +303,14 @@ def _discovery_of(
 
 
 def _fitted(evidence: Evidence) -> ModelState:
-    """What explains the data; it is not always what is written, which has to run over the declared range."""
+    """The model that explains the data. The written one may be another, since that has to run over the declared
+    range."""
     unknown = evidence.verdict.word == "unknown"
     return evidence.after if unknown else ModelState.of(evidence.path.problem, evidence.path.chosen)
 
 
 def _without_fault(evidence: Evidence, others: Mapping[int, OtherTemperature]) -> Evidence:
-    """The evidence; the declared model is written where the fitted one makes up for a wrong temperature."""
+    """The evidence, with the declared model written in place of a fitted one that makes up for a wrong temperature."""
     fault = fitted_at_fault(evidence.after, others)
     if fault is None:
         return evidence

@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import NonNegativeInt, PositiveFloat, PositiveInt
 
-from aesi.bench.blind import LIMIT_S, chosen, judged, summary, table
+from aesi.bench.blind import LIMIT_S, chosen, judged, lost, summary, table
 from flows.benchmarks.cases import Cases, tracked
 from flows.benchmarks.page import write_between
 
@@ -51,7 +51,7 @@ def run(
     specs = chosen(cases, only, small, seed, every, after)
     judge = partial(judged, cells=cells, limit_s=limit_s)
     rows = []
-    for row in tracked(Cases("blind", seed, specs, judge, summary, SHOWN), workers, address):
+    for row in tracked(Cases("blind", seed, specs, judge, summary, lost, SHOWN), workers, address):
         rows.append(row)
         yield row
     if write is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from hashlib import sha256
@@ -12,6 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 from aesi import bench
 from aesi.bench import CaseRow
+from aesi.bench.limit import NOT_RUN
+from aesi.data.catalogue import locate
+from aesi.errors import DataError
 from aesi.numerics.files.source_digest import source_digest
 from aesi.numerics.files.whole import write_whole
 from aesi.pipeline.experiment.sections import TrackingConfig
@@ -33,7 +37,8 @@ class Cases:
     """What is judged and how.
 
     name : of the experiment in the tracking store.  judge : a specification -> its row, a function that a process
-    elsewhere can import (or a partial of one).  summary : rows -> the last line.
+    elsewhere can import (or a partial of one).  summary : rows -> the last line.  lost : a specification -> its row
+    where the system ended the process that judged it.
     shown : keys of a row that are parameters of its run; other numbers are metrics.
     """
 
@@ -42,6 +47,7 @@ class Cases:
     specs: Sequence[Any]
     judge: Callable[[Any], CaseRow]
     summary: Callable[[list[CaseRow]], CaseRow]
+    lost: Callable[[Any], CaseRow]
     shown: tuple[str, ...]
 
 
@@ -102,9 +108,19 @@ def judged_once(
     if known:
         Console().say(f"{case.name}: {path} is of another program, other settings or files; judged again.")
     row = judge(case)
-    if row.get("verdict") != "not run":
+    if row.get("verdict") != NOT_RUN:
         write_whole(path, json.dumps(of_this | {"row": row}))
     return row
+
+
+def of_sets(files: Iterable[tuple[str, str]]) -> Iterator[Path]:
+    """The files of data sets that can be had here.
+
+    files : data set, name of the file.
+    """
+    for data, name in files:
+        with suppress(DataError):
+            yield locate(data, name)
 
 
 def kept(folder: str) -> list[CaseRow]:
@@ -137,10 +153,10 @@ def _read(path: Path) -> dict[str, Any]:
 
 def _judged(cases: Cases, workers: int, address: str | None) -> Iterator[CaseRow]:
     if address is not None:
-        return on_dask(cases.judge, cases.specs, workers, address)
+        return on_dask(cases.judge, cases.specs, workers, address, cases.lost)
     if workers == 1:
         return map(cases.judge, cases.specs)
-    return in_processes(cases.judge, cases.specs, workers)
+    return in_processes(cases.judge, cases.specs, workers, cases.lost)
 
 
 def _track(tracker: Tracker, row: CaseRow, shown: tuple[str, ...]) -> None:

@@ -57,12 +57,12 @@ WATCHED = {
     ),
     "bands": Watch(("layout", "horizon_s", "method", "cells", "seed"), lower={"score_ratio": RESULT}),
     "blind": Watch(
-        ("summary", "cases"),
+        ("summary", "seed", "cases"),
         higher={"effect_exact_pct": RATE, "effect_grouped_pct": RATE, "stranger_unknown_pct": RATE},
         lower={"none_false_name_pct": RATE},
     ),
     "real": Watch(
-        ("summary", "cases"),
+        ("summary", "cases", "ran"),
         higher={"withheld_named_pct": RATE, "fault_named_pct": RATE, "control_silent_pct": RATE},
         lower={"after_worse_pct": RATE},
     ),
@@ -150,6 +150,17 @@ def regressions(entries: Sequence[Entry], lines: Iterable[Line]) -> list[str]:
             since = f"{entry.date}, {entry.commit[:7] or 'no commit'}"
             found += [f"{_name(line)}: {text} ({since})" for text in _worse(before, line)]
     return found
+
+
+def not_compared(entries: Sequence[Entry], lines: Iterable[Line]) -> list[str]:
+    """The benchmarks of which no watched figure has been recorded of the same case."""
+    known = latest(entries)
+    compared: dict[str, bool] = {}
+    for line in lines:
+        _, before = known.get(case_of(line), (None, {"bench": line["bench"]}))
+        met = bool(figures(before).keys() & figures(line).keys())
+        compared[line["bench"]] = compared.get(line["bench"], False) or met
+    return [bench for bench, met in compared.items() if not met]
 
 
 def _worse(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:

@@ -9,8 +9,8 @@ from typing import Any
 
 from pydantic import PositiveFloat, PositiveInt
 
-from aesi.bench.left_out import LIMIT_S, LeftOutCase, judged, plan, summary, table
-from flows.benchmarks.cases import Cases, judged_once, tracked
+from aesi.bench.left_out import LIMIT_S, LeftOutCase, judged, lost, plan, summary, table
+from flows.benchmarks.cases import Cases, judged_once, of_sets, tracked
 from flows.benchmarks.page import write_between
 
 SHOWN = ("cell", "record", "verdict", "effects", "error")
@@ -40,7 +40,7 @@ def run(
         keep=keep,
         files=partial(_files, cells=cells),
     )
-    for row in tracked(Cases("left_out", 0, plan(only), judge, summary, SHOWN), workers, address):
+    for row in tracked(Cases("left_out", 0, plan(only), judge, summary, lost, SHOWN), workers, address):
         rows.append(row)
         yield row
     if write is not None:
@@ -48,6 +48,10 @@ def run(
         write_between(write, BEGIN, END, table(sorted(rows[:-1], key=lambda row: order[row["case"]])))
 
 
-def _files(case: LeftOutCase, cells: str) -> tuple[Path, ...]:
-    """The file of a case's cell, where it lies in the folder of cell files."""
-    return () if case.set.cell is None else (Path(cells) / case.set.cell,)
+def _files(case: LeftOutCase, cells: str) -> Iterator[Path]:
+    """The file of a case's cell, and the records of its set."""
+    one = case.set
+    if one.cell is not None:
+        yield Path(cells) / one.cell
+    names = (*([] if one.cell else ["cell.bpx.json"]), *one.slow, *one.drives)
+    yield from of_sets((one.data, name) for name in names)

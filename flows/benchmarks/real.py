@@ -12,10 +12,10 @@ from typing import Any
 
 from pydantic import PositiveFloat, PositiveInt
 
-from aesi.bench.real import chosen, judged, summary, table, write_report
+from aesi.bench.real import chosen, judged, lost, summary, table, write_report
 from aesi.bench.real.case import RealCase
 from aesi.bench.real.judge import LIMIT_S
-from flows.benchmarks.cases import Cases, judged_once, tracked
+from flows.benchmarks.cases import Cases, judged_once, of_sets, tracked
 from flows.benchmarks.page import write_between
 
 SHOWN = ("group", "cell", "record", "put_in", "answer", "verdict", "effects", "source", "error")
@@ -53,7 +53,7 @@ def run(
         files=partial(_files, cells=cells),
     )
     rows = []
-    for row in tracked(Cases("real", 0, specs, judge, summary, SHOWN), workers, address):
+    for row in tracked(Cases("real", 0, specs, judge, summary, lost, SHOWN), workers, address):
         if row.get("summary"):
             if report:
                 write_report(Path(report), rows, row)
@@ -67,6 +67,16 @@ def run(
         write_between(write, *marks, table(sorted(rows, key=lambda row: order[row["case"]])))
 
 
-def _files(case: RealCase, cells: str) -> tuple[Path, ...]:
-    """The file of a case's cell, where it lies in the folder of cell files."""
-    return () if ":" in case.cell else (Path(cells) / case.cell,)
+def _files(case: RealCase, cells: str) -> Iterator[Path]:
+    """The file of a case's cell, its records and spectra."""
+    place, colon, file = case.cell.partition(":")
+    if not colon:
+        yield Path(cells) / case.cell
+    takes = [case.take, *case.good, *([] if case.against is None else [case.against])]
+    yield from of_sets(
+        [
+            *([(place, file)] if colon else []),
+            *((take.set, take.file) for take in takes),
+            *([] if case.spectra is None else [(case.take.set, case.spectra)]),
+        ]
+    )

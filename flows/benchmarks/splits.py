@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -18,12 +19,13 @@ from pydantic import PositiveFloat, PositiveInt
 from aesi.bench import CaseRow
 from aesi.bench.hybrid.split_figures import summary, table
 from aesi.bench.hybrid.splits import EXPERIMENTS, SplitCase, chosen_splits, judged
-from aesi.bench.limit import Stopwatch
-from aesi.errors import AesiError, FitError
+from aesi.bench.limit import LOST, NO_TIME, NOT_RUN, Stopwatch
+from aesi.errors import AesiError, DataError, FitError
 from aesi.pipeline.experiment.config import ExperimentConfig, overridden_key, read_experiment
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.load import Loaded
-from aesi.pipeline.experiment.sources import named_files
+from aesi.pipeline.experiment.sources import catalogue_files, check_had, named_files
+from flows.base.console import Console
 from flows.benchmarks.cases import Cases, judged_once, kept, tracked
 from flows.benchmarks.page import write_between
 
@@ -36,7 +38,7 @@ CHEAP = ("conformal.method=split", "conformal.compare=[]", "conformal.horizons_s
 QUICK_MODELS = ("ESPM", "ESPM, one resistor", "ESPM recalibrated", "AESI I", "AESI II")
 
 
-SHOWN = ("split", "cell", "seed", "development", "error")
+SHOWN = ("split", "cell", "seed", "development", "verdict", "error")
 TRACKED = ("mser_pct", "coverage_pct", "winkler_mv")
 """Figures of each model that are metrics of its run."""
 BEGIN, END = "<!-- table of aesi bench splits -->", "<!-- end of splits -->"
@@ -55,6 +57,12 @@ class SplitRun:
     def name(self) -> str:
         """Of the case."""
         return f"{self.split.name}, seed {self.seed}"
+
+    @property
+    def settings(self) -> list[str]:
+        """What is laid over the file for every split alike."""
+        own = ("seed", *map(overridden_key, self.split.overrides))
+        return [override for override in self.overrides if overridden_key(override) not in own]
 
     @property
     def config(self) -> ExperimentConfig:
@@ -87,7 +95,8 @@ def run(
     cells, a_cell, only, development : which splits.  models : which rows of Table 1.  overrides : laid over all files.
     workers, address : processes here, or a Dask scheduler.  write : a page whose part between the two marks becomes
     the table.  keep : a folder for what each split gave; one that is in it is not run again by the same program, as it
-    was asked, so that an interrupted run goes on, and the table is of all that the program has kept there.
+    was asked, so that an interrupted run goes on, and the table is of all that the program has kept there with these
+    settings, of whatever cells and seeds.
     """
     asked = {"a_cell": a_cell, "seeds": seeds, "candidates": candidates, "resamples": resamples, "dt_s": dt_s}
     standing = {"seeds": 3} if whole else QUICK
@@ -99,11 +108,20 @@ def run(
     ]
     rows = []
     judge = partial(judged_once, judge=_row, keep=keep, files=_files)
-    for row in tracked(Cases("splits", 0, runs, judge, summary, SHOWN), workers, address):
+    for row in tracked(Cases("splits", 0, runs, judge, summary, _lost, SHOWN), workers, address):
         rows.append(row)
         yield row
     if write is not None:
-        write_between(write, BEGIN, END, table(kept(keep) if keep else rows[:-1]))
+        write_between(write, BEGIN, END, table(_kept(keep, runs[0].settings) if keep else rows[:-1]))
+
+
+def _kept(folder: str, settings: Sequence[str]) -> list[CaseRow]:
+    """The rows that this program has kept there with these settings."""
+    rows = kept(folder)
+    other = [row["case"] for row in rows if row["settings"] != settings]
+    if other:
+        Console().say(f"{folder}: of other settings, and left out of the table: {'; '.join(other)}.")
+    return [row for row in rows if row["settings"] == settings]
 
 
 def over(laid: Sequence[str], overrides: Sequence[str]) -> tuple[str, ...]:
@@ -114,9 +132,12 @@ def over(laid: Sequence[str], overrides: Sequence[str]) -> tuple[str, ...]:
 
 
 def _files(run: SplitRun) -> Iterator[Path]:
-    """The file of its experiment, and those that this names."""
+    """The file of its experiment, those that this names, and the records and the cell of its data set."""
+    config = run.config
     yield Path(run.folder) / run.split.experiment
-    yield from named_files(run.config).values()
+    yield from named_files(config).values()
+    with suppress(DataError):
+        yield from catalogue_files(config)
 
 
 def _laid(case: SplitCase, seed: int, settings: Mapping[str, Any], models: Sequence[str]) -> tuple[str, ...]:
@@ -132,16 +153,13 @@ def _laid(case: SplitCase, seed: int, settings: Mapping[str, Any], models: Seque
 
 
 def _row(run: SplitRun) -> CaseRow:
-    """A split that fails says why; it counts as nothing gained over the declared model."""
+    """A split that fails says why; `verdict` is 'not run' where its data cannot be had."""
     spent = Stopwatch()
-    case = run.split
-    head = {
-        "case": run.name,
-        "split": case.name,
-        "cell": case.cell,
-        "seed": run.seed,
-        "development": case.development,
-    }
+    case, head = run.split, _head(run)
+    try:
+        check_had(run.config)
+    except DataError as error:
+        return head | {"verdict": NOT_RUN, "error": str(error), **spent.row}
     try:
         figures = _judged(case, run.config)
     except AesiError as error:
@@ -149,8 +167,26 @@ def _row(run: SplitRun) -> CaseRow:
     return head | figures | spent.row
 
 
+def _lost(run: SplitRun) -> CaseRow:
+    return _head(run) | {"error": LOST.error} | NO_TIME
+
+
+def _head(run: SplitRun) -> CaseRow:
+    return {
+        "case": run.name,
+        "split": run.split.name,
+        "cell": run.split.cell,
+        "seed": run.seed,
+        "development": run.split.development,
+        "settings": run.settings,
+    }
+
+
 def search_and_fit(config: ExperimentConfig) -> tuple[Loaded, Mapping[str, float], Sequence[Fitted]]:
-    """The stages of `aesi run`, untracked: what was loaded, validation MSER (per cent), the models of Table 1."""
+    """The stages of `aesi run`, untracked: what was loaded, validation MSER (per cent), the models of Table 1.
+
+    Raises DataError where the data cannot be had: what an experiment falls back to is no measurement of its cell.
+    """
     from aesi.pipeline.experiment.candidate import top_share
     from aesi.pipeline.experiment.fit import build_problem, final_models
     from aesi.pipeline.experiment.intervals.conformalise import conformalise
@@ -161,7 +197,7 @@ def search_and_fit(config: ExperimentConfig) -> tuple[Loaded, Mapping[str, float
     from flows.search.nsga2 import search
     from flows.search.study import settings_of
 
-    loaded = load(config)
+    loaded = load(config.model_copy(update={"fallback": None}))
     problem = build_problem(loaded, config)
     known = {}
     found = search(

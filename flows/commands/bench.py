@@ -28,7 +28,7 @@ def bench(
 ) -> None:
     """Time and check the project against its peers, in one run on this machine."""
     from flows.benchmarks import run
-    from flows.benchmarks.history import regressions
+    from flows.benchmarks.history import not_compared, regressions
 
     chosen = _chosen(name)
     keywords = dict(_pair(option) for option in given or [])
@@ -38,6 +38,11 @@ def bench(
         for line in run(each, **keywords):
             lines.append({"bench": each, **line})
             typer.echo(json.dumps(lines[-1]) if as_json else _plain(each, line))
+    apart = not_compared(history, lines) if compare else []
+    if apart:
+        typer.echo(
+            f"{compare} holds no figure of the same cases of {', '.join(apart)}: not compared.", err=True
+        )
     worse = regressions(history, lines)
     if worse:
         raise Regressed(f"worse than recorded: {'; '.join(worse)}.")

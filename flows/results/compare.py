@@ -12,6 +12,7 @@ from aesi.errors import InputError
 from aesi.pipeline.report.compare import ComparedRun, write_comparison
 from aesi.pipeline.written import COMPARISON, FINDING
 from flows.tracking.store import Store, beginning
+from flows.tracking.tracker import was_cut
 
 OF_THE_RESULT = ("chosen_candidate", "chosen_model")
 """Parameters that are what came of a run, not what was asked for."""
@@ -75,15 +76,19 @@ def _compared(store: Store, experiment: str, run: Any) -> ComparedRun:
 
 def _judged_on(params: Mapping[str, str]) -> str:
     """What tells the test rows of a run from another's: the step to which they were averaged; the digests of the
-    records, which are tracked behind those of the other roles; of a record that is cut, and of the virtual cell's, all
-    digests and which part tests."""
-    dt_s = params.get("data.dt_s")
-    digests = params.get("data_digest", "").split(", ")
-    tests = json.loads(params.get("data.test") or "[]")
-    if tests and len(digests) > len(tests):
-        return json.dumps([dt_s, sorted(digests[-len(tests) :])])
+    records, which are tracked behind those of the other roles; of a record that is cut, of the virtual cell's, and
+    where so many are named that the list is not tracked whole, all digests and which part tests."""
+    dt_s, asked, read = (
+        params.get("data.dt_s"),
+        params.get("data.test") or "[]",
+        params.get("data_digest", ""),
+    )
+    if not (was_cut(asked) or was_cut(read)):
+        digests, tests = read.split(", "), json.loads(asked)
+        if tests and len(digests) > len(tests):
+            return json.dumps([dt_s, sorted(digests[-len(tests) :])])
     return json.dumps(
-        [dt_s, digests, tests, *(params.get(f"data.repeats.{key}") for key in ("period_s", "test"))]
+        [dt_s, read, asked, *(params.get(f"data.repeats.{key}") for key in ("period_s", "test"))]
     )
 
 

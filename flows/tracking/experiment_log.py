@@ -187,7 +187,7 @@ def result_line(row: Mapping[str, Any]) -> str:
     if beyond is not None and isfinite(beyond):
         line += f", {reduced(beyond)} than recalibrated"
     if step:
-        line += f"; {step['coverage_pct']:.1f} % covered one step ahead at {step['nominal_pct']:.0f} %"
+        line += f"; {step['coverage_pct']:.1f} % covered one step ahead at {step['nominal_pct']:g} %"
     return f"{line}."
 
 

@@ -11,6 +11,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -23,6 +24,8 @@ from flows.tracking.provenance import source_tags
 from flows.tracking.store import KIND, Store, now_ms, without_login
 
 PARAMETER_LIMIT = 6000  # MLflow cuts longer ones off
+CUT = "… sha256 "
+"""What stands between the beginning of a longer parameter and the hash of all of it."""
 SAMPLE_S = 10.0
 """Time between two readings of memory and processor, s."""
 LOCAL_UI = "http://127.0.0.1:5000"
@@ -298,7 +301,15 @@ def _texts(values: Mapping[str, Any]) -> dict[str, str]:
 
 def _text(value: Any) -> str:
     text = value if isinstance(value, str) else json.dumps(value, default=str)
-    return text if len(text) <= PARAMETER_LIMIT else text[: PARAMETER_LIMIT - 1] + "…"
+    if len(text) <= PARAMETER_LIMIT:
+        return text
+    mark = f"{CUT}{sha256(text.encode()).hexdigest()[:16]}"  # by which two that begin alike are told apart
+    return text[: PARAMETER_LIMIT - len(mark)] + mark
+
+
+def was_cut(text: str) -> bool:
+    """Whether a tracked parameter is the beginning of a longer one alone."""
+    return len(text) == PARAMETER_LIMIT and CUT in text
 
 
 def _numbers(values: Mapping[str, float]) -> dict[str, float]:

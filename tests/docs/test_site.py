@@ -323,8 +323,8 @@ def test_the_medians_that_the_page_of_the_cells_begins_with_are_those_of_its_arc
     assert [chamber for chamber, *_ in said] == ["25", "10", "0", "-10", "-20"]
     for chamber, panasonic, hg2 in said:
         assert medians["panasonic_ncr18650pf", f"{chamber} degC"] == int(panasonic)
-        folder = "40" if chamber == "25" else chamber
-        assert medians["lg_18650hg2", f"{folder} degC"] == int(hg2)
+        if chamber != "25":  # five drives of another chamber: `test_counts.py` takes their median
+            assert medians["lg_18650hg2", f"{chamber} degC"] == int(hg2)
 
 
 @pytest.mark.parametrize(("name", "least"), [("limits.md", 25), ("index.md", 20)])

@@ -4,12 +4,15 @@ The cells are those of `virtual_drives`: a drive that repeats every 1,800 s at 1
 from what is declared, training on repeats 1, 3 and 5, free run on 2 and 4. Every setting sees the same cells; a
 search of `candidates` genomes picks by the losses of that setting, for the two ensembles and, with the same
 budget and ranges, for SINDy-C. The reduction of the squared error counts from zero up, so that one cell on which
-a model is useless weighs no more than one on which it is of no use; `tenth` is the tenth percentile over cells.
+a model is useless weighs no more than one on which it is of no use; `tenth` is the tenth percentile over cells. A
+cell on which no candidate of a setting survives counts as one without a reduction (`failed`), so that every setting is
+judged by the same cells.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -87,7 +90,8 @@ def _reached(split: Split, options: Options, candidates: int, sindy: bool) -> di
         return {}
     models: list[ErrorModel] = [*chosen.ensembles]
     if sindy:
-        models.append(tuned_sindy_c(problem, options.seed, candidates, POPULATION, space))
+        with suppress(FitError):  # none of its candidates survives
+            models.append(tuned_sindy_c(problem, options.seed, candidates, POPULATION, space))
     return {model.name: _reduction(model, split) for model in models}
 
 
@@ -98,11 +102,11 @@ def _reduction(model: ErrorModel, split: Split) -> float:
 
 
 def _summary(reached: Sequence[Mapping[str, float]]) -> dict[str, Any]:
-    line: dict[str, Any] = {}
+    line: dict[str, Any] = {"failed": sum(not cell for cell in reached)}
     for name in (*ENSEMBLES, "SINDy-C"):
-        values = np.array([cell[name] for cell in reached if name in cell])
-        if not len(values):
+        if not any(name in cell for cell in reached):
             continue
+        values = np.array([cell.get(name, 0.0) for cell in reached])
         key = name.lower().replace(" ", "_").replace("-", "_")
         line |= {
             f"{key}_mean_pct": round(float(np.maximum(values, 0.0).mean()), 2),

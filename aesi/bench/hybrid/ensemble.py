@@ -44,7 +44,7 @@ def run(
     n: PositiveInt = 88_200,
     candidates: PositiveInt = 20,
     resamples: PositiveInt = 100,
-    peer_models: NonNegativeInt = 2,
+    peer_models: PositiveInt = 2,
     seed: NonNegativeInt = 0,
     **_: Any,
 ) -> Iterator[dict[str, Any]]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from aesi.bench import CaseRow
 from aesi.bench.hybrid.splits import EXPERIMENTS, against
+from aesi.bench.limit import NOT_RUN
 from aesi.pipeline.experiment.physics_models import RECALIBRATED
 
 BEST = "AESI I"
@@ -25,36 +26,44 @@ TITLES = {
 def summary(rows: Sequence[CaseRow]) -> dict[str, Any]:
     """Means and worst cases by cell, of all splits and of those that judge alone.
 
+    A run (a split with one seed) that failed counts as nothing gained, 0 %, in every reduction of the squared error on
+    its own temperature, and in no other figure; one whose data cannot be had counts in none.
     best_in_hindsight : of whichever model errs least on each split, the recalibrated one among them: what a choice that
     knew the test could have taken off, and no choice from training drives can count on."""
+    ran = [row for row in rows if row.get("verdict") != NOT_RUN]
     return {
         "summary": True,
-        "splits": len(rows),
-        "failed": sum("error" in row for row in rows),
-        "all": {cell: _of(mine) for cell, mine in _by_cell(rows).items()},
+        "splits": len({row["split"] for row in ran}),
+        "runs": len(ran),
+        "not_run": [row["case"] for row in rows if row.get("verdict") == NOT_RUN],
+        "failed": sum("error" in row for row in ran),
+        "all": {cell: _of(mine) for cell, mine in _by_cell(ran).items()},
         "judging": {
-            cell: _of(mine) for cell, mine in _by_cell([r for r in rows if not r["development"]]).items()
+            cell: _of(mine) for cell, mine in _by_cell([r for r in ran if not r["development"]]).items()
         },
     }
 
 
 def _by_cell(rows: Sequence[CaseRow]) -> dict[str, list[CaseRow]]:
-    good = [row for row in rows if "error" not in row]
-    by_cell = {cell: [row for row in good if row["cell"] == cell] for cell in EXPERIMENTS}
-    return {cell: mine for cell, mine in by_cell.items() if mine} | ({"every cell": good} if good else {})
+    by_cell = {cell: [row for row in rows if row["cell"] == cell] for cell in EXPERIMENTS}
+    return {cell: mine for cell, mine in by_cell.items() if mine} | ({"every cell": [*rows]} if rows else {})
 
 
 def _of(rows: Sequence[CaseRow]) -> dict[str, Any]:
     """The figures of one cell: of each model, of the best in hindsight, and how far the validation figure is off."""
-    out: dict[str, Any] = {"splits": len(rows)}
-    home = [row["models"] for row in rows]
-    tests = [test for row in rows for test in (row["models"], *row.get("abroad", {}).values())]
+    good = [row for row in rows if "error" not in row]
+    out: dict[str, Any] = {"splits": len({row["split"] for row in rows}), "runs": len(rows)}
+    if not good:
+        return out
+    nothing = [0.0] * (len(rows) - len(good))
+    home = [row["models"] for row in good]
+    abroad = [test for row in good for test in row.get("abroad", {}).values()]
     for name in home[0]:
         mine = [models[name] for models in home if name in models]
-        gains = [against(test[name], test[RECALIBRATED]) for test in tests if RECALIBRATED in test]
         out[name] = (
-            _spread("mser_pct", [m["mser_pct"] for m in mine])
-            | _spread("mser_recalibrated_pct", gains)
+            _spread("mser_pct", [m["mser_pct"] for m in mine], nothing)
+            | _spread("mser_recalibrated_pct", _gains(name, home), nothing)
+            | _spread("abroad_mser_recalibrated_pct", _gains(name, abroad))
             | _of_bands(mine)
         )
     best = [
@@ -63,9 +72,9 @@ def _of(rows: Sequence[CaseRow]) -> dict[str, Any]:
         if RECALIBRATED in models
     ]
     if best:
-        out["best_in_hindsight"] = _spread("mser_recalibrated_pct", best)
+        out["best_in_hindsight"] = _spread("mser_recalibrated_pct", best, nothing)
     if BEST in home[0]:
-        gaps = [abs(r["validation_mser_pct"][BEST] - r["models"][BEST]["mser_pct"]) for r in rows]
+        gaps = [abs(r["validation_mser_pct"][BEST] - r["models"][BEST]["mser_pct"]) for r in good]
         out["validation_minus_test"] = {"median": float(np.median(gaps)), "worst": max(gaps)}
     return out
 
@@ -82,11 +91,17 @@ def _of_bands(models: Sequence[Mapping[str, Any]]) -> dict[str, float]:
     }
 
 
-def _spread(name: str, values: Sequence[float]) -> dict[str, float]:
-    """Mean and worst; nothing of no values."""
+def _gains(name: str, tests: Sequence[Mapping[str, Any]]) -> list[float]:
+    """Reduction by a model of what the recalibrated one leaves, per cent, of each test that has both."""
+    return [against(test[name], test[RECALIBRATED]) for test in tests if RECALIBRATED in test]
+
+
+def _spread(name: str, values: Sequence[float], failed: Sequence[float] = ()) -> dict[str, float]:
+    """Mean and worst, with what a failed run counts as; nothing of no values."""
     if not values:
         return {}
-    return {f"{name}_mean": float(np.mean(values)), f"{name}_worst": min(values)}
+    every = [*values, *failed]
+    return {f"{name}_mean": float(np.mean(every)), f"{name}_worst": min(every)}
 
 
 HEAD = [
@@ -103,15 +118,18 @@ EACH = [
 
 def table(rows: Sequence[CaseRow]) -> list[str]:
     """Lines of Markdown: a cell and a temperature a line, mean / worst split, each split by its mean over the seeds;
-    and folded away each split."""
-    good = [row for row in rows if "error" not in row]
+    and folded away each split. What failed counts as in `summary`, and is told below."""
+    ran = [row for row in rows if row.get("verdict") != NOT_RUN]
     lines, each = list(HEAD), list(EACH)
     for cell, title in TITLES.items():
-        splits = [_over_seeds(mine) for mine in _by("split", [r for r in good if r["cell"] == cell])]
-        lines += _summed(title, splits)
+        mine = list(_by("split", [row for row in ran if row["cell"] == cell]))
+        splits = [_over_seeds(runs) for runs in mine if not all("error" in run for run in runs)]
+        lines += _summed(title, splits, len(mine) - len(splits))
         for split in splits:
             each += _told(split)
-    failed = [f"{row['case']} failed: {row['error']}" for row in rows if "error" in row]
+    failed = [
+        f"{row['case']} {row.get('verdict', 'failed')}: {row['error']}" for row in rows if "error" in row
+    ]
     return [*lines, "", *failed, '??? note "Each split"', "", *(f"    {line}" for line in each)]
 
 
@@ -122,17 +140,18 @@ def _by(key: str, rows: Sequence[CaseRow]) -> Iterator[list[CaseRow]]:
 
 def _over_seeds(rows: Sequence[CaseRow]) -> dict[str, Any]:
     """`home` and what was tested `abroad`: model -> means of its figures, with `against` the recalibrated one."""
-    first = rows[0]
-    told = [row["validation_mser_pct"].get(BEST) for row in rows]
+    good = [row for row in rows if "error" not in row]
+    first, share = good[0], len(good) / len(rows)
+    told = [row["validation_mser_pct"].get(BEST) for row in good]
     return {
         "split": first["split"],
         "seeds": len(rows),
         "alone": first["cell"] in ("hg2", "panasonic"),
-        "home": _mean([row["models"] for row in rows]),
-        "abroad": {n: _mean([row["abroad"][n] for row in rows]) for n in first.get("abroad", {})},
+        "home": _mean([row["models"] for row in good], share),
+        "abroad": {n: _mean([row["abroad"][n] for row in good], share) for n in first.get("abroad", {})},
         "validation": float(np.mean(told)),
         "off": float(
-            np.mean([abs(v - r["models"][BEST]["mser_pct"]) for v, r in zip(told, rows, strict=True)])
+            np.mean([abs(v - r["models"][BEST]["mser_pct"]) for v, r in zip(told, good, strict=True)])
         ),
     }
 
@@ -140,7 +159,8 @@ def _over_seeds(rows: Sequence[CaseRow]) -> dict[str, Any]:
 FIGURES = ("mser_pct", "coverage_pct", "worst_drive_coverage_pct", "winkler_mv", "rows")
 
 
-def _mean(models: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, float]]:
+def _mean(models: Sequence[Mapping[str, Any]], share: float) -> dict[str, dict[str, float]]:
+    """share : of the runs that did not fail; the others gained nothing."""
     out = {
         name: {
             key: float(np.mean([m[name][key] for m in models])) for key in FIGURES if key in models[0][name]
@@ -148,24 +168,33 @@ def _mean(models: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, float]]:
         for name in models[0]
     }
     for name, figures in out.items():
-        figures["against"] = float(np.mean([against(m[name], m[RECALIBRATED]) for m in models]))
+        figures["mser_pct"] *= share
+        figures["against"] = share * float(np.mean(_gains(name, models)))
     return out
 
 
-def _summed(title: str, splits: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+def _summed(title: str, splits: Sequence[Mapping[str, Any]], failed: int) -> Iterator[str]:
+    """failed : splits of which no run came to an end."""
     if not splits:
         return
     off = [split["off"] for split in splits]
-    yield _line(title, splits, [s["home"] for s in splits], f"{np.median(off):.1f} / {max(off):.1f}")
-    for name in splits[0]["abroad"]:
-        yield _line(f"{title.split(',')[0]}, {name}", splits, [s["abroad"][name] for s in splits], "")
+    off_told = f"{np.median(off):.1f} / {max(off):.1f}"
+    yield _line(title, splits, [s["home"] for s in splits], failed, off_told)
+    for name in dict.fromkeys(name for split in splits for name in split["abroad"]):
+        there = [split for split in splits if name in split["abroad"]]
+        models = [split["abroad"][name] for split in there]
+        yield _line(f"{title.split(',')[0]}, {name}", there, models, failed, "")
 
 
 def _line(
-    title: str, splits: Sequence[Mapping[str, Any]], models: Sequence[Mapping[str, Any]], off: str
+    title: str,
+    splits: Sequence[Mapping[str, Any]],
+    models: Sequence[Mapping[str, Any]],
+    failed: int,
+    off: str,
 ) -> str:
     def spread(name: str, key: str) -> str:
-        values = [m[name][key] for m in models]
+        values = [*(m[name][key] for m in models), *[0.0] * failed]
         return f"{np.mean(values):.1f} / {min(values):.1f}"
 
     def pooled(name: str, key: str) -> float:
@@ -174,7 +203,7 @@ def _line(
     worst = min(m[BEST]["worst_drive_coverage_pct"] for m in models)
     cells = (
         title,
-        str(len(splits)),
+        str(len(splits) + failed),
         str(splits[0]["seeds"]),
         spread(RECALIBRATED, "mser_pct"),
         spread(BEST, "mser_pct"),

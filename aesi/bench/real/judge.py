@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from aesi.bench.detectable import seen_on_measured
-from aesi.bench.limit import NoAnswer, Stopwatch, answer_of
+from aesi.bench.limit import LOST, NO_TIME, NOT_RUN, NoAnswer, Stopwatch, answer_of
 from aesi.bench.real.answers import initial_state_row, scored
 from aesi.bench.real.beside import capacity_row, course_row, witness_row
 from aesi.bench.real.case import RealCase, Take
@@ -41,7 +41,40 @@ def judged(case: RealCase, cells: str, limit_s: float | None = LIMIT_S) -> dict[
     cells : folder of the cell files.  limit_s : processor seconds; a case that takes longer is a miss.
     """
     spent = Stopwatch()
-    row: dict[str, Any] = {
+    row = _asked(case)
+    try:
+        data = record(case.take)
+        declared = declared_cell(case.cell, cells)
+        known = _known(case, data, declared)
+        good = [record(take) for take in case.good]
+    except DataError as error:
+        return row | {"verdict": NOT_RUN, "error": str(error), **spent.row}
+    soc0 = case.soc0
+    if case.fault:
+        data = with_fault(data, case.fault.kind, case.fault.size)
+        declared = declared_with_fault(declared, case.fault.kind, case.fault.size)
+        soc0 = soc0_with_fault(soc0, case.fault.kind, case.fault.size)
+    held = 0.0 if good else HELD_OUT  # what a record has beside good ones is asked of all of it
+    found = answer_of(lambda: discover(declared, [data], soc0=soc0, holdout=held, good=good), limit_s)
+    if isinstance(found, NoAnswer):
+        answer = found.row | MISSED
+    else:
+        answer = _held_against(case, known, found, discovery_content(found), data, declared, soc0)
+    row |= answer | spent.row
+    return row | {"seen_nats": seen_on_measured(declared, data, soc0, case.answers, good, held)}
+
+
+def lost(case: RealCase) -> dict[str, Any]:
+    """The row of a case whose process the system ended: a miss. What there was to be seen is not known."""
+    return _asked(case) | LOST.row | MISSED | NO_TIME
+
+
+MISSED: dict[str, Any] = {"effects": [], "named": False}
+"""What a case scores that gave no answer."""
+
+
+def _asked(case: RealCase) -> dict[str, Any]:
+    return {
         "case": case.name,
         "group": case.group,
         "development": case.development,
@@ -55,25 +88,6 @@ def judged(case: RealCase, cells: str, limit_s: float | None = LIMIT_S) -> dict[
         "source": case.source,
         "matched": case.matched,
     }
-    try:
-        data = record(case.take)
-        declared = declared_cell(case.cell, cells)
-        known = _known(case, data, declared)
-        good = [record(take) for take in case.good]
-    except DataError as error:
-        return row | {"verdict": "not run", "error": str(error), **spent.row}
-    soc0 = case.soc0
-    if case.fault:
-        data = with_fault(data, case.fault.kind, case.fault.size)
-        declared = declared_with_fault(declared, case.fault.kind, case.fault.size)
-        soc0 = soc0_with_fault(soc0, case.fault.kind, case.fault.size)
-    held = 0.0 if good else HELD_OUT  # what a record has beside good ones is asked of all of it
-    found = answer_of(lambda: discover(declared, [data], soc0=soc0, holdout=held, good=good), limit_s)
-    if isinstance(found, NoAnswer):
-        return row | found.row | {"effects": [], "named": False} | spent.row
-    answer = _held_against(case, known, found, discovery_content(found), data, declared, soc0)
-    seen = seen_on_measured(declared, data, soc0, case.answers, good, held)
-    return row | answer | spent.row | {"seen_nats": seen}
 
 
 def declared_cell(name: str, cells: str) -> Cell:

@@ -10,7 +10,7 @@ import numpy as np
 
 from aesi.bench import CaseRow
 from aesi.bench.detectable import SEEN_NATS
-from aesi.bench.limit import NO_ANSWER
+from aesi.bench.limit import NO_ANSWER, NOT_RUN
 from aesi.bench.scoring import rate
 from aesi.tracer.decide.written import AS_GOOD
 
@@ -26,11 +26,11 @@ SOC0 = "wrong_soc0"
 
 def summary(rows: Sequence[CaseRow]) -> CaseRow:
     """Rates of all cases that ran; those of the cases that chose nothing stand under `reported`."""
-    ran = [r for r in rows if r["verdict"] != "not run"]
+    ran = [r for r in rows if r["verdict"] != NOT_RUN]
     return {
         "summary": True,
         "cases": len(rows),
-        "not_run": [r["case"] for r in rows if r["verdict"] == "not run"],
+        "not_run": [r["case"] for r in rows if r["verdict"] == NOT_RUN],
         **_rates(ran),
         "reported": _rates([r for r in ran if not r["development"]]),
         "confusion": _confusion(ran),

@@ -8,7 +8,7 @@ import numpy as np
 
 from aesi.bench import CaseRow
 from aesi.bench.detectable import SEEN_NATS
-from aesi.bench.limit import NO_ANSWER
+from aesi.bench.limit import NOT_RUN
 from aesi.bench.real.summary import SOC0
 
 NOUNS = {
@@ -23,12 +23,12 @@ STATES = ("before", "recalibrated", "after")
 
 
 def table(rows: Sequence[CaseRow]) -> list[str]:
-    """Lines of Markdown of the cases that ran.
+    """Lines of Markdown of the cases that ran, those without an answer among them, as misses.
 
     `named` counts right names, where no name is right that none was given; `could be`: of the cases with a right name,
     those of which that says more than `SEEN_NATS` of unseen data.
     """
-    ran = [row for row in rows if row["verdict"] not in ("not run", *NO_ANSWER)]
+    ran = [row for row in rows if row["verdict"] != NOT_RUN]
     return [*_by_kind(ran), "", '??? note "Each case"', "", *(f"    {line}" for line in _each(ran))]
 
 

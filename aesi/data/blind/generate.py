@@ -249,6 +249,14 @@ def _shifted(trace: TrueRun, added_v: Array) -> TrueRun:
     )
 
 
+def label_of(spec: CaseSpec) -> str:
+    """The label that the case of a specification will have."""
+    return _label(
+        [name for name in spec.recipes if name not in STRANGERS],
+        [name for name in spec.recipes if name in STRANGERS],
+    )[0]
+
+
 def _label(known: list[str], strange: list[str]) -> tuple[str, tuple[str, ...]]:
     if strange:
         return "unknown", tuple(dict.fromkeys(a for name in strange for a in STRANGERS[name].also))

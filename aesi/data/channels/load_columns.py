@@ -75,7 +75,7 @@ def _times(table: TableFile, mapped: Mapped, name: str) -> Array:
         row = int(wrong[0])
         raise DataError(
             f"{table.path.name}, {table.where(row)}: column {mapped.header[name]!r} holds {cells[row][:40]!r}, which "
-            f"is no time as {unit}; declare what it is: --unit {name}=s (or h, h:m:s, date, or a pattern such as "
+            f"is no time as {unit}; declare what it is: --unit {name}=s (or min, h, h:m:s, date, or a pattern such as "
             "'%d.%m.%Y %H:%M:%S')."
         )
     return seconds

@@ -103,9 +103,9 @@ def layout_of(text: str, encoding: str, *, whole: bool, name: str, wanted: Colle
         first_row = start + 1
     separator = _separator_at(lines, start)
     if start:
-        notes.append(
-            f"{start} lines before the {'table' if nameless is not None else 'header'} were passed over."
-        )
+        above = "1 line" if start == 1 else f"{start} lines"
+        of = "table" if nameless is not None else "header"
+        notes.append(f"{above} before the {of} {'was' if start == 1 else 'were'} passed over.")
     if heading is not None and heading.has_units:
         notes.append("The line of units below the header was read as such.")
     if encoding == "latin-1":
@@ -145,15 +145,17 @@ def _layer(above: Sequence[str], header: tuple[str, ...], below: Sequence[str], 
     """Empty cells that a row of this table begins with, below the names of other layers; 0 of a table by itself.
 
     Those names stand in the lines right above, each indented by one cell more, and the rows of such a layer have no
-    more cells than its names: a first column without a name, as of row numbers, is none of that.
+    more cells than its names: a first column without a name, as of row numbers, is none of that. Neware may write the
+    first row of a step into the line of its cycle, so that the cells of the layers between may follow.
     """
     layer = next((i for i, name in enumerate(header) if name), 0)
     names = [_extent(line, separator) for line in above[-layer:]] if layer else []
     if not layer or [first for first, _ in names] != list(range(layer)):
         return 0
+    ends = [last + sum(deeper for _, deeper in names[first + 1 :]) for first, last in names]
     rows = [_extent(line, separator) for line in below if line.strip()]
     others = [(first, last) for first, last in rows if first < layer]
-    return layer if others and all(last <= names[first][1] for first, last in others) else 0
+    return layer if others and all(last <= ends[first] for first, last in others) else 0
 
 
 def _extent(line: str, separator: str) -> tuple[int, int]:

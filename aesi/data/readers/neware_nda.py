@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from aesi.data.readers.formats import neware
 from aesi.data.readers.frame import FrameTable, of_mapping
 from aesi.errors import DataError
 from aesi.numerics.typing import AnyArray
@@ -31,7 +32,10 @@ def open_nda(path: Path) -> FrameTable:
         raise DataError(f"{path.name} cannot be read as a cycler's file: {reason[:200]}") from None
     columns = {str(name): frame[name].to_numpy() for name in frame.columns}
     notes = ["Read by batterydf, which converted its units and names to BDF."]
-    return of_mapping(path, _of_the_test(columns, notes), tuple(notes))
+    table = of_mapping(path, _of_the_test(columns, notes), tuple(notes))
+    # Its columns have BDF's names. Of a known export two rows may share a stamp.
+    table.format = neware.FORMAT
+    return table
 
 
 TEST_TIME, STEP, CYCLE = "Test Time / s", "Step Count / 1", "Cycle Count / 1"

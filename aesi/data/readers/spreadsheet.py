@@ -1,8 +1,9 @@
 """Excel workbooks (.xlsx), as Arbin and Neware write them, through openpyxl.
 
-The table is taken from the first sheet whose rows hold a heading (of known names, or else of any), and a note names
-further sheets with the same columns, as Arbin makes them of a long test; clock times and dates become text, so that
-they are read in the same way as from a text file.
+The table is taken from the first sheet whose rows hold a heading of known names, or else from the longest with any
+heading: cyclers write sheets of sums over steps and cycles before that of the records. A note names further sheets with
+the same columns, as Arbin makes them of a long test; clock times and dates become text, so that they are read in the
+same way as from a text file.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ LAST_YEAR_OF_CLOCKS = 1900
 
 
 def open_sheet(path: Path, wanted: Collection[str] = ()) -> FrameTable:
-    """The first sheet with a table of measurements.
+    """The sheet with the table of measurements.
 
     Raises DataError where openpyxl is missing, the file is no workbook, or no sheet has a heading.
     """
@@ -68,9 +69,11 @@ def _check_no_archive(path: Path) -> None:
 def _first_table(path: Path, book: Any, wanted: Collection[str]) -> FrameTable:
     heads = [(sheet, _head(sheet)) for sheet in book.worksheets]
     tables = _with_headings((sheet, find_heading(head, wanted)) for sheet, head in heads)
-    tables = tables or _with_headings(
-        (sheet, likely_heading(head[i : i + 3] for i in range(len(head)))) for sheet, head in heads
-    )
+    if not tables:
+        unknown = _with_headings(
+            (sheet, likely_heading(head[i : i + 3] for i in range(len(head)))) for sheet, head in heads
+        )
+        tables = sorted(unknown, key=lambda table: -(table[0].max_row or 0))
     if tables:
         sheet, heading = tables[0]
         alike = [repr(other.title) for other, its in tables[1:] if its.header == heading.header]

@@ -1,4 +1,4 @@
-"""What a cell is made of, as its file declares it: frozen, in SI units, hashable by value.
+"""The parameters of a cell, as its file declares them: frozen, in SI units, hashable by value.
 
 Sign convention of the whole package: current is positive on discharge.
 """
@@ -111,8 +111,8 @@ class Electrolyte:
 
 @dataclass(frozen=True)
 class Balance:
-    """All that a cell at rest depends on: the open-circuit potentials of its electrodes (V against Li/Li+), and the
-    stoichiometries (empty, full) of either."""
+    """The parameters of a cell at rest: open-circuit potentials of the electrodes (V against Li/Li+), and the
+    stoichiometry limits (empty, full) of each."""
 
     ocp_n: Relation
     ocp_p: Relation
@@ -130,7 +130,7 @@ class Balance:
         return self.ocp_p(theta_p) - self.ocp_n(theta_n)
 
     def rest_voltage_at(self, soc: float) -> float:
-        """V, one of `rest_voltage_v`."""
+        """V at the reference temperature, for a single state of charge."""
         theta_n, theta_p = self.stoichiometries(soc)
         return value_at(self.ocp_p, theta_p) - value_at(self.ocp_n, theta_n)
 
@@ -142,12 +142,12 @@ class CellParameters:
     electrode_area_m2 : of one electrode pair.
     density_kg_m3 to heat_transfer_w_m2_k : None where the file has no thermal data.
     thermal_conductivity_w_m_k : from the inside of the winding to the case, see `winding_resistance_k_w`.
-    initial_soc : as the file declares it, for other readers: a simulation is told its own start.
-    contact_resistance_ohm : in series with the whole cell; that of metal, the same at any temperature.
-    fitted_with : "espm" or "dfn", the model that the parameters were fitted with, where they were.
-    capacity_shares : (record, share of this capacity that the cell had then), of the records of that fit.
-    tested_on : (record, day of its test), of those that have one.  fitted_at_k : (record, its mean temperature).
-    unread : sentences on what the file declares and no simulation takes, as a hysteresis or a state of ageing.
+    initial_soc : as declared, for other programs; simulations take `soc0` instead.
+    contact_resistance_ohm : in series with the whole cell, of metal, independent of temperature.
+    fitted_with : "espm" or "dfn", the model that the parameters were fitted with; None where they were not fitted.
+    capacity_shares : (record, capacity of the cell then over the capacity in the file), for the records of that fit.
+    tested_on : (record, day of its test), where known.  fitted_at_k : (record, its mean temperature, K).
+    unread : sentences on declarations of the file that no simulation uses (a hysteresis, a state of ageing).
     """
 
     negative: Electrode
@@ -181,27 +181,38 @@ class CellParameters:
 
     @property
     def total_area_m2(self) -> float:
-        """Area of all electrode pairs."""
+        """Area of all electrode pairs, m2."""
         return self.electrode_area_m2 * self.electrode_pairs
 
     def electrode_capacity_ah(self, electrode: Electrode) -> float:
-        """Charge that takes an electrode from stoichiometry 0 to 1."""
+        """Charge between stoichiometry 0 and 1 of an electrode, Ah."""
         volume = self.total_area_m2 * electrode.thickness_m
         return FARADAY_C_MOL * electrode.active_fraction * volume * electrode.c_max_mol_m3 / SECONDS_PER_HOUR
 
     @property
     def capacity_ah(self) -> float:
-        """Charge between the stoichiometry limits of the negative electrode."""
+        """Charge between the stoichiometry limits of the negative electrode, Ah."""
         window = self.negative.theta_max - self.negative.theta_min
         return window * self.electrode_capacity_ah(self.negative)
 
     @property
-    def winding_resistance_k_w(self) -> float:
-        """By how much (K/W) the mean of the winding is warmer than its case; 0 where the file does not tell how it
-        conducts or how much heat it holds.
+    def contacts_and_films_ohm(self) -> float:
+        """Resistance of the contacts and of both electrodes' films over the whole cell, half charged and at the
+        reference temperature."""
+        half = self.stoichiometries(0.5)
+        ohm = self.contact_resistance_ohm
+        for electrode, theta in zip((self.negative, self.positive), half, strict=True):
+            surface_m2 = electrode.area_per_volume_1_m * electrode.thickness_m * self.total_area_m2
+            ohm += float(electrode.film_ohm_m2(np.array([theta]))[0]) / surface_m2
+        return ohm
 
-        Of a long cylinder that heats evenly, k its conductivity, V its volume and A its surface: (V/A)/(2 k A), by the
-        mean of q (r0^2 - r^2)/(4 k). A plate of the same V and A has two thirds of it.
+    @property
+    def winding_resistance_k_w(self) -> float:
+        """Thermal resistance between the mean of the winding and its case, K/W; 0 where the file declares no thermal
+        conductivity or no heat capacity.
+
+        For a long cylinder with uniform heat release, k its conductivity, V its volume and A its surface, it is
+        (V/A)/(2 k A), from the mean of q (r0^2 - r^2)/(4 k). A plate of the same V and A has two thirds of it.
         """
         k, surface, volume = self.thermal_conductivity_w_m_k, self.surface_area_m2, self.volume_m3
         if k is None or surface is None or volume is None or self.heat_capacity_j_k is None:
@@ -210,30 +221,31 @@ class CellParameters:
 
     @property
     def conductance_w_k(self) -> float | None:
-        """W/K from the winding to the surroundings, through the case; None where the file does not tell."""
+        """Thermal conductance from the winding through the case to the surroundings, W/K; None where the file does not
+        declare it."""
         if self.heat_transfer_w_m2_k is None or self.surface_area_m2 is None:
             return None
         outside = self.heat_transfer_w_m2_k * self.surface_area_m2
         return outside / (1.0 + outside * self.winding_resistance_k_w)
 
     def case_share(self, conductance_w_k: float) -> float:
-        """What its case is warmer than the surroundings by, over what the winding is, where the heat flows from this to
-        the surroundings through a conductance G (W/K) and on its way through the winding's resistance R: 1 - R G.
+        """Temperature rise of the case over that of the winding, both above the surroundings: 1 - R G.
 
-        1 where the file tells no R; nought or less of a conductance that is larger than the winding's own, 1/R.
+        conductance_w_k : G, W/K, from the winding to the surroundings; it includes the winding's resistance R.
+        Returns 1 where the file declares no R, and 0 or less where G exceeds the winding's own conductance 1/R.
         """
         return 1.0 - self.winding_resistance_k_w * conductance_w_k
 
     @property
     def heat_capacity_j_k(self) -> float | None:
-        """Density times specific heat times volume, or None where one of them is not declared."""
+        """Density times specific heat times volume, J/K; None where one of them is not declared."""
         if self.density_kg_m3 is None or self.specific_heat_j_kg_k is None or self.volume_m3 is None:
             return None
         return self.density_kg_m3 * self.specific_heat_j_kg_k * self.volume_m3
 
     @property
     def balance(self) -> Balance:
-        """Of the electrodes: what the cell is at rest."""
+        """The open-circuit potentials and stoichiometry limits of the cell."""
         n, p = self.negative, self.positive
         return Balance(n.ocp, p.ocp, (n.theta_min, n.theta_max), (p.theta_max, p.theta_min))
 
@@ -258,17 +270,19 @@ class CellParameters:
         return replace(self, electrolyte=replace(self.electrolyte, **changes))
 
     def with_soh(self, soh: Soh) -> Self:
-        """The cell at a state of health: this share of its capacity left, or that of a day, see `with_material`.
+        """The cell at a state of health, see `with_material`.
 
-        Raises CellError, as `checked_soh` and `soh_on` do.
+        soh : remaining share of the file's capacity, or a day, for the share of that day.
+        Raises CellError as `checked_soh` and `soh_on` do.
         """
         checked = checked_soh(soh)
         return self.with_material(self.soh_on(checked) if isinstance(checked, date) else checked)
 
     def soh_on(self, day: date) -> float:
-        """Share of its file's capacity that the cell had on a day, by the records that it was fitted to (`health`).
+        """Capacity of the cell on a day over the capacity in its file, from the records that it was fitted to
+        (`health`).
 
-        Raises CellError where none of these has a date, and for a day before the first or after the last of them.
+        Raises CellError where none of these records has a date, and for a day before the first or after the last one.
         """
         days, shares = shares_by_day(self.capacity_shares, dict(self.tested_on))
         if not days:
@@ -285,9 +299,8 @@ class CellParameters:
         return float(np.interp(at.toordinal(), [known.toordinal() for known in days], shares))
 
     def with_material(self, share: float) -> Self:
-        """The cell with this share of its active material and of the lithium in it, in both electrodes alike: the
-        stoichiometries of full and empty stay. What it had in the records that it was fitted to is of the new capacity
-        then."""
+        """The cell with this share of its active material and of the lithium in it, the same in both electrodes, so
+        that the stoichiometry limits stay. Its `capacity_shares` become relative to the new capacity."""
         n, p = self.negative, self.positive
         changed = self.with_negative(c_max_mol_m3=n.c_max_mol_m3 * share).with_positive(
             c_max_mol_m3=p.c_max_mol_m3 * share
@@ -298,7 +311,7 @@ class CellParameters:
 
 
 def require_positive(what: str, values: Mapping[str, float]) -> None:
-    """values : by field of the file.  Raises CellError for the first that is not a positive number."""
+    """Check the values of a part `what`, by field of the file.  Raises CellError for the first that is not positive."""
     for name, value in values.items():
         if not value > 0 or not np.isfinite(value):
             raise CellError(f"{what}: {name} = {value:g} has to be a positive number.")

@@ -11,7 +11,15 @@ from numba import njit
 
 from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K
 from aesi.physics.espm.electrode_kernels import local_conductivity, region_drops, solve_electrode
-from aesi.physics.espm.kernels import FASTMATH, compiled, lookup, open_circuit, parts_of, slot_of
+from aesi.physics.espm.kernels import (
+    FASTMATH,
+    compiled,
+    lookup,
+    open_circuit,
+    parts_of,
+    salt_at_separator,
+    slot_of,
+)
 from aesi.physics.espm.layout import StepEnd
 from aesi.physics.espm.transport_kernels import (
     arrhenius,
@@ -49,7 +57,7 @@ def run_general(  # type: ignore[no-untyped-def]
     rest_particles(theta0, current[0] / area, particles, electrolyte, memory, modes, dissolved)
     t_k, t_weights = temperature[0], -1.0
     watts, last_j, last_step = 0.0, current[0] / area, 0.0
-    fault_at, fault, driest, voltage = -1, 0, 1.0, 0.0
+    fault_at, fault, voltage = -1, 0, 0.0
     for k in range(time.shape[0]):
         whole = time[k] - time[k - 1] if k > 0 else 0.0
         parts = parts_of(whole, drive.substep, drive.most, drive.finer) if k > 0 else 1
@@ -67,7 +75,7 @@ def run_general(  # type: ignore[no-untyped-def]
                 diffuse(i0 / area, j1, dt, last_step, slot, particles, electrolyte, memory, modes, dissolved)
                 last_step = dt
             predict(memory, modes)
-            driest = observe_salt(
+            observe_salt(
                 dissolved.c,
                 electrolyte.c0,
                 electrolyte.gauss,
@@ -102,7 +110,7 @@ def run_general(  # type: ignore[no-untyped-def]
                     t_k = heated(start_k, mean_heat(watts, power, i0, i1), dt, heat, around_k)
                 watts = power
         out[0, k], out[7, k] = voltage, t_k
-        what = record_sample(k, driest, particles, memory, modes, dissolved.c, out)
+        what = record_sample(k, particles, memory, modes, dissolved.c, electrolyte.c0, out)
         if fault_at < 0 and what > 0:
             fault_at, fault = k, what
     return fault_at, fault
@@ -234,7 +242,7 @@ def surfaces_inside(particles, theta):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def record_sample(k, driest, particles, memory, modes, c, out):  # type: ignore[no-untyped-def]
+def record_sample(k, particles, memory, modes, c, c0, out):  # type: ignore[no-untyped-def]
     """Means of the electrodes, salt at the collectors, plated lithium; returns what left its range, 0 for nothing."""
     what = 0
     for row in range(1, 7):
@@ -247,4 +255,4 @@ def record_sample(k, driest, particles, memory, modes, c, out):  # type: ignore[
         what = 1 if not 0.0 <= out[1, k] <= 1.0 else 2
     out[3, k], out[4, k] = c[0], c[c.shape[0] - 1]
     out[8, k] = np.mean(memory.plated)
-    return what if what > 0 or driest > 0.0 else 3
+    return what if what > 0 or salt_at_separator(c, c0) > 0.0 else 3

@@ -88,6 +88,16 @@ def wet(salt):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", fastmath=FASTMATH)
+def salt_at_separator(c, c0):  # type: ignore[no-untyped-def]
+    """Salt where the electrodes meet the separator, over rest, of the electrode that has less there.
+
+    c : nodes of three equal layers that share their ends, mol/m3.
+    """
+    layer = (c.shape[0] - 1) // 3
+    return min(c[layer], c[2 * layer]) / c0
+
+
+@njit(inline="always", fastmath=FASTMATH)
 def step_weights(rate, dt):  # type: ignore[no-untyped-def]
     """exp(-rate dt), and the integrals over the step that weigh the input at its start and at its end."""
     z = rate * dt

@@ -17,6 +17,7 @@ from aesi.physics.espm.kernels import (
     mean_asinh,
     open_circuit,
     parts_of,
+    salt_at_separator,
     share_ahead,
     slot_of,
     step_weights,
@@ -51,13 +52,13 @@ def run_linear(time, current, backward, theta0, solid, salt, cell, memory, out):
             mean_p += solid.lump[1] * charge
             last_step = step_salt(i0, i1, dt, last_step, slot, cell, salt, memory)
         theta_n, theta_p = mean_n + above_n, mean_p + above_p
-        driest = salt_at_gauss_points(c, cell.c0, salt.gauss, memory.g)
+        salt_at_gauss_points(c, cell.c0, salt.gauss, memory.g)
         out[0, k] = voltage(i1, theta_n, theta_p, cell, salt, c, memory.g)
         out[1, k], out[2, k] = theta_n, theta_p
         out[3, k], out[4, k] = c[0], c[c.shape[0] - 1]
         out[5, k], out[6, k] = mean_n, mean_p
         if fault_at < 0:
-            fault = out_of_range(theta_n, theta_p, driest)
+            fault = out_of_range(theta_n, theta_p, salt_at_separator(c, cell.c0))
             if fault > 0:
                 fault_at = k
     return fault_at, fault
@@ -133,22 +134,15 @@ def step_salt(i0, i1, dt, last_step, slot, cell, salt, memory):  # type: ignore[
 
 @njit(inline="always", fastmath=FASTMATH)
 def salt_at_gauss_points(c, c0, gauss, g):  # type: ignore[no-untyped-def]
-    """g : (6,) salt over rest at the Gauss points of both electrodes, kept positive.
-
-    Returns the salt where they meet the separator, over rest, of the electrode that has less there, as it is.
-    """
+    """g : (6,) salt over rest at the Gauss points of both electrodes, kept positive."""
     nodes = c.shape[0]
     width = (nodes - 1) // 3 + 1
-    driest = min(c[width - 1], c[nodes - width]) / c0
     for i in range(6):
         first = 0 if i < 3 else nodes - width
         value = 0.0
         for j in range(width):
             value += gauss[i, first + j] * c[first + j]
-        g[i] = value / c0
-    for i in range(6):
-        g[i] = wet(g[i])
-    return driest
+        g[i] = wet(value / c0)
 
 
 @njit(inline="always", fastmath=FASTMATH)

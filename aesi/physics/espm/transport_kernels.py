@@ -146,24 +146,17 @@ def solid_forcing(mean, z, at, project, psi, nodes, force):  # type: ignore[no-u
 
 @njit(inline="always", fastmath=FASTMATH)
 def observe_salt(c, c0, gauss, salt, log_salt, region_salt):  # type: ignore[no-untyped-def]
-    """Salt at the Gauss points over rest, its mean logarithm and mean (mol/m3) in each region.
-
-    Returns the salt where they meet the separator, over rest, of the electrode that has less there.
-    """
+    """Salt at the Gauss points over rest, its mean logarithm and mean (mol/m3) in each region."""
     for i in range(gauss.shape[0]):
         g = 0.0
         for j in range(c.shape[0]):
             g += gauss[i, j] * c[j]
-        salt[i] = g / c0
-    regions, layer = log_salt.shape[0] // 2, (c.shape[0] - 1) // 3
-    driest = min(c[layer], c[2 * layer]) / c0
-    for i in range(gauss.shape[0]):
-        salt[i] = wet(salt[i])
+        salt[i] = wet(g / c0)
+    regions = log_salt.shape[0] // 2
     for r in range(2 * regions):
         g1, g2, g3 = salt[3 * r], salt[3 * r + 1], salt[3 * r + 2]
         log_salt[r] = (5.0 * math.log(g1 * g3) + 8.0 * math.log(g2)) / 18.0
         region_salt[r] = c0 * (5.0 * (g1 + g3) + 8.0 * g2) / 18.0
-    return driest
 
 
 @njit(inline="always", fastmath=FASTMATH)

@@ -1,4 +1,4 @@
-"""A rest voltage of a cell as a state of charge, by its open-circuit potentials, and what it is uncertain by."""
+"""State of charge from a rest voltage by the open-circuit potentials, with its standard deviation."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from aesi.physics.espm.plain import shifted_ocp
 from aesi.records import Measurement
 
 GIVEN_SD = 0.0005
-"""Standard deviation of a state of charge that the user gives, and the least of any."""
+"""Standard deviation of a state of charge that the user gives, and the smallest of any."""
 READING_V = 9e-3
-"""Standard deviation of the open-circuit voltage of a cell file, V: what calibrated and published files leave of a
+"""Standard deviation of the open-circuit voltage of a cell file, V: RMS error of calibrated and published files on a
 measured drive (geometric mean of eight development records of `aesi bench real`)."""
 GOOD_READING_V = 3e-3
-"""The same where the file's potentials are taken for those of the cell, since a fit of its records moves them, or tells
-what else is off: half of what a calibration leaves of a C/20 discharge."""
+"""The same, V, in a fit, which moves the potentials or finds other errors: half the RMS error of a calibration on a
+C/20 discharge."""
 CHARGED_V = 0.03
 """How far a full cell's voltage falls at rest: 6 to 30 mV in the charged records of four measured cells."""
 NEARLY_FULL, LINGERING_V = 0.98, 0.1
@@ -33,14 +33,14 @@ BEYOND_V = 0.05
 convention: with half or twice as much `aesi bench start --set cuts=16` refuses none of 48 rows, and what it is to
 refuse, cells of another chemistry, lies hundreds of millivolts off."""
 GRID = 4001
-"""States of charge at which potentials are looked up."""
+"""Number of states of charge in the table of open-circuit voltages."""
 
 
 def initial_soc(cell: Cell, voltage_v: float, kelvin: float | None = None) -> float:
-    """State of charge of a cell that rests at `voltage_v`: 1 of a full charge, else that of the open-circuit voltage.
+    """State of charge of a cell that rests at `voltage_v` (V): 1 for a full charge, else by the open-circuit voltage.
 
-    kelvin : K; None is the cell file's initial temperature.
-    Voltages up to `BEYOND_V` beyond full and empty belong to such a cell. Raises DataError outside, naming the range.
+    kelvin : temperature, K; None takes the cell file's initial temperature.
+    Voltages up to `BEYOND_V` beyond full and empty are accepted. Raises DataError outside, naming the range.
     """
     return OpenCircuit(cell, kelvin).soc_at_rest(voltage_v, voltage_v)
 
@@ -68,12 +68,12 @@ class OpenCircuit:
         return cls(cell, kelvin, record.name, potentials_v)
 
     def soc_at(self, voltage_v: float) -> float:
-        """State of charge of an open-circuit voltage, held at the ends of the range."""
+        """State of charge at an open-circuit voltage (V), clipped to the range of the cell."""
         return float(np.interp(voltage_v, self.ocv, self.soc))
 
     def soc_at_rest(self, terminal_v: float, ocv_v: float) -> float:
-        """State of charge of a resting cell: 1 of a full charge, by its terminals, else that of the open-circuit
-        voltage, which effects in series may keep apart from them.  Raises DataError as `reading` does."""
+        """State of charge of a resting cell: 1 for a full charge, judged by the terminal voltage, else that at the
+        open-circuit voltage; effects in series may make the two differ.  Raises DataError as `reading` does."""
         return 1.0 if self.charged(terminal_v) else self.reading(ocv_v, self.potentials_v)[0]
 
     def voltage_at(self, soc: float) -> float:
@@ -89,7 +89,8 @@ class OpenCircuit:
         return max(0.5 * abs(1.0 - self.soc_at(voltage_v)), self.reading(self.voltage_at(1.0), spread_v)[1])
 
     def charged(self, voltage_v: float, drop_v: float = 0.0) -> bool:
-        """Is this rest voltage that of a full charge?  drop_v : of it is the model's, which may be far too much."""
+        """True where this rest voltage (V) is that of a full charge.  drop_v : part of it that the model added for a
+        load, which may be far too much."""
         as_read = voltage_v - max(drop_v, 0.0)
         highest = max(float(self.ocv[-1]), self.cell.upper_voltage_v)
         return voltage_v >= self.charged_from_v and as_read <= highest + BEYOND_V
@@ -105,8 +106,8 @@ class OpenCircuit:
         return self.voltage_at(NEARLY_FULL) + LINGERING_V
 
     def reading(self, voltage_v: float, spread_v: float) -> tuple[float, float]:
-        """State of charge of an open-circuit voltage, and half of what the voltage +/- `spread_v` spans; beyond the
-        range, of what its end does with as much more as it is away.
+        """(state of charge at an open-circuit voltage, half the range that voltage +/- `spread_v` covers). Beyond full
+        and empty the range is that at the limit, with `spread_v` enlarged by the distance from it.
         """
         if not self.admits(voltage_v, spread_v):
             low, high = np.interp([0.0, 1.0], self.soc, self.ocv)
@@ -124,11 +125,11 @@ class OpenCircuit:
         return self.soc_at(voltage_v), sd
 
     def ends(self, voltage_v: float, spread_v: float) -> tuple[float, float]:
-        """States of charge of the voltage -+ two `spread_v`."""
+        """States of charge at voltage_v - 2 spread_v and at voltage_v + 2 spread_v."""
         return self.soc_at(voltage_v - 2.0 * spread_v), self.soc_at(voltage_v + 2.0 * spread_v)
 
     def admits(self, voltage_v: float, spread_v: float) -> bool:
-        """Is there a state of this cell that rests within two of the given deviations of the voltage?"""
+        """True where some state of this cell rests within 2 `spread_v` of the voltage."""
         low, high = np.interp([0.0, 1.0], self.soc, self.ocv)
         beyond = max(BEYOND_V, 2.0 * spread_v)
         return bool(low - beyond <= voltage_v <= high + beyond)

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import ndtr
 
+from aesi.numerics.typing import Array
 from aesi.physics.belongs import SOC_MARGIN
 from aesi.physics.start.state import InitialState
 from aesi.records import Hold, Measurement
@@ -27,7 +28,7 @@ def told_by_charge(read: InitialState, record: Measurement, hold: Hold, capacity
     """What was read under load, where no row of the record is further beyond empty or full than cells hold more than
     they are declared to; itself where that leaves it as it is, or contradicts it."""
     moved = record.discharged_ah(hold) / capacity_ah
-    ends = np.array([float(moved.max()) - SOC_MARGIN, 1.0 + SOC_MARGIN + float(moved.min())])
+    ends = _ends(moved)
     low, high = ((ends - read.soc) / read.sd).tolist()
     share = ndtr(high) - ndtr(low)
     if share < CONTRADICTED:
@@ -40,3 +41,16 @@ def told_by_charge(read: InitialState, record: Measurement, hold: Hold, capacity
         return read
     words = f"{read.sentence[:-1]}; as the record moves {np.ptp(moved):.3f} of the capacity, {soc:.3f} +/- {sd:.3f}."
     return replace(read, soc=soc, sd=sd, sentence=words, ends=None)
+
+
+def carried_from(soc: float, record: Measurement, hold: Hold, capacity_ah: float) -> bool:
+    """Whether no row of a record that begins at a state of charge is further beyond empty or full than cells hold more
+    than they are declared to."""
+    low, high = _ends(record.discharged_ah(hold) / capacity_ah)
+    return bool(low <= soc <= high)
+
+
+def _ends(moved: Array) -> Array:
+    """(2,) the least and the largest state of charge that a record may begin at which moves these shares (n,) of the
+    capacity."""
+    return np.array([float(moved.max()) - SOC_MARGIN, 1.0 + SOC_MARGIN + float(moved.min())])

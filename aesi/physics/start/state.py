@@ -1,4 +1,4 @@
-"""What is known of a record's first row."""
+"""The state of charge at a record's first row, with its uncertainty."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ Basis = Literal["given", "full charge", "rest", "load"]
 
 @dataclass(frozen=True)
 class InitialState:
-    """soc : state of charge at rest before the first row, by the declared windows.  sd : its standard deviation.
+    """The state of charge at the first row of a record.
 
-    basis : what it rests on.  sentence : the same for a reader, with the figures.  contradicted : True where a given
-    state of charge is far from that of the voltage.  rest_voltage_v : at which the cell rests there, as read.
-    doubt : how far the reading of the voltage is from what was given.  ends : states of charge that the voltage would
-    say two of its deviations lower and higher; on a flat potential far beyond soc -+ 2 sd.
-    doubted : True where a given one is further from that of the voltage than this is uncertain by, and not so far that
-    it is contradicted.
-    by_voltage : of a full charge alone, what the open-circuit potentials say of its rest voltage instead of 1.
+    soc : at rest before the first row, 0 to 1, in the declared stoichiometry windows.  sd : its standard deviation.
+    basis : its source.  sentence : source and figures, for a reader.  rest_voltage_v : V, at which the cell rests
+    there; None where it was given.  ends : states of charge at the voltage lowered and raised by two of its standard
+    deviations, or None; on a flat potential far beyond soc -+ 2 sd.
+    doubt : difference between a given state of charge and the one read from the voltage.  contradicted : True where
+    this difference is large.  doubted : True where it exceeds the uncertainty of the reading without being that large.
+    by_voltage : of a full charge alone, the state of charge by its rest voltage and the open-circuit potentials.
     """
 
     soc: float
@@ -34,16 +34,16 @@ class InitialState:
 
     @property
     def read_sd(self) -> float:
-        """Standard deviation of a state of charge that was read from a voltage; nought of one that was given, and of a
+        """Standard deviation of a state of charge that was read from a voltage; 0 for one that was given, and for a
         full charge, which is 1 by definition."""
         return self.sd if self.basis in ("rest", "load") else 0.0
 
     @property
     def against_voltage(self) -> bool:
-        """Was a state of charge taken as it was given, though the record's voltage contradicts it?"""
+        """True where a given state of charge was kept although the record's voltage contradicts it."""
         return self.contradicted and self.basis == "given"
 
     def off(self, soc: float) -> float:
-        """How far a state of charge is from all that the voltage may mean; 0 within."""
+        """Distance of a state of charge from the interval `ends`; 0 within it."""
         low, high = self.ends or (self.soc - 2.0 * self.sd, self.soc + 2.0 * self.sd)
         return max(low - soc, soc - high, 0.0)

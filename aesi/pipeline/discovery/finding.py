@@ -1,4 +1,4 @@
-"""The result of `aesi.discover`: the verdict, its figures as a table and a plot, and the model it leads to."""
+"""The result of `aesi.discover`: the verdict, its figures as a table and a plot, and the resulting model."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LABELS = {"before": "as declared", "recalibrated": "recalibrated", "after": "aft
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """The result of a discovery.  case : what was asked.  found : the tracer's answer, whole."""
+    """The result of a discovery.  case : the arguments of the call.  found : the full outcome of the tracer."""
 
     case: Case
     found: Discovery
@@ -52,18 +52,18 @@ class Finding:
 
     @property
     def reason(self) -> str:
-        """A sentence on what the verdict rests on."""
+        """The figures behind the verdict, in words."""
         return str(self.content["reason"])
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences on where the test part contradicts the verdict, or the written model does worse there than
-        another one."""
+        """Sentences where the test part contradicts the verdict, where a record contradicts its temperature, and where
+        the written model is worse than another one."""
         return tuple(self.content["warnings"])
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Sentences on what was assumed, and on what the reader did to the files."""
+        """Sentences on assumptions, and on changes that the reader made to the data."""
         return tuple(self.content["notes"])
 
     def rmse_mv(
@@ -71,9 +71,10 @@ class Finding:
         state: Literal["before", "recalibrated", "after"] = "after",
         part: Literal["fit", "test"] = "test",
     ) -> float:
-        """RMS voltage error, mV: as declared, recalibrated, or with what was found; NaN where there is no such part.
+        """RMS voltage error of a model, mV; NaN where there is no such part.
 
-        part : "test", which chose nothing, or "fit", which was fitted.
+        state : "before", the declared model; "recalibrated"; or "after", the written model.
+        part : "test", to which nothing was fitted, or "fit".
         """
         return float(self.content[state][part].get("rmse_mv", float("nan")))
 
@@ -84,11 +85,11 @@ class Finding:
 
     @cached_property
     def model(self) -> HybridModel:
-        """The cell with what was found, for `predict` and `save`."""
+        """The written model, with the effects that were found, for `predict` and `save`."""
         return found_model(self.found)
 
     def to_frame(self) -> pd.DataFrame:
-        """The candidates, best first: one row a parameter, with its 90 % interval."""
+        """The candidates, best first: one row per parameter, with its 90 % interval."""
         import pandas as pd
 
         rows = []
@@ -100,7 +101,7 @@ class Finding:
         return pd.DataFrame(rows, columns=list(columns))
 
     def plot(self, part: Literal["fit", "test"] = "test") -> Figure:
-        """Measured voltage, current, and the residual in each state of the model, over time: a plotly figure."""
+        """Measured voltage, current, and the residual of each model over time: a plotly figure."""
         from aesi.pipeline.report.plots.records import residual_figure
 
         traces = view(self.found, self.content, "").of(part)

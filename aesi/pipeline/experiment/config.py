@@ -19,6 +19,7 @@ from pydantic import BaseModel, Field, ValidationError, field_validator, model_v
 
 from aesi.errors import ConfigError, wanted
 from aesi.pipeline.experiment.sections import (
+    SHORT_FOR,
     CellConfig,
     ConformalConfig,
     DataConfig,
@@ -222,6 +223,8 @@ def _override(content: dict[str, Any], override: str) -> None:
         raise ConfigError(f"--set {override}: {text!r} is not a YAML value.") from None
     for depth, part in enumerate(parts[:-1]):
         child = content.setdefault(part, {})
+        if isinstance(child, str) and part in SHORT_FOR:
+            child = content[part] = {SHORT_FOR[part]: child}
         if not isinstance(child, dict):
             raise ConfigError(f"--set {override}: {'.'.join(parts[: depth + 1])} is a value and has no keys.")
         content = child

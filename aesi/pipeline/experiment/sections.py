@@ -27,6 +27,8 @@ Share = Annotated[float, Field(gt=0, lt=1)]
 Positive = Annotated[float, Field(gt=0)]
 Weight = Annotated[float, Field(ge=0)]
 Count = Annotated[int, Field(ge=1)]
+SHORT_FOR = {"cell": "bpx"}
+"""Section that may be a text alone, in a file or below `fallback` -> the key that the text is the value of."""
 
 
 class Section(BaseModel):
@@ -202,7 +204,7 @@ class CellConfig(Section):
     @classmethod
     def _path_alone(cls, value: object) -> object:
         """`cell: found/model` is short for `cell: {bpx: found/model}`."""
-        return {"bpx": value} if isinstance(value, str) else value
+        return {SHORT_FOR["cell"]: value} if isinstance(value, str) else value
 
 
 class LibraryConfig(Section):

@@ -1,7 +1,7 @@
-"""The product: ESPM, the effects added to it, the sparse correction of what is left, and prediction bands.
+"""The hybrid model: physics with added effects, a sparse correction of the remaining error, and prediction bands.
 
-A record is brought to the step of the correction, predicted there in free run or one step ahead, and brought
-back to its own rows. How a model is kept on disk: `aesi.pipeline.product.model_folder`.
+A record is resampled to the step of the correction, predicted there in free run or one step ahead, and interpolated
+back to its own rows. The files of a saved model: `aesi.pipeline.product.model_folder`.
 """
 
 from __future__ import annotations
@@ -39,18 +39,21 @@ from aesi.records.steps import after_gap, next_stamp
 from aesi.sparse import SparseModel
 
 END_BEFORE = ", or end the record before that (--to-s on the command line)."
-"""End of a sentence on a record that runs out: a correction and bands say nothing of a cell that has run out."""
+"""End of a sentence on a record in which the cell runs out: correction and bands are meaningless from there on."""
 
 
 @dataclass(frozen=True, eq=False)
 class HybridModel:
-    """Physics + effects + correction + intervals; the last two may be absent.
+    """A physics model with effects, a correction of its voltage error and prediction intervals.
 
+    effects : active effects in addition to the cell.  correction : sparse model of the error, or None.
+    intervals : intervals one step ahead, or None.  bands : bands of a free run, or None.
+    dt_s : step of correction and bands, s; records with other steps are resampled to it and back.
+    hold : how the current runs between rows.  soc0 : default state of charge at the first row, or None.
     model : of the physics, "espm" or "dfn".
-    dt_s : s, the step of the correction and of the bands; records sampled otherwise are brought to it and back.
-    held : effects that values of the cell hold, in words; `effects` are those that act beside it.
-    beside : ids of those of both that were fitted beside what was found, and are no finding.
-    finding : what it was found to be worth on records that chose nothing, in words; '' where that is not known.
+    held : effects that are contained in values of the cell, in words.  beside : ids of effects, held or active, that
+    were fitted together with the found ones and are no finding themselves.
+    finding : its errors on test records, in words; '' where they are not known.
     """
 
     cell: Cell
@@ -67,7 +70,7 @@ class HybridModel:
     finding: str = ""
 
     def __post_init__(self) -> None:
-        """Raises InputError for what is no Cell, no effects, no step, no hold, no state of charge or no model."""
+        """Raises InputError for a wrong cell, effects, step, hold, state of charge or model."""
         check_cell(self.cell)
         object.__setattr__(self, "effects", checked_effects(self.effects))
         step: object = self.dt_s  # a file may hold anything
@@ -84,12 +87,12 @@ class HybridModel:
         return f"HybridModel({', '.join(parts)})"
 
     def with_soh(self, soh: Soh | None) -> Self:
-        """A copy with the cell at a state of health, see `Cell.with_soh`; as it is for None."""
+        """A copy with the cell at a state of health, see `Cell.with_soh`; unchanged for None."""
         return self if soh is None else replace(self, cell=self.cell.with_soh(soh))
 
     @property
     def visited(self) -> Visited | None:
-        """The charges and temperatures that the correction was trained on, where they are known."""
+        """The states of charge and temperatures that the correction was trained on; None where they are not known."""
         return trained_on(self.correction, self.bands)
 
     def predict(
@@ -104,20 +107,19 @@ class HybridModel:
     ) -> Prediction:
         """Voltage under a current, with its band.
 
-        time_s, current_a : (n,) s, A (discharge positive).  voltage_v : (n,) V measured: one step ahead, each
-        sample predicted from those before it, the first by the physics alone and without a band; None: free run. Rows
-        denser than the model's step are predicted from the mean of those in the step before; the band is of single
-        rows.
-        error0_v : V, measured minus physics at the first sample, that a free run begins with. Where it is not known
-        (None), it begins with what the inputs give, and the band is that of a whole drive from the first sample on. One
-        step ahead it has no use.
-        soc0 : state of charge at the first sample; None takes it from the first measured voltage at rest, else
+        time_s, current_a : (n,) s, A (discharge positive).
+        voltage_v : (n,) V, measured, for predictions one step ahead: each sample is predicted from those before it, the
+        first by the physics alone and without a band. Rows denser than the model's step are predicted from the mean of
+        those in the step before; the band holds for single rows. None for a free run.
+        error0_v : initial error of a free run, V, measured minus physics at the first sample. None takes the error that
+        the inputs give, with the band of a whole drive from the first sample on. Ignored one step ahead.
+        soc0 : state of charge at the first sample, 0 to 1; None takes it from the first measured voltage at rest, else
         the model's own.  temperature_degc : as in `simulate`.
-        soc0_sd : how far soc0 may be off, one standard deviation, by which the band of a free run is wider: nought
-        takes it as exact, and a band around a start that is not covers next to nothing.
+        soc0_sd : standard deviation of soc0, which widens the band of a free run. 0 takes soc0 as exact; if it is not,
+        the band covers almost nothing.
 
-        Raises DataError where the record cannot be simulated, its first voltage is no such cell's, soc0 is unknown, or
-        one step ahead is asked for of rows that are further apart than the correction's step.
+        Raises DataError where the record cannot be simulated, where its first voltage does not belong to this cell,
+        where soc0 is unknown, and, one step ahead, for rows further apart than the correction's step.
         """
         free = voltage_v is None
         measured = np.full(np.shape(time_s), np.nan) if free else numbers(voltage_v, "voltage_v")
@@ -134,15 +136,14 @@ class HybridModel:
         error0_v: float | None = None,
         soc0_sd: float = 0.0,
     ) -> Prediction:
-        """`predict` of a record, under its name: one step ahead of its voltage, or in free run, which sees none after
-        the first.
+        """`predict` for a record: one step ahead of its voltage, or in free run, which uses only the first voltage.
 
-        error0_v : that a free run begins with; None takes it from the first voltage, as an experiment does that judges
-        a model, or where that is missing as `predict` does.
-        soc0 : None reads it, with what it is uncertain by, from the voltage that the record begins with, also for a
-        free run; where it has none it is the model's own.
-        soc0_sd : standard deviation of a soc0 that is not read, by what it is worth the band of a free run is wider.
-        Raises InputError for one that is no number from 0 to 1, and for an error0_v that is not finite.
+        error0_v : initial error of a free run, V; None takes it from the first voltage, as in the test of an
+        experiment, or as `predict` does where that voltage is missing.
+        soc0 : None reads it with its standard deviation from the voltage at the start of the record, also for a free
+        run; without a voltage it is the model's own.
+        soc0_sd : standard deviation of a soc0 that is not read from the voltage; it widens the band of a free run.
+        Raises InputError for a soc0_sd outside 0 to 1, and for an error0_v that is not finite; else as `predict`.
         """
         if error0_v is not None and not np.isfinite(error0_v):
             raise InputError(f"error0_v = {error0_v!r} is no voltage; give volts, or leave it out.")
@@ -221,8 +222,8 @@ class HybridModel:
             )
 
     def _begins(self, record: Measurement, soc0_sd: float) -> tuple[float, float]:
-        """State of charge at the first row and its standard deviation, by its voltage; the model's own without one, and
-        the deviation that was given."""
+        """(state of charge at the first row, its standard deviation), from its voltage; without a voltage the model's
+        own, and `soc0_sd`."""
         if np.isfinite(record.voltage_v[:1]).any():
             read = initial_state(self.cell, record, None, self.hold, self.effects, model=self.model)
             return read.soc, read.read_sd
@@ -240,16 +241,16 @@ class HybridModel:
             )
 
     def after_gap(self, time_s: Array) -> BoolArray:
-        """(n,) True for a row with none a step before it, so that it is predicted from further back.
+        """(n,) True for a row after a gap: no row lies one step before it, so that it is predicted from further back.
 
-        time_s : (n,) s, of the rows.
+        time_s : (n,) s of the rows.
         """
         if self.correction is None:
             return np.zeros(len(time_s), dtype=bool)
         return after_gap(time_s, self.dt_s)
 
     def _even(self, record: Measurement) -> Measurement:
-        """The record at the step of correction and bands, or itself where that is nothing to do."""
+        """The record resampled to the step of correction and bands; itself where it has that step, or none is used."""
         stepping = self.correction is not None or self.bands is not None
         if not stepping or is_even(record.time_s, self.dt_s):
             return record
@@ -281,8 +282,8 @@ class HybridModel:
     def _with_slopes(
         self, series: ErrorSeries, record: Measurement, soc0: float, soc0_sd: float
     ) -> ErrorSeries:
-        """The series with the slopes that the band needs of the physics: a simulation for each parameter left open,
-        and one for the start."""
+        """The series with the sensitivities of the physics that the band needs: one simulation for each uncertain
+        parameter, and one for the initial state."""
         if self.bands is not None and soc0_sd > 0.0:
             series = replace(series, start_v=self.start_worth_v(record, soc0, soc0_sd, series.model_v))
         if self.bands is None or self.bands.root is None:
@@ -291,7 +292,7 @@ class HybridModel:
         return replace(series, slopes_v=slopes)
 
     def start_worth_v(self, record: Measurement, soc0: float, soc0_sd: float, physics_v: Array) -> Array:
-        """(n,) V, >= 0, how far the physics_v (n,) of the record moves where it starts `soc0_sd` off soc0; see
+        """(n,) V, >= 0, change of the record's physics_v (n,) where it starts `soc0_sd` away from soc0; see
         `start_v`."""
         physics = PhysicsStart(self.cell, self.cell, self.effects, model=self.model)
         return start_v(physics, record, soc0, soc0_sd, self.hold, physics_v)
@@ -312,7 +313,8 @@ class HybridModel:
         return Prediction.of(series, run.error_v, low, high, run.outside, weight, alpha)
 
     def _one_step(self, series: ErrorSeries) -> Prediction:
-        """Of the record's own rows, each as the last one of its step, a step before which it, too, is not known."""
+        """Prediction of the record's own rows. Each counts as the last row of its step, of which no earlier row is
+        known."""
         own = series if series.own is None else series.own
         if self.correction is None:
             n = len(own)
@@ -336,7 +338,7 @@ class HybridModel:
 
 
 def _back(prediction: Prediction, own: ErrorSeries) -> Prediction:
-    """Of a free run, onto a record's own rows: the physics simulated there (`own`), the correction and its band
+    """A free run on the record's own rows: the physics is simulated there (`own`), correction and band are
     interpolated."""
 
     def onto(values: Array) -> Array:
@@ -358,11 +360,11 @@ def _back(prediction: Prediction, own: ErrorSeries) -> Prediction:
 
 @contextmanager
 def _as_saved(file: Path) -> Iterator[None]:
-    """A sentence, naming the file, on what is wrong with the content of a file of a model."""
+    """Turns errors in the content of a model's file into an InputError that names the file."""
     try:
         yield
     except CellError:
-        raise  # which names its own
+        raise  # its sentence names the file
     except InputError as error:
         raise InputError(f"{file}: {error}") from None
     except KeyError as error:

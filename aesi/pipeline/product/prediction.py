@@ -1,4 +1,4 @@
-"""What a hybrid model says about a record: the voltage, its band, and the physics it rests on."""
+"""The prediction of a hybrid model for a record: voltage, band, and the physics behind it."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """A predicted voltage with its band, a value a sample.
+    """A predicted voltage with its band, one value per sample.
 
-    voltage_v, lower_v, upper_v : (n,) V; the bounds are NaN where the model carries no calibrated band.
-    physics_v : (n,) V, the ESPM with its effects alone.  soc : (n,).
-    outside : (n,) True where an input, or the temperature, lies outside the range the correction was trained on.
-    weight : (n,) share of the correction that is kept, 0 to 1, where it fades towards the physics with the distance
-    from what it was trained on; 1 of one that does not fade, NaN where the model carries none.
-    temperature_degc : (n,) at which the physics took the cell.
+    time_s : (n,) s.  voltage_v, lower_v, upper_v : (n,) V; the bounds are NaN where the model has no calibrated band.
+    physics_v : (n,) V, the physics with its effects, without the correction.  soc : (n,) state of charge.
+    outside : (n,) True where an input, or the temperature, lies outside the range that the correction was trained on.
+    weight : (n,) share of the correction that is applied, 0 to 1: it fades towards the physics with the distance from
+    the training data. 1 for a correction that does not fade, NaN without one.
+    nominal : coverage of the band, 0 to 1; None without one.  temperature_degc : (n,) degC, of the simulated cell.
     """
 
     time_s: Array
@@ -41,7 +41,7 @@ class Prediction:
         return len(self.time_s)
 
     def __repr__(self) -> str:
-        band = "no band" if self.nominal is None else f"{100 * self.nominal:.0f} % band"
+        band = "no band" if self.nominal is None else f"{100 * self.nominal:g} % band"
         outside = (
             f", {100 * self.outside.mean():.0f} % outside the trained range" if self.outside.any() else ""
         )
@@ -53,12 +53,12 @@ class Prediction:
         voltage = {"predicted": self.voltage_v, "physics alone": self.physics_v}
         panels = {"voltage, V": voltage, "state of charge": {"state of charge": self.soc}}
         band = (
-            None if self.nominal is None else (f"{100 * self.nominal:.0f} % band", self.lower_v, self.upper_v)
+            None if self.nominal is None else (f"{100 * self.nominal:g} % band", self.lower_v, self.upper_v)
         )
         return over_time(self.time_s, panels, band)
 
     def to_frame(self) -> pd.DataFrame:
-        """The prediction as a table, one row a sample."""
+        """The prediction as a table, one row per sample."""
         import pandas as pd
 
         names = ("time_s", "voltage_v", "lower_v", "upper_v", "physics_v", "soc", "outside", "weight")
@@ -75,9 +75,9 @@ class Prediction:
         weight: Array,
         alpha: float | None,
     ) -> Prediction:
-        """The physics of `series` with an error added to it; low_v, high_v : (n,) V, the band about the sum.
+        """The physics of `series` plus a predicted error_v (n,) V.  low_v, high_v : (n,) V, limits of the band.
 
-        alpha : share of misses of the band; None where there is none.
+        alpha : miss rate of the band; None without a band.
         """
         voltage = series.model_v + error_v
         return cls(

@@ -1,15 +1,15 @@
-"""The tables of the paper, from plain rows: which figures stand in which.
+"""The tables of the paper, from plain rows.
 
 A row is an entry of `models` in a run's summary.json. Every value is optional and shows as a dash where it is absent;
-beyond the published schema a row may carry
+in addition to the published schema a row may have
 
-    validation_mser_pct   over training drives that chose nothing
+    validation_mser_pct   over training drives left out in turn
     free_run   {train,valid,test}_{mser_pct,mser_recalibrated_pct,rmse_mv}, diverged (the number of records left behind)
     one_step   {train,valid,test}_rmse_mv, persistence_rmse_mv (test)
     k_step     {"1": mV, "10": mV, ...}: test RMSE by horizon in seconds; likewise k_step_persistence
     intervals  nominal_pct, coverage_pct, average_width_v, winkler_v, worst_bin_coverage_pct (one step ahead)
     free_run_intervals   the same keys, in free run; with inside_coverage_pct, pieces and worst_piece_coverage_pct of
-                         the calibration, and start_v, what a standard deviation of an uncertain start is worth
+                         the calibration, and start_v, change of the voltage by a standard deviation of the start
     bands_by_horizon     {"1": the same keys, ...}, by the time since the last measurement in seconds
     test_records         {record: rmse_mv, mser_pct, outside_pct, kept_pct, mean_degc, beyond_k; where a simulation ran
                          out ran_out_s, until_ran_out_mv}, in free run
@@ -73,7 +73,7 @@ def interval_table(models: Sequence[Row]) -> Table:
 
 
 def method_table(models: Sequence[Row]) -> Table:
-    """The methods of the intervals beside each other, calibrated on the same residuals."""
+    """Prediction intervals by method, calibrated on the same residuals."""
     rows = [
         {"name": f"{row['name']}, {method}", "by_method": figures}
         for row in _having(models, "intervals_by_method")
@@ -88,7 +88,7 @@ def method_table(models: Sequence[Row]) -> Table:
 
 
 def free_run_band_table(models: Sequence[Row]) -> Table:
-    """Prediction bands without measured voltage, by how long ago the last measurement was."""
+    """Prediction bands without measured voltage, by the time since the last measurement."""
     rows = [
         {"name": f"{row['name']}, {horizon}", "bands": figures}
         for row in _having(models, "free_run_intervals")
@@ -203,7 +203,7 @@ def _table(key: str, caption: str, columns: Sequence[Column], models: Sequence[R
 
 def _interval_columns(group: str) -> list[Column]:
     return [
-        ("nominal, %", lambda row: _number(row, f"{group}.nominal_pct", 0)),
+        ("nominal, %", lambda row: _as_asked(row, f"{group}.nominal_pct")),
         ("coverage, %", lambda row: _ranged(row, group, "coverage_pct")),
         ("worst bin, %", lambda row: _number(row, f"{group}.worst_bin_coverage_pct", 2)),
         ("low minutes, %", lambda row: _number(row, f"{group}.low_minutes_pct", 2)),
@@ -234,7 +234,7 @@ def _horizons(row: Row) -> list[str]:
 
 
 def _brackets(models: Sequence[Row]) -> str:
-    """Words for the caption on what stands in brackets; '' where a row is of one run."""
+    """A sentence for the caption on the figures in brackets; '' where each row is of one run."""
     seeds = max((int(row.get("seeds") or 0) for row in models), default=0)
     return f" In brackets: lowest and highest of {seeds} seeds." if seeds else ""
 
@@ -255,6 +255,12 @@ def _find(row: Row, path: str) -> Any:
 def _number(row: Row, path: str, digits: int, factor: float = 1.0) -> str:
     value = _find(row, path)
     return _formatted(None if value is None else value * factor, digits)
+
+
+def _as_asked(row: Row, path: str) -> str:
+    """A number that was asked for, which is exact: 97.5 is not 98."""
+    value = _find(row, path)
+    return ABSENT if value is None else f"{value:g}"
 
 
 def _formatted(value: float | None, digits: int) -> str:

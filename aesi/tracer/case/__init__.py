@@ -1,1 +1,1 @@
-"""What all hypotheses of one case share: records, own parameters, effects, and one way to simulate."""
+"""What all hypotheses of one case share: records, own parameters, effects, and the simulation."""

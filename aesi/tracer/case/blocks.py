@@ -1,4 +1,4 @@
-"""Blocks of rows that can be left out, and the conditions that blocks are left out by."""
+"""Blocks of rows for cross-validation, and the folds (by block and by condition) in which they are left out."""
 
 from __future__ import annotations
 
@@ -14,36 +14,39 @@ from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.tracer.case.problem import InverseProblem
 
 BLOCKS = 24
-"""Blocks of all records together, each left out in turn: enough for a sum over them to say something, and each long
-against the correlation of a model error. A convention."""
+"""Number of blocks over all records, each left out in turn: enough of them for a sum of scores, and each long against
+the correlation time of a model error. A convention."""
 FEWEST = 4
 """Fewest blocks that one record is cut into."""
 SEEN_SHARE = 2.0 / 3.0
-"""Share of the blocks, from the first on, that is fitted in the fold that leaves out the end."""
+"""Share of the blocks, from the first on, that is kept in the fold "end", which leaves out the rest."""
 FEWEST_MEASURED = 6
-"""Blocks that a record of a measured cell may have in any case. It has more only where it holds as many independent
-samples of the model error, which lasts longer there."""
+"""Most blocks of a record of a measured cell, unless it holds more independent samples of the model error. The error of
+a measured cell's model has the longer correlation time."""
 RANGES = 3
-"""Ranges of the current's RMS, and of the state of charge, by which blocks are left out together."""
+"""Number of ranges of RMS current, and of state of charge. The blocks of one range are left out together."""
 WINDOW_S = 20.0
 """Length of the window, s, that tells an error within seconds from a lasting one: what differs from the window's
 mean counts as an error within seconds. Its correlation time is 4 to 6 s on six development records; with windows of
 60 s it is 7 to 10 s, since part of the slow drift is then counted in (`python -m aesi.bench.fast_error`)."""
 OTHER_RATE = 1.1
-"""The largest mean of the ranges of current has to be at least this many times the smallest, or they are no
-different rates: a current that never changes is one rate. A convention."""
+"""Least ratio of the largest to the smallest mean RMS current of the ranges. Below it they count as one rate, as with a
+current that never changes, and the partition "rate" is left out. A convention."""
 
 
 @dataclass(frozen=True, eq=False)
 class Windows:
-    """of_row : (n,) number of each row's window.  lasts_s : (n,) s that each row stands for."""
+    """Short stretches of time, for means over seconds.
+
+    of_row : (n,) number of each row's window.  lasts_s : (n,) s that each row stands for.
+    """
 
     of_row: IntArray
     lasts_s: Array
 
     @classmethod
     def within(cls, starts: IntArray, time_s: Array, lasts_s: Array, length_s: float) -> Windows:
-        """Windows of a length within each block.  starts : (b + 1,) first rows of blocks, and the number of rows."""
+        """Windows of `length_s` that do not cross blocks.  starts : (b + 1,) first row of each block, then n."""
         of_row = np.zeros(len(time_s), dtype=int)
         opened = 0
         for rows in _slices(starts):
@@ -54,13 +57,13 @@ class Windows:
 
     @cached_property
     def row_weight(self) -> Array:
-        """(n,) weight of each row in the mean of its window: the share of the window that it lasts."""
+        """(n,) weight of each row in the mean of its window: its share of the window's duration."""
         return np.asarray(self.lasts_s / np.bincount(self.of_row, self.lasts_s)[self.of_row], dtype=float)
 
     @cached_property
     def fast_dof(self) -> Array:
-        """(n,) degrees of freedom of each row's deviation from the mean of its window: one less its weight, none of a
-        lone row."""
+        """(n,) degrees of freedom of each row's deviation from the mean of its window: 1 - weight, so 0 for a window
+        of one row."""
         return 1.0 - self.row_weight
 
     @cached_property
@@ -76,13 +79,14 @@ class Windows:
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """starts : (b + 1,) first rows of the blocks, and the number of rows.  record : (b,) number of each block's record.
+    """Contiguous blocks of the fitted rows, and the folds of a cross-validation.
 
-    folds : partition -> sets of blocks that are left out in turn: "block" one each; "record", "rate", "charge" those of
-    one record, of one range of the current's RMS, of one range of the state of charge, where there are several; "end"
-    the last third.
-    compared : (n,) True for the rows by which an error on unseen data is told, see `InverseProblem.compared`.
-    windows : of `WINDOW_S` within each block, None where errors at the scale of seconds are not told apart.
+    starts : (b + 1,) first row of each block, then the number of rows n.  record : (b,) number of each block's record.
+    folds : partition -> folds, each a set of blocks. "block": one block each. "record", "rate", "charge": the blocks of
+    one record, of one range of RMS current, of one range of state of charge, where there are several. "end": the last
+    third, in one fold.
+    compared : (n,) True for the rows that count in an error on unseen data, see `InverseProblem.compared`.
+    windows : of `WINDOW_S` within each block; None where the model error has no separate part within seconds.
     """
 
     starts: IntArray
@@ -106,7 +110,7 @@ class Blocks:
 
 
 def blocks_of(problem: InverseProblem) -> Blocks:
-    """Contiguous blocks by rows, shared among the records, and the folds of them, see `Blocks`."""
+    """The blocks of all records, and their folds."""
     starts, record = _cut(problem)
     windows = None
     if problem.two_scales:
@@ -161,6 +165,6 @@ def _differ(rates: Sequence[Array]) -> bool:
 
 
 def _ranges(of_block: Array) -> tuple[tuple[int, ...], ...]:
-    """Blocks by ranges of a quantity (b,), as many in each."""
+    """Blocks by `RANGES` ranges of a quantity (b,), with about as many blocks in each."""
     order = np.argsort(of_block, kind="stable")
     return tuple(tuple(sorted(part.tolist())) for part in np.array_split(order, RANGES) if len(part))

@@ -18,19 +18,19 @@ from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import PreparedRecord
 
 FEWEST_SAMPLES = 200
-"""Fewest samples of a record shorter than ten times SHORTEST_S; of a longer one as many as there are blocks."""
+"""Fewest fitted rows of a record shorter than ten times SHORTEST_S. A longer one needs only `BLOCKS` rows."""
 SHORTEST_S = 300.0
 """Shortest record: in less, neither diffusion nor the slope of the open-circuit voltage shows."""
 LEAST_C_RATE = 0.02
-"""A record whose current stays below this rate holds no load: its overpotential is within what open-circuit potentials
-are off by. A convention, like the rate below which a current counts as a rest (`aesi.physics.initial_state`)."""
+"""A record whose current stays below this C-rate holds no load: its overpotential is within the errors of open-circuit
+potentials. A convention, like the rate below which a current counts as a rest (`aesi.physics.initial_state`)."""
 FOREIGN_CELL_V = 0.25
-"""A model of the right chemistry, however badly parametrised, is closer than this to the voltage in the median. The
+"""Median absolute error, V, below which a model of the right chemistry stays, however badly parametrised. The
 file of an LG M50, sized to cells of other makes, errs by 50 to 115 mV RMS on their drives from 10 to 40 degC
 (`aesi bench cells`, declared; docs/cells.md). At 0 degC and below it errs by 100 mV and more, 468 at worst."""
 CONDITIONS = 5
-"""Values that are tried of a quantity that was not measured, evenly over its range: a cell at -10 degC whose
-temperature nobody gives is off by 290 mV."""
+"""Number of values, evenly over its range, that are tried for a quantity that was not measured: a cell at -10 degC
+without a measured temperature is off by 290 mV."""
 
 
 def check_compared(problem: InverseProblem) -> None:
@@ -77,8 +77,8 @@ def check_record(cell: Cell, record: PreparedRecord) -> None:
 def check_same_cell(problem: InverseProblem, record: PreparedRecord, declared: Run) -> None:
     """Raises DataError where the declared model is so far off that the data must come from another cell.
 
-    declared : (n_thin,) what the declared model gives.  Where an effect infers what the record does not hold
-    (temperature), the model has to be so far off over all of its range.
+    declared : simulation of the declared model over the thinned rows (n_thin,).  Where the record lacks a quantity that
+    an effect infers (temperature), the error is raised only if the model is as far off at every value tried.
     """
     typical = _typical_v(record, declared.voltage_v)
     if typical <= FOREIGN_CELL_V:
@@ -103,8 +103,8 @@ def _typical_v(record: PreparedRecord, voltage_v: Array) -> float:
 
 
 def _unmeasured(problem: InverseProblem, record: PreparedRecord) -> Iterator[ActiveEffect]:
-    """Active effects that stand in for what the record does not hold (its temperature): those of one parameter, at
-    `CONDITIONS` values over its range."""
+    """The effects that infer a quantity which the record lacks (its temperature), each active at `CONDITIONS` values
+    over the range of its one parameter; effects with more parameters are skipped."""
     for effect in problem.effects.values():
         if effect.infers is None or record.data.temperature_degc is not None or len(effect.parameters) != 1:
             continue

@@ -1,13 +1,13 @@
 """Activation energies of a measured cell whose file was fitted at one temperature only, so that they are unknown.
 
-A calibration on records of one temperature leaves them as its start file has them, so that at another one the logarithm
-of each rate is off by
+A calibration on records of one temperature keeps the activation energies of its start file. At another temperature T
+the logarithm of each rate is then off by
 
     dE/R (1/T_file - 1/T)        T_file mean temperature of the records that the file was fitted to
 
-with dE as far off as a calibration on records of several temperatures expects them to be: nought at T_file, a factor of
-four either way in a solid diffusivity at -20 degC of a file of 25 degC. A file whose records span temperatures has
-energies that were fitted.
+The error dE of an energy has the prior of a calibration on records of several temperatures. The error of a rate is zero
+at T_file, and a factor of four either way in a solid diffusivity at -20 degC for a file of 25 degC. The energies of a
+file whose records span temperatures were fitted, and stay.
 """
 
 from __future__ import annotations
@@ -29,20 +29,21 @@ from aesi.records import Measurement
 from aesi.tracer.case.free_parameter import FURTHEST_SDS
 
 ACTIVATION_ENERGIES = "activation_energies"
-"""Id of the effect that moves them, which no hypothesis can name: it restates what the file declares."""
+"""Id of the effect that moves the activation energies. No hypothesis can name it: it restates declared parameters."""
 
 
 def fitted_kelvin(cell: Cell) -> float | None:
-    """The one temperature that a file was fitted at, K; None where its records span more, or the file tells of none."""
+    """The temperature at which a cell file was fitted, K; None where its records span more than `SPAN_K`, or where the
+    file records no temperature."""
     kelvin = [mean_k for _, mean_k in cell.fitted_at_k]
     return float(np.mean(kelvin)) if kelvin and max(kelvin) - min(kelvin) <= SPAN_K else None
 
 
 def far_from_file(cell: Cell, data: Measurement, supposed: bool) -> bool:
-    """Whether a record's temperature is further from the one that the file was fitted at than records must lie apart
-    for a fit to tell activation energies.
+    """Whether a record's temperature is more than `SPAN_K` from that at which the file was fitted. Records have to lie
+    so far apart for a fit to determine activation energies.
 
-    supposed : whether an effect says what temperature it had, where that was not measured.
+    supposed : whether an effect supplies the temperature of the record where none was measured.
     """
     fitted_k = fitted_kelvin(cell)
     if fitted_k is None:
@@ -54,9 +55,9 @@ def far_from_file(cell: Cell, data: Measurement, supposed: bool) -> bool:
 
 def energies_of(cell: Cell) -> Effect:
     """The effect that changes the activation energies of a file that was fitted at one temperature. The rates at that
-    temperature stay; rates that do not depend on temperature by the file stay everywhere.
+    temperature stay. A rate whose energy is zero in the file stays at every temperature.
 
-    The spread of each energy is the root mean square by which the file's is off, if what is known of it is right.
+    The spread of each energy is the RMS deviation of the file's value under the prior of `energy_priors`.
     """
     parameters, declared = {}, {}
     for (part, rate), known in energy_priors(cell).items():
@@ -78,9 +79,9 @@ def energies_of(cell: Cell) -> Effect:
 def with_energies(
     model: EspmModel, *, declared: Mapping[str, float], held_at_k: float, **energies: float
 ) -> EspmModel:
-    """The model with other activation energies, J/mol, its rates at `held_at_k` as they were.
+    """The model with other activation energies, J/mol, its rates at `held_at_k` (K) unchanged.
 
-    declared : of all rates.
+    declared : activation energy in the file, J/mol, of every rate.
     """
     cell, there = model.cell, {**declared, **energies}
 

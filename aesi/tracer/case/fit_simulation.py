@@ -24,9 +24,9 @@ def fit_simulation(
 ) -> Run:
     """One simulation, at the measured temperature where there is one, in longer steps where rows are far apart.
 
-    soc0 : at the first row; None: where the cell rests at `rest_voltage_v`.  effects : active; those that infer a
-    quantity that was measured are passed over.
-    Stoichiometries that run out are clipped, so that a search is not stopped by them. Raises AesiError where the
+    soc0 : state of charge at the first row; None takes that at which the cell rests at `rest_voltage_v` (V).
+    effects : active ones; those that infer a quantity that was measured are skipped.
+    Stoichiometries are clipped at the ends of their range, so that a search goes on. Raises AesiError where the
     simulation fails.
     """
     needed = tuple(a for a in effects if a.effect.infers is None or data.temperature_degc is None)

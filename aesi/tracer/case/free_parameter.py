@@ -2,9 +2,9 @@
 
     x = (phi(value) - phi(centre)) / sd        phi the natural logarithm, the square or the identity
 
-The declared parameters of a cell (its own ones) have the spread that is declared beside them; those of an effect under
-test have a prior as wide as the effect allows; the initial state of charge of a record has its standard deviation, and
-so has the share of its capacity that the cell had then.
+The prior of an own parameter (one that the cell declares) has the spread declared with it. That of a parameter of an
+effect under test is as wide as the effect allows. The initial state of charge of a record, and the cell's share of its
+capacity during the record, have a standard deviation each.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from aesi.physics.effect import Effect
 STATE_OF_CHARGE = "soc0"
 """Owner of the parameters that shift a record's initial state of charge."""
 CAPACITY_SHARE = "capacity_share"
-"""Owner of the parameters that say what share of the file's capacity the cell had in a record."""
+"""Owner of the parameters that give a cell's capacity during a record, as a share of the file's."""
 OF_ONE_RECORD = (STATE_OF_CHARGE, CAPACITY_SHARE)
-"""Owners of what is a record's and not the cell's; the name of the parameter is the number of the record."""
+"""Owners of parameters that belong to one record, not to the cell. The parameter's name is the record's number."""
 OF_ALL_RECORDS = " of all records"
-"""Ending of an owner's name: a declared parameter that good records and others share, beside an effect that acts on
-the others alone."""
+"""Ending of the owner of a declared parameter that all records share, the good ones too. It tells this parameter from
+that of the effect under test, which acts on the other records alone."""
 FURTHEST_SDS = 4.0
 """An own parameter may not leave this many of its standard deviations."""
 TINY = 1e-6
@@ -40,9 +40,9 @@ class FreeParameter:
     owner : id of an effect, or one of OF_ONE_RECORD with the number of a record as the name.
     low, high, centre : in `unit`.  sd : of the natural logarithm where `log`, of the square where `even`, else in
     `unit`.
-    own : True for what the declared model has anyway, False for what an effect under test adds.
+    own : True for a parameter of the declared model, False for one of an effect under test.
     amplitude : False for parameters that only shape an effect (a rate, a time constant).
-    typical : where the effect is usually seen.  low_is_limit : the lower bound stands for nought.
+    typical : usual value where the effect is present, in `unit`.  low_is_limit : the lower bound stands for zero.
     """
 
     owner: str
@@ -98,18 +98,18 @@ class FreeParameter:
         return (1.0 / 3.0 if self.amplitude else 1.0) * self.coordinate(self.typical)
 
     def ends(self, x: float) -> tuple[bool, bool]:
-        """Whether x is on its lower bound, and whether it is on its upper one."""
+        """(x is on its lower bound, x is on its upper bound)."""
         lowest, highest = at_ends(x, *self.bounds)
         return bool(lowest), bool(highest)
 
     def told(self, value: float) -> float:
-        """A value as results state it: the bound itself where it counts as on it, free of round-off."""
+        """A value for reports: the bound itself where the value differs from it by round-off only."""
         lowest, highest = self.ends(self.coordinate(value))
         return self.low if lowest else self.high if highest else value
 
     def on_bound(self, x: float) -> bool:
-        """True where an effect's parameter ended on the bound of what is plausible. The neutral value is no such
-        bound, nor is a limit that no value can pass (a share of 0 or 1)."""
+        """True where an effect's parameter ended on a bound of its plausible range. A bound at the neutral value does
+        not count, nor one that stands for zero, nor one that no value can pass (a share of 0 or 1)."""
         if self.own or not (self.amplitude or self.log):
             return False
         (low, high), (lowest, highest) = self.bounds, self.ends(x)
@@ -118,14 +118,13 @@ class FreeParameter:
 
 
 def at_ends(x: Array | float, low: Array | float, high: Array | float) -> tuple[BoolArray, BoolArray]:
-    """Whether each coordinate is at the lower end of its range, and whether at the upper; two arrays of the shape of
-    x."""
+    """(at the lower end, at the upper end) of its range for each coordinate: two boolean arrays of the shape of x."""
     return np.asarray(x - low < TINY), np.asarray(high - x < TINY)
 
 
 def of_effect(effect: str, parameters: Mapping[str, Parameter], capacity_ah: float) -> list[FreeParameter]:
-    """The parameters of an effect under test, in a cell of this capacity. Their priors are as wide as the effect's
-    usual size, where that is known, and otherwise as its range."""
+    """The parameters of an effect under test, in a cell of this capacity (Ah). The prior is as wide as the effect's
+    usual size where that is known, else as its range."""
     return [_of_effect(effect, name, p, capacity_ah) for name, p in parameters.items()]
 
 
@@ -144,7 +143,7 @@ def _of_effect(effect: str, name: str, p: Parameter, capacity_ah: float) -> Free
         high=high,
         log=log,
         centre=centre,
-        sd=_expected(p, capacity_ah) or float(reach) / 2.0,  # the ends of its range are two deviations off
+        sd=_expected(p, capacity_ah) or float(reach) / 2.0,  # ends of the range at two standard deviations
         own=False,
         amplitude=p.neutral is not None,
         typical=p.default,
@@ -217,8 +216,8 @@ def values_of(
 def by_owner(
     placed: Mapping[tuple[str, str], float], hypothesis: Sequence[str]
 ) -> dict[str, dict[str, float]]:
-    """owner -> name -> value, of values by (owner, name); an effect of the hypothesis that has no parameters has none
-    of these, and acts all the same."""
+    """owner -> name -> value, from values by (owner, name). An effect of the hypothesis without parameters has an empty
+    entry, so that it still acts."""
     out: dict[str, dict[str, float]] = {}
     for (owner, name), value in placed.items():
         out.setdefault(owner, {})[name] = value
@@ -251,17 +250,17 @@ def starts(free: Sequence[FreeParameter]) -> list[Array]:
 
 
 def of_all_records(effect: str) -> str:
-    """Owner of the parameters of an effect that all records share, the good ones too."""
+    """Owner of those parameters of an effect that all records share, good ones included."""
     return effect + OF_ALL_RECORDS
 
 
 def acting_on(
     effects: Mapping[str, Effect], values: Mapping[str, Mapping[str, float]], good: bool
 ) -> dict[str, dict[str, float]]:
-    """Id of an effect -> name -> value on one record: what all records share and what is under test, as deviations
-    added in the parameter's own scale, within its bounds.
+    """Id of an effect -> name -> value on one record. Where an effect has a value that all records share and one under
+    test, their deviations from neutral add up (multiply for a logarithmic parameter), within its bounds.
 
-    values : owner -> name -> value.  good : of a record that is known to be good, which only has what all share.
+    values : owner -> name -> value.  good : whether the record is known to be good, so that only shared values act.
     """
     out: dict[str, dict[str, float]] = {}
     for owner, given in values.items():

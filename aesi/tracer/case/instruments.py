@@ -1,6 +1,6 @@
-"""Undo instrument faults on the rows as they were measured, and average these for fits only then.
+"""Undo instrument faults on the rows as measured, before they are averaged for fits.
 
-The other order would not do: a lag of half a second is gone from rows that are averages over a second.
+The order matters: a lag of half a second no longer shows in rows that are averages over a second.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from aesi.records import Measurement
 def instruments_undone(
     data: Measurement, effects: Sequence[ActiveEffect]
 ) -> tuple[Measurement, tuple[ActiveEffect, ...]]:
-    """The record as the cell saw it, and the effects without the part that was undone.
+    """The record as the cell saw it, averaged, and the effects without the part that was undone.
 
     A lag of half a second does not show in rows of a second, over which a jump of the current is spread; nor does one
     of a tenth in the sparse rows of a pulse, which begin where the current jumps. Records that were not averaged are
@@ -32,7 +32,7 @@ def instruments_undone(
 
 @lru_cache(maxsize=64)
 def _seen_by_cell(data: Averaged, acting: tuple[ActiveEffect, ...]) -> Measurement:
-    """The record behind the instruments; remembered, since few of the parameters that a fit moves are theirs."""
+    """The record without the instruments' faults. Cached, since few of the parameters that a fit moves are theirs."""
     written = Record(data.finer.time_s, data.finer.current_a)
     record = as_cell_saw(written, acting).beside_voltage(data.window.hold == "backward")
     return data.with_record(record.time_s, record.current_a)

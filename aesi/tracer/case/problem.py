@@ -34,14 +34,13 @@ from aesi.tracer.case.records import PreparedRecord
 from aesi.tracer.case.trust import AGEING, MEASURED_CELL, Trust, own_sd, start_sd
 
 SHARE_SD = 0.027
-"""Standard deviation of the logarithm of a record's capacity over the file's: the root mean square of the shares
-that two files, calibrated over temperatures, gave to their twelve records, taken within weeks of each other
-(`Cell.capacity_shares`), when the number was chosen. The present files give 0.030, since a record with a load now
-has the silicon of its day."""
+"""Standard deviation of ln(capacity of a record / capacity in the file): RMS over the twelve records, taken within
+weeks of each other, of two files that were calibrated over temperatures (`Cell.capacity_shares`), when the number was
+chosen. The present files give 0.030, since a record with a load now has the silicon of its day."""
 INDEPENDENT_S, INDEPENDENT_CHARGE = 200.0, 0.05
-"""How long (s), and over how much charge (share of the capacity), the error of a model of a measured cell lasts. Its
+"""Time (s) and charge (share of the capacity) over which the error of a model of a measured cell stays correlated. Its
 integral correlation time is 45 to 670 s on eight development records of `aesi bench real` (geometric mean 140 s about
-the mean, 260 s about nought); in charge it is 1 to 18 %.
+the mean, 260 s about zero); in charge it is 1 to 18 %.
 
 The part within seconds lasts 4 to 6 s. It is a wrong response to the current and comes back whenever the current does
 the same, so it adds no independent samples: taken as independent after 8 s, effects that are not there gain up to 290
@@ -53,21 +52,21 @@ BESIDE_TIMES = 2.0
 it the sizes of effects that 24 pairs of development records do not have scatter by 0.97 of their standard
 deviations, and one pair has one beyond 2.58 of them (`python -m aesi.bench.real.repeatability`)."""
 OHMIC_SHARE = 0.03
-"""Share by which a file is off in the resistance that a cell shows from row to row: 0.7 to 4.0 % on five development
-records, 2.7 % in the median. A published file is off by 20 %, too much for any contact (`python -m
+"""Relative error of a cell file in the resistance that a cell shows from one row to the next: 0.7 to 4.0 % on five
+development records, 2.7 % in the median. A published file is off by 20 %, too much for any contact (`python -m
 aesi.bench.fast_error`)."""
 STEP = 4e-3
-"""Step of finite differences, in standard deviations of a parameter's prior: short against the accuracy that data
-give. Ten rows a second tell a lag to a thousandth of its spread."""
+"""Step of finite differences, in standard deviations of a parameter's prior: short against the posterior standard
+deviation. Rows at 10 Hz determine a lag to a thousandth of its spread."""
 REMEMBERED = 64
-"""How many voltages of good records are kept: those of a dozen hypotheses that effects grow on, side by side."""
+"""Number of simulated voltages of good records in the cache: enough for a dozen hypotheses that grow in parallel."""
 
 ValuesByOwner = Mapping[str, Mapping[str, float]]
 """owner -> name -> value."""
 
 
 def share_of(values: ValuesByOwner, record: int) -> float:
-    """Share of the file's capacity that the cell had in a record."""
+    """Capacity of the cell during a record, as a share of the file's; 1 where it is not fitted."""
     return values.get(CAPACITY_SHARE, {}).get(str(record), 1.0)
 
 
@@ -76,14 +75,14 @@ class InverseProblem:
     """One case.
 
     cell : as declared.  records : prepared, the good ones last.
-    effects : id -> Effect, all that may be tried or moved. A parameter of theirs with a spread is an own parameter of
-    the declared model, and moves in every hypothesis.  trust : how far the declared values are believed.
-    fixed : effects in every simulation.  model : that every hypothesis uses.
-    approximated_v : RMS, V, by which approximations of that model that were kept move the voltage; no effect is named
-    for less.  reduced_v : RMS, V, by which the cell's other model differs, where that one may be searched too: what is
-    left may be this difference.
-    ages : whether the records say that they are of several ages.  energies : whether the activation energies are open
-    that no record told the file of a measured cell.
+    effects : id -> Effect, all that may be tried or moved. A parameter of an effect that has a spread is an own
+    parameter of the declared model, and moves in every hypothesis.  trust : how far the declared values are believed.
+    fixed : effects in every simulation.  model : model of the cell, the same in every hypothesis.
+    approximated_v : RMS change of the voltage by the approximations kept in that model, V; no effect is named for less.
+    reduced_v : RMS difference to the cell's other model, V, where that may be searched too: a residual may be this
+    difference.
+    ages : whether the records appear to be of several ages.  energies : whether to fit those activation energies of a
+    measured cell that the calibration of its file could not determine.
     """
 
     cell: Cell
@@ -99,31 +98,31 @@ class InverseProblem:
 
     @property
     def coarse(self) -> bool:
-        """True where the model errs as models of measured cells do, so that the likelihood is coarsened."""
+        """True where the model error is that of a measured cell, so that the likelihood is coarsened."""
         return self.trust == "loose" or self.trust in MEASURED_CELL
 
     @property
     def has_good(self) -> bool:
-        """True where some of the records are known to be good: effects act on the others then."""
+        """True where some records are known to be good, so that effects act on the others only."""
         return any(record.good for record in self.records)
 
     @property
     def two_scales(self) -> bool:
-        """True where what the model errs by within seconds is told apart from what lasts longer."""
+        """True where the model error has two parts: one that lasts, and one within seconds."""
         return self.trust == "measured"
 
     @property
     def several_ages(self) -> bool:
-        """True where the cell may have another capacity in each record: of one record alone, what the cell has lost
-        since its file is what an effect would say."""
+        """True where each record has its own capacity of the cell. It takes several records: in a single one, the
+        capacity lost since the file was made is for an effect to explain."""
         return self.ages and self.trust in AGEING and len(self.records) > 1
 
     def competing(self) -> tuple[str, ...]:
-        """Ids of the effects that may be named: not those that only take back an approximation of the model."""
+        """Ids of the effects that a hypothesis may name: all but those that undo an approximation of the model."""
         return tuple(name for name, effect in self.effects.items() if effect.refines is None)
 
     def free(self, hypothesis: Sequence[str]) -> tuple[FreeParameter, ...]:
-        """What a hypothesis may move: states of charge, own parameters, then those of its effects."""
+        """The parameters that a hypothesis may move: states of charge, own parameters, then those of its effects."""
         out = [
             state_of_charge(i, r.soc0, start_sd(self.trust, r.soc0_sd)) for i, r in enumerate(self.records)
         ]
@@ -143,9 +142,9 @@ class InverseProblem:
         return tuple(out)
 
     def _open_energies(self, hypothesis: Sequence[str]) -> list[FreeParameter]:
-        """The activation energies of a measured cell that its file does not know; empty unless a record is, or may
-        be by the hypothesis, further from the temperature that the file was fitted at than records must lie apart to
-        tell them."""
+        """The activation energies of a measured cell that its file could not determine. Empty unless a record is, or
+        may be under the hypothesis, far enough from the temperature at which the file was fitted, see
+        `far_from_file`."""
         if not self.energies or self.trust not in MEASURED_CELL:
             return []
         acting = (*(self.effects[name] for name in hypothesis), *(active.effect for active in self.fixed))
@@ -169,16 +168,16 @@ class InverseProblem:
         return of_effect(effect, self.effects[effect].parameters, self.cell.nominal_capacity_ah)
 
     def active(self, values: ValuesByOwner, good: bool = False) -> tuple[ActiveEffect, ...]:
-        """The effects to simulate with.  One under test is among them at its neutral point too: some rewrite the cell
-        even there (its windows by voltages), and a residual must be continuous in the parameters of a fit.
+        """The effects to simulate with. An effect under test is included even at its neutral point: some rewrite the
+        cell even there (its windows by voltages), and a residual must be continuous in the parameters of a fit.
 
-        good : of a record that is known to be good, on which no effect under test acts.
+        good : whether the record is known to be good, so that no effect under test acts on it.
         """
         acting = acting_on(self._movable, values, good)
         return (*self.fixed, *(self._movable[name].activate_only(**given) for name, given in acting.items()))
 
     def predict(self, values: ValuesByOwner, only: int | None = None) -> Array | None:
-        """(n,) V over the fit parts of all records, or of one; None where the model fails."""
+        """(n,) V over the fit parts of all records, or of record `only`; None where the model fails."""
         out = []
         asked_for = range(len(self.records)) if only is None else (only,)
         try:
@@ -197,7 +196,7 @@ class InverseProblem:
 
     @cached_property
     def _of_good_v(self) -> Callable[[int, float, tuple[ActiveEffect, ...], float], Array]:
-        """`_voltage_v` of good records, remembered: what is under test does not act on them."""
+        """`_voltage_v` of good records, cached: effects under test do not act on them."""
         return lru_cache(maxsize=REMEMBERED)(self._voltage_v)
 
     def run(
@@ -209,7 +208,7 @@ class InverseProblem:
         rest_voltage_v: float | None = None,
         share: float = 1.0,
     ) -> Run:
-        """One simulation, see `fit_simulation`.  share : of the file's capacity that the cell had then."""
+        """One simulation, see `fit_simulation`.  share : capacity of the cell then, as a share of the file's."""
         cell = self.cell if share == 1.0 else self.cell.with_material(share)
         return fit_simulation(cell, data, soc0, effects, hold, self.model, rest_voltage_v)
 
@@ -229,7 +228,7 @@ class InverseProblem:
 
     @cached_property
     def measured(self) -> Array:
-        """(n,) V: what fits see."""
+        """(n,) V, measured voltage of the fitted rows, thinned."""
         return np.concatenate([m.voltage_v for m in self.seen])
 
     @cached_property
@@ -267,8 +266,8 @@ class InverseProblem:
 
     @cached_property
     def start_slope_v(self) -> Array:
-        """(n,) V: what one standard deviation of each record's initial state of charge is worth in the declared model;
-        nought of a record that cannot be simulated there."""
+        """(n,) V, change of the declared model's voltage by one standard deviation of each record's initial state of
+        charge; zero for a record that cannot be simulated there."""
         out = []
         for record, data in zip(self.records, self.seen, strict=True):
             try:
@@ -280,8 +279,8 @@ class InverseProblem:
     def start_slope_of_v(
         self, record: PreparedRecord, data: Measurement, effects: tuple[ActiveEffect, ...], hold: Hold
     ) -> Array:
-        """(n,) V: what one standard deviation of a record's initial state of charge is worth on these rows of it, of
-        the cell with these effects.  Raises AesiError where it cannot be simulated there."""
+        """(n,) V, change of the voltage on these rows of a record by one standard deviation of its initial state of
+        charge, for the cell with these effects.  Raises AesiError where it cannot be simulated there."""
         here, there = (
             self.run(data, soc0, effects, hold).voltage_v for soc0 in (record.soc0, record.other_soc0)
         )
@@ -289,15 +288,15 @@ class InverseProblem:
 
     @cached_property
     def declared_soc(self) -> Array:
-        """(n,) state of charge by the declared cell's coulombs."""
+        """(n,) state of charge in the declared model, by coulomb counting."""
         return np.concatenate([run.series["soc"] for run in self._declared])
 
     @cached_property
     def independent(self) -> Array:
-        """(n,) share of an independent sample of the model error that each row stands for.
+        """(n,) number of independent samples of the model error that each row stands for.
 
-        They are dealt out by time. While no charge moves the error stays what it was, so that a rest, however long, or
-        a pause of the logger in it counts as the time that one sample lasts."""
+        The samples of a record are shared out by time. The error does not change while no charge moves, so that a rest
+        or a pause of the logger, however long, counts as the time of one sample."""
         out = []
         for data, rows in zip(self.seen, self.slices, strict=True):
             lasts = self.lasts_s[rows]
@@ -312,8 +311,8 @@ class InverseProblem:
         return joined * self.compared if self.trust == "beside" else joined
 
     def _without_long_rests(self, data: Measurement, lasts_s: Array) -> Array:
-        """(n,) s that each row stands for, those of a rest together no more than the samples last that its charge is,
-        or one."""
+        """(n,) s that each row stands for, with each rest shortened to the time of as many independent samples as its
+        charge makes up, at least one."""
         capacity_ah = self.cell.nominal_capacity_ah
         rests = np.abs(data.current_a) <= REST_C_RATE * capacity_ah
         number = np.cumsum(np.diff(rests, prepend=False))
@@ -328,9 +327,9 @@ class InverseProblem:
         return np.concatenate([np.gradient(data.time_s) for data in self.seen])
 
     def off_at_seconds(self, hypothesis: Sequence[str]) -> Array:
-        """(n, k) V: how far one standard deviation of each parameter that may be wrong within seconds moves the
-        voltage of the declared cell. Parameters that the hypothesis itself moves are left out; k is 0 where the
-        model error has one scale. Lasting shifts are still in it: `model_error.off_within_seconds` takes them off."""
+        """(n, k) V, change of the declared model's voltage by one standard deviation of each parameter in which the
+        file may err within seconds. Parameters that the hypothesis itself moves are left out; k is 0 where the model
+        error has one scale. Lasting shifts are included: `model_error.off_within_seconds` subtracts them."""
         off = self._off_at_seconds if self.two_scales else ()
         kept = [column for restating, column in off if restating.isdisjoint(hypothesis)]
         return np.column_stack([np.zeros((len(self.time_s), 0)), *kept])
@@ -359,7 +358,7 @@ class InverseProblem:
         return tuple(out)
 
     def _declared_with(self, effect: Effect, name: str, value: float) -> Array | None:
-        """(n,) V of the declared cell with one parameter elsewhere; None where it cannot be simulated."""
+        """(n,) V of the declared cell with one parameter changed to `value`; None where it cannot be simulated."""
         effects = (*self.fixed, effect.activate_only(**{name: value}))
         try:
             return np.concatenate(
@@ -370,8 +369,8 @@ class InverseProblem:
 
     @cached_property
     def compared(self) -> BoolArray:
-        """(n,) True for the rows of the records in question, and for those rows of good records whose state of
-        charge the former reach: how far a model errs depends on the state of charge."""
+        """(n,) True for all rows of records not known to be good, and for those rows of good records whose state of
+        charge lies in the range of the former: the size of a model error depends on the state of charge."""
         z, good = self.declared_soc, self.good_rows
         looked = z[~good]
         near = (z > looked.min() - INDEPENDENT_CHARGE) & (z < looked.max() + INDEPENDENT_CHARGE)
@@ -384,7 +383,7 @@ class InverseProblem:
 
     @cached_property
     def steepness(self) -> Array:
-        """(n,) 1: slope of the declared open-circuit voltage over state of charge, over one volt."""
+        """(n,) |dU/dz| / (1 V), U the declared open-circuit voltage and z the state of charge."""
         z = self.declared_soc
         step = 5e-3
         low, high = np.clip(z - step, -0.01, 1.01), np.clip(z + step, -0.01, 1.01)

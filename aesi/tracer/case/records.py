@@ -1,8 +1,8 @@
 """Measured records made ready for fits: noise, initial state of charge, the part that may be looked at.
 
-Fits run on a thinned copy (`thinned.py`). What thinning does to the voltage of the declared model is taken off the
-measured one, so that what it does not keep by itself is kept too. Reported errors are always those of the record as
-measured.
+Fits run on a thinned copy (`thinned.py`). Thinning changes the voltage of the declared model a little; this change is
+subtracted from the measured voltage, so that the residual does not contain it. Reported errors are always those of the
+record as measured.
 """
 
 from __future__ import annotations
@@ -27,59 +27,60 @@ from aesi.records import Hold, Measurement, at_its_temperature, hold_sentence
 from aesi.tracer.case.thinned import ThinnedRecord, lost_v, thinned_record, thinned_together
 
 THINNED_SHARE = 0.5
-"""Share of the voltage that thinning takes from the declared model that counts as noise, since it takes another
-amount from another model: with kinetics 1.4 times as fast 0.38 to 0.48 of it are left on eight drives of blind cases
-at 10 Hz (seeds 13 and 18)."""
+"""Share of the declared model's change by thinning that counts as noise, since another model changes by another amount:
+with kinetics 1.4 times as fast 0.38 to 0.48 of it are left on eight drives of blind cases at 10 Hz (seeds 13 and
+18)."""
 CONTINUATION_STEPS = 3.0
 """A file that starts within this many samples of another's end, on the same clock, continues it."""
 HOLD_OPTION = "--hold {0} (in an experiment discover.hold: {0})"
 """How a user declares another hold, for `hold_sentence`."""
 HALF_FULL = 0.5
-"""Above this state of charge a smaller one is safer to simulate, below it a larger one: the middle, whatever the
-cell."""
+"""State of charge, share: above it a smaller one is safer to simulate, below it a larger one."""
 FEWEST_ROWS = 8
-"""Fewest rows that tell a noise."""
+"""Fewest rows from which noise is estimated; a shorter record gets SMALLEST_NOISE_V."""
 CALM_SHARE = 0.3
-"""Share of the rows, those at which the current changes least, that tell the noise. A convention."""
+"""Share of the rows, those at which the current changes least, from which the noise is estimated. A convention."""
 LARGEST_SDS = 3.5
-"""A difference that is larger by so many standard deviations is a step of the voltage and no noise. A convention."""
+"""A difference larger than this many standard deviations is a step of the voltage, not noise. A convention."""
 HELD_SHARE = 0.75
-"""Share of the differences in a steady stretch that tell how large noise may be: where a channel holds its values for
-several rows, up to half of the differences are nought."""
+"""Quantile of the differences in a steady stretch from which the scale of the noise is read: where a channel holds its
+values for several rows, up to half of the differences are zero."""
 HARMONICS = 200
-"""Harmonics of the error of rounding that are summed: 0.1 % of it is in the others."""
+"""Harmonics of the rounding error that are summed; 0.1 % of its mean square is in the others."""
 SETTLED_S = 5.0
-"""How long a current has been steady where noise is told from rows further apart, s: what relaxes faster is over."""
+"""Time, s, for which the current must have been steady before noise is estimated at longer lags: faster relaxation is
+then over."""
 LONGEST_SMOOTH_S = 8.0
-"""Longest lag, s, at which noise is looked for that a filter has made smooth, or a slow instrument holds: a convention,
-between the seconds that such channels take and the minutes that the voltage relaxes over."""
+"""Longest lag, s, at which the noise of a filtered or holding channel is looked for: a convention, between the seconds
+that such channels take and the minutes over which the voltage relaxes."""
 SMOOTH_LAGS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
-"""Lags, rows, that are tried."""
+"""Lags that are tried, rows."""
 FEWEST_SPANS = 50
-"""Spans of one lag after the other that tell the noise at a lag, to a tenth of it."""
+"""Fewest spans without overlap from which the noise at a lag is estimated, to a tenth of its value."""
 EVEN_TIMES = 1.5
-"""Factor on the typical time of so many rows by which a span may be longer: no third difference reaches over a gap."""
+"""Longest duration of a span, over the typical time of so many rows: no third difference reaches over a gap."""
 SMOOTH_TIMES = 1.25
-"""Factor by which noise has to be larger at a longer lag for the channel to be taken for one that is filtered or holds
-its values: two and a half of the standard deviations that `FEWEST_SPANS` leave. White noise stays as it is told from
+"""Least ratio of the noise at a longer lag to that of neighbouring rows for a channel to count as filtered or holding:
+two and a half of the standard deviations that `FEWEST_SPANS` leave. Otherwise the noise is white, as estimated from
 neighbouring rows."""
 SMALLEST_NOISE_V = 5e-5
-"""Least noise that is assumed, V: no cycler writes less, and in a virtual record without noise each microvolt would
-count."""
+"""Least noise that is assumed, V. No cycler has less, and in a virtual record without noise each microvolt would count
+as evidence."""
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedRecord:
     """One measurement as the tracer uses it.
 
-    data : as measured.  thin : what fits run on, fit and held-out part.  n_fit : rows of `thin` that fits may see.
-    fit_until_s : the time where the fit part of `data` ends (inf for all).  start : the state at the first row.
-    hold, thin_hold : how the current runs between the samples of either.  white_v : (n_thin,) V, standard deviation of
-    the noise in each row of `thin`.  as_white_v : (n_thin,) V, that of white noise which would leave as much to tell:
-    larger where rows share one value of the noise.  noise_full_v : of that in the fit part of `data`.
-    lead_rows : rows of `data` at the start that only lead to what is judged.
-    good : known to be good: nothing is looked for in it, and what others have beside it is what is different there.
-    continues : number of the record that fits have seen and that this one begins with, where it does.
+    data : as measured.  thin : thinned rows for fits, fit part and held-out part.  n_fit : rows of `thin` in the fit
+    part.  fit_until_s : time at which the fit part of `data` ends, s (inf for all).  start : state at the first row.
+    hold, thin_hold : how the current runs between the rows of `data` and of `thin`.  white_v : (n_thin,) V, standard
+    deviation of the noise in each row of `thin`.  as_white_v : (n_thin,) V, standard deviation of white noise with the
+    same information, larger where rows share one value of the noise.  noise_full_v : standard deviation of the noise in
+    the fit part of `data`, V.
+    lead_rows : number of first rows of `data` that are simulated but not judged.
+    good : known to be good: no effect acts on it, and the other records are compared with it.
+    continues : number of the fitted record whose rows this one begins with, or None.
     """
 
     data: Measurement
@@ -109,13 +110,13 @@ class PreparedRecord:
 
     @property
     def soc0_sd(self) -> float:
-        """Standard deviation of `soc0`. It is at least the difference between a state that was given and the one
-        that the voltage reads as: of two that disagree neither is known better than that."""
+        """Standard deviation of `soc0`, at least the difference between the state that was given and the one that the
+        voltage indicates: where the two disagree, neither is known better than that."""
         return max(self.start.sd, self.start.doubt)
 
     @property
     def other_soc0(self) -> float:
-        """A state of charge one standard deviation from that, towards the middle: the side that is safe to
+        """A state of charge one standard deviation from `soc0`, towards the middle: the side that is safe to
         simulate."""
         return self.soc0 + (-self.soc0_sd if self.soc0 > HALF_FULL else self.soc0_sd)
 
@@ -140,9 +141,9 @@ class PreparedRecord:
 class Noise(NamedTuple):
     """Noise of a record's rows.
 
-    sd_v : standard deviation, V.  resolution_v : the part of it that no mean of rows gets rid of, V: what the voltage
-    was rounded by where noise does not scatter it over more than one step.
-    rows : how many rows that follow each other share one value of the rest: one where it is white.
+    sd_v : standard deviation, V.  resolution_v : the part of it that averaging over rows does not reduce, V: the
+    rounding error, where noise does not scatter the voltage over several steps of the resolution.
+    rows : number of consecutive rows that share one value of the remaining noise; 1 where that is white.
     """
 
     sd_v: float
@@ -150,7 +151,7 @@ class Noise(NamedTuple):
     rows: int
 
     def of_means_v(self, rows: Array) -> Array:
-        """(m,) V: standard deviation of means over as many rows each as `rows` (m,) says."""
+        """(m,) V, standard deviations of means over `rows` (m,) rows each."""
         values = np.maximum(rows / self.rows, 1.0)
         return np.sqrt((self.sd_v**2 - self.resolution_v**2) / values + self.resolution_v**2)
 
@@ -158,7 +159,7 @@ class Noise(NamedTuple):
 def noise_of(data: Measurement, capacity_ah: float) -> Noise:
     """The noise of a record.
 
-    capacity_ah : of the cell, which tells where the current is steady.
+    capacity_ah : of the cell; a current counts as steady by its C-rate.
     """
     if len(data) < FEWEST_ROWS:
         return Noise(SMALLEST_NOISE_V, 0.0, 1)
@@ -174,8 +175,8 @@ def noise_of(data: Measurement, capacity_ah: float) -> Noise:
 def noise_floor_v(voltage_v: Array, current_a: Array) -> float:
     """Standard deviation of the white noise, V, from second differences where the current is steady.
 
-    voltage_v, current_a : (n,).  The scale is robust to the steps that remain; the smallest
-    voltage step over the root of twelve is the least it can be.
+    voltage_v, current_a : (n,) V, A.  The estimate is robust to voltage steps that remain. It is at least the smallest
+    voltage step over the root of twelve.
     """
     if len(voltage_v) < FEWEST_ROWS:
         return SMALLEST_NOISE_V
@@ -184,7 +185,7 @@ def noise_floor_v(voltage_v: Array, current_a: Array) -> float:
 
 
 def _from_row_to_row_v(voltage_v: Array, current_a: Array) -> float:
-    """As `noise_floor_v`, but for the least that it can be."""
+    """As `noise_floor_v`, without its lower limits."""
     second = voltage_v[2:] - 2.0 * voltage_v[1:-1] + voltage_v[:-2]
     change = np.abs(np.diff(current_a))
     change = np.maximum(change[1:], change[:-1])
@@ -192,9 +193,9 @@ def _from_row_to_row_v(voltage_v: Array, current_a: Array) -> float:
 
 
 def _scale(differences: Array, share: float = 0.5) -> float:
-    """Root mean square of differences, without those that are too large to be noise.
+    """RMS of differences, without those that are too large to be noise.
 
-    share : of the differences, the smallest ones, that tell how large noise may be.
+    share : quantile of their magnitude from which the scale of the noise is read, as of a normal distribution.
     """
     size = np.abs(differences)
     usual = float(np.quantile(size, share)) / float(ndtri(0.5 * (1.0 + share)))
@@ -203,17 +204,17 @@ def _scale(differences: Array, share: float = 0.5) -> float:
 
 
 def _quantum_v(voltage_v: Array) -> float:
-    """The smallest step of a voltage, V; nought where there is one value alone."""
+    """The smallest step of a voltage, V; zero where it has a single value."""
     steps = np.diff(np.unique(np.round(voltage_v, 6)))
     return float(steps.min()) if len(steps) else 0.0
 
 
 def _rounded_by_v(quantum_v: float, scattered_v: float) -> float:
-    """Root mean square, V, of what the mean of a constant voltage with white noise is off by since each of its rows
-    was rounded to a multiple of a quantum: quantum / sqrt(12) without noise, a 200th of that with noise of half a
-    quantum, which scatters it over its neighbours.
+    """RMS error, V, of the mean of a constant voltage with white noise whose rows are rounded to multiples of a
+    quantum: quantum / sqrt(12) without noise, a 200th of that with noise of half a quantum, which scatters the rows
+    over neighbouring multiples.
 
-    scattered_v : of the noise, what rounding adds to it included.
+    scattered_v : standard deviation of the rows, V, the part that rounding adds included.
     Widrow & Kollar, Quantization Noise (2008), chapter 4: the k-th harmonic of the error is q / (pi k) sin(2 pi k v/q),
     and is multiplied by exp(-2 (pi k s / q)**2) in the mean over noise of standard deviation s.
     """
@@ -228,12 +229,12 @@ def _rounded_by_v(quantum_v: float, scattered_v: float) -> float:
 
 
 def _smooth_noise_v(data: Measurement, capacity_ah: float) -> dict[int, float]:
-    """Standard deviation of the noise, V, by the lag, rows, at which values are compared: that of white noise is the
-    same at each, that of a filtered or held channel grows with the lag.
+    """Lag (rows) -> standard deviation of the noise, V, from differences at that lag. It is the same at each lag for
+    white noise, and grows with the lag for a channel that is filtered or holds its values.
 
-    From third differences in stretches of steady current, `SETTLED_S` after they begin, which tell noise from a
-    relaxing voltage. That grows as the cube of the lag; a lag at which the noise has grown by more than the lag did is
-    left out, with all that are longer, and so are those with fewer than `FEWEST_SPANS` spans that do not overlap.
+    It comes from third differences in stretches of steady current, `SETTLED_S` after they begin. A relaxing voltage
+    adds a part that grows as the cube of the lag: the lags end before one at which the noise grows by a larger factor
+    than the lag, or which has fewer than `FEWEST_SPANS` spans that do not overlap.
     """
     typical = float(np.median(np.diff(data.time_s))) if len(data) > 1 else np.inf
     settled = max(int(np.ceil(SETTLED_S / typical)), 1)
@@ -256,8 +257,8 @@ def _smooth_noise_v(data: Measurement, capacity_ah: float) -> dict[int, float]:
 
 
 def _calm(data: Measurement, span: int, longest_s: float, most_a: float) -> BoolArray:
-    """(n - span,) whether the current is steady from a row on to `span` rows later: as in the calmest of the spans that
-    take no longer and in which it moves by no more."""
+    """(n - span,) True where the current is steady from a row to the one `span` rows later: among the spans of at most
+    `longest_s` (s) whose current varies by at most `most_a` (A), the `CALM_SHARE` that vary least."""
     inside = slice((span + 1) // 2, (span + 1) // 2 + len(data) - span)
     highest, lowest = (of(data.current_a, span + 1)[inside] for of in (maximum_filter1d, minimum_filter1d))
     moves = highest - lowest
@@ -325,25 +326,25 @@ def _prepared(
 
 
 def _white_v(record: ThinnedRecord, noise: Noise, of_thin: Noise) -> Array:
-    """(n_thin,) V: noise of the rows of `thin`, by that of the rows of the record and of `thin` that fits see."""
-    if record.rows is not None:  # what lies between rows that far apart is no noise
+    """(n_thin,) V, noise of each row of `thin`.  noise, of_thin : of the fit part, as measured and thinned."""
+    if record.rows is not None:  # rows are too far apart for their differences to be noise
         return np.maximum(noise.of_means_v(record.rows), SMALLEST_NOISE_V)
-    # Averages have no more of it than rows: what a drive that never rests moves them by is not noise.
+    # Averages are no noisier than rows: a larger estimate comes from the load of a drive that never rests.
     return np.full(len(record.thin), min(max(of_thin.sd_v, noise.resolution_v), noise.sd_v))
 
 
 def _as_white_v(record: ThinnedRecord, noise: Noise, of_thin: Noise, white_v: Array, n_fit: int) -> Array:
-    """(n_thin,) V: `PreparedRecord.as_white_v` for the noise `white_v` (n_thin,) of the rows.
+    """(n_thin,) V, `PreparedRecord.as_white_v` for the noise `white_v` (n_thin,) of the rows.
 
-    As many rows as share a value tell no more than one of them does: those over which a channel is smooth, and those
-    that were rounded to one value, of which `resolution_v` is the same.
+    Rows that share one value of the noise carry the information of a single row: rows over which a channel is smooth,
+    and rows that were rounded to one value, which share the rounding error `resolution_v`.
     """
     share = np.maximum(noise.rows / record.rows, 1.0) if record.rows is not None else float(of_thin.rows)
     if not noise.resolution_v:
         return np.sqrt(share) * white_v
     code = np.round(record.thin.voltage_v / _quantum_v(record.whole.voltage_v))
     opens = np.diff(code, prepend=np.nan) != 0.0
-    opens[n_fit : n_fit + 1] = True  # what is held back moves nothing that fits see
+    opens[n_fit : n_fit + 1] = True  # rows held back must not change the weight of fitted ones
     alike = np.bincount(np.cumsum(opens) - 1)[np.cumsum(opens) - 1]
     scattered_v2 = np.maximum(white_v**2 - noise.resolution_v**2, 0.0)
     return np.sqrt(share * scattered_v2 + alike * noise.resolution_v**2)
@@ -359,11 +360,10 @@ def _temperature_noted(data: Measurement) -> tuple[str, ...]:
 
 
 def led_by(data: Measurement, seen: Sequence[Measurement]) -> tuple[int, Measurement] | None:
-    """The record among those that fits have seen that `data` goes on from: its index, and both as one record; None
-    where there is none.
+    """(index of the fitted record that leads to `data`, both as one record); None where no fitted record does.
 
-    It is the longest that `data` begins with, or else the first that `data` continues. The latter are not joined where
-    only one of the two has a temperature, since no simulation could run at half a column.
+    It is the longest one with whose rows `data` begins, else the first one that `data` continues. The latter is not
+    joined where only one of the two has a temperature: a simulation needs the whole column.
     """
     begun = [index for index, known in enumerate(seen) if _begins_with(data, known)]
     if begun:
@@ -391,10 +391,10 @@ def prepare_test(
     soc0: float | None,
     given: Sequence[ActiveEffect] = (),
 ) -> PreparedRecord:
-    """A test record, which chooses nothing, made ready.
+    """A prepared test record, to which nothing is fitted.
 
-    Where a record that fits have seen leads to it (`led_by`), the model runs through that and only what comes after is
-    judged; its notes say so in place of a state that its own first row would give.
+    Where a fitted record leads to it (`led_by`), the simulation starts with that record and only the later rows are
+    judged. The notes then say so, in place of a state of charge read from the first row.
     """
     led = led_by(data, seen)
     if led is None:
@@ -429,9 +429,10 @@ def prepare_all(
     given: Sequence[ActiveEffect] = (),
     good: Sequence[Measurement] = (),
 ) -> tuple[PreparedRecord, ...]:
-    """`prepare` over several measurements, thinned until their sum is within what fits can afford.
+    """The prepared records of several measurements, thinned together (`thinned_together`).
 
-    good : those that are known to be good, which stand last. They are fitted whole, and start where their voltage says.
+    good : measurements that are known to be good. Their records come last, are fitted whole, and take the initial state
+    of charge from their voltage.
     """
     rows = thinned_together(cell, (*measurements, *good))
     shared = len(measurements) > 1

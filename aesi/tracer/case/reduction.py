@@ -1,4 +1,4 @@
-"""Approximations of the model itself, numerics and reduction, settled before anything is sought in the cell."""
+"""Approximations of the model itself (numerics, reduction to a single particle), settled before the search."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from aesi.tracer.case.problem import InverseProblem, ValuesByOwner
 MODELS: tuple[ModelName, ModelName] = ("espm", "dfn")
 
 NOTABLE_SHARE = 0.1
-"""Share of the noise: an approximation that moves the voltage by more is undone in every hypothesis. A convention:
-one that moves it by less raises an error by half a percent at most."""
+"""Share of the noise: an approximation that moves the voltage by more (RMS) is undone in every hypothesis. A
+convention: one that moves it by less raises an error by half a percent at most."""
 LEAST_V = 1e-4
-"""RMS by which two solvers of one model differ: 99 of 100 right hypotheses err by less
+"""RMS difference of two solvers of one model, V: 99 of 100 right hypotheses err by less
 (`python -m aesi.bench.solver_error`)."""
 
 
@@ -38,16 +38,16 @@ def with_fine_numerics(problem: InverseProblem) -> InverseProblem:
 
 
 def let_stand(problem: InverseProblem, shift_v: float) -> InverseProblem:
-    """The problem with one approximation more that moves the voltage by this RMS (V)."""
+    """The problem, with one more approximation kept that moves the voltage by `shift_v` (V RMS)."""
     return replace(problem, approximated_v=float(np.hypot(problem.approximated_v, shift_v)))
 
 
 @dataclass(frozen=True)
 class Reduction:
-    """What the single particle leaves out of the porous electrode of one cell.
+    """Difference of the single particle model and the porous electrode model of one cell.
 
-    shift_v : root mean square over what fits see, V.  noise_v : of the rows there, with what thinning left open.
-    of : which cell, in words.
+    shift_v : RMS difference of the voltages over the fitted rows, V.  noise_v : noise of these rows, V, with the
+    uncertainty from thinning.  of : which cell, in words.
     """
 
     shift_v: float
@@ -56,12 +56,12 @@ class Reduction:
 
     @property
     def notable(self) -> bool:
-        """True where it is too much to be passed over, or has no value (NaN)."""
+        """True where the difference is too large to be neglected, or is NaN."""
         return not self.shift_v <= max(NOTABLE_SHARE * self.noise_v, LEAST_V)
 
     @property
     def sentence(self) -> str:
-        """How far the two models differ, beside the noise that decides what is notable."""
+        """How far the two models differ, compared with the noise: a clause for messages."""
         times = self.shift_v / self.noise_v
         return (
             f"the porous electrode (dfn) and the single particle (espm) of {self.of} differ by "
@@ -71,10 +71,10 @@ class Reduction:
 
 
 def reduction_of(problem: InverseProblem, values: ValuesByOwner | None = None) -> Reduction | None:
-    """How far the two models of a cell differ on its records. None where one of them cannot be simulated, or where the
-    declared model already holds an effect that undoes the reduction.
+    """The difference of the two models of a cell on its records. None where one of them cannot be simulated, or where
+    the declared model already holds an effect that undoes the reduction.
 
-    values : owner -> name -> value where a hypothesis ended; None: the declared cell.
+    values : owner -> name -> value of a fitted hypothesis; None takes the declared cell.
     """
     if any(active.effect.refines == "reduction" for active in problem.fixed):
         return None

@@ -16,7 +16,7 @@ from aesi.records import Measurement
 LONGEST_STEP_S = 60.0
 """A minute is short beside diffusion at C/20."""
 STEPS_A_SAMPLE = 4
-"""Steps of the model between two rows."""
+"""Most steps of the model between two rows."""
 
 PARAMETERS = {
     "substep_s": Parameter(
@@ -29,8 +29,8 @@ PARAMETERS = {
 
 
 def longer_steps(model: EspmModel, *, substep_s: float) -> EspmModel:
-    """The model with another longest step, and few of them between two samples: records are thinned to where little
-    happens between them."""
+    """The model with another longest step, s, and at most `STEPS_A_SAMPLE` steps between two rows: thinned records have
+    rows wherever much happens."""
     return replace(model, substep_s=substep_s, most_substeps=STEPS_A_SAMPLE)
 
 
@@ -52,7 +52,7 @@ FEWER_POINTS = Effect("fewer_points", "instrument", __doc__ or "", on_model=fewe
 
 @lru_cache(maxsize=64)
 def stepping(data: Measurement) -> tuple[ActiveEffect, ...]:
-    """The effect that a record is simulated with: longer steps where samples are far apart, else none."""
+    """The numerics for one record: an effect with longer steps where rows are far apart, else an empty tuple."""
     gaps = np.diff(data.time_s)
     if float(gaps.max(initial=0.0)) <= STEPS_A_SAMPLE * DEFAULT_SUBSTEP_S:
         return ()

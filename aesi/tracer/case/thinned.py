@@ -1,7 +1,7 @@
-"""Records as fits see them: fewer rows, which keep charge and the linear part of the response.
+"""Thinned records for fits: fewer rows, which keep charge and the linear part of the response.
 
-Rows are averages over symmetric windows, of current and voltage alike; of tests at steady currents with pulses and
-rests, and of records with uneven times, rows that are dense after each step.
+Rows of a drive are averages over symmetric windows, of current and voltage alike. Tests at steady currents with pulses
+and rests, and records with uneven times, get rows that are dense after each step.
 """
 
 from __future__ import annotations
@@ -32,9 +32,10 @@ STEADY_SPACING = Spacing(first_s=0.5, growth=0.25)
 
 @dataclass(frozen=True, eq=False)
 class ThinnedRecord:
-    """whole : the record as measured.  thin : the rows of it that fits see, the same object where these are all.
+    """A record as measured, with its thinned copy.
 
-    rows : (n_thin,) how many rows of `whole` each stands for, None for the even windows of a drive.
+    whole : as measured.  thin : the thinned rows; the same object where no row was dropped.
+    rows : (n_thin,) number of rows of `whole` that each thinned row stands for; None for the even windows of a drive.
     hold : how the current of `whole` runs between its rows.
     """
 
@@ -49,12 +50,12 @@ class ThinnedRecord:
         return self.hold if self.thin is self.whole or self.rows is not None else "linear"
 
     def averaged(self, voltage_v: Array) -> Array:
-        """(n_thin,) V: another voltage of the whole record (n,) as its own was thinned."""
+        """(n_thin,) V, a voltage (n,) over the whole record, averaged like the record's own."""
         return self.thin.window.averages(voltage_v) if isinstance(self.thin, Averaged) else voltage_v
 
 
 def thinned_record(cell: Cell, data: Measurement, step_s: float = THIN_STEP_S) -> ThinnedRecord:
-    """One record; at most one sample in `step_s` of a drive."""
+    """One record, thinned; a drive to at most one row in `step_s` (s)."""
     hold = data.hold_taken
     longest_s = float(data.time_s[-1] - data.time_s[0]) / STEADY_SAMPLES
     steady = condensed(data, cell.nominal_capacity_ah, longest_s, STEADY_SPACING, hold)
@@ -63,7 +64,7 @@ def thinned_record(cell: Cell, data: Measurement, step_s: float = THIN_STEP_S) -
 
 
 def thinned_together(cell: Cell, measurements: Sequence[Measurement]) -> list[ThinnedRecord]:
-    """Several, thinned until their sum is within what fits can afford."""
+    """Several records, thinned until they have at most `FIT_SAMPLES` rows in all or windows reach `DOUBLED_UNTIL_S`."""
     step_s = THIN_STEP_S
     while True:
         records = [thinned_record(cell, data, step_s) for data in measurements]
@@ -73,8 +74,8 @@ def thinned_together(cell: Cell, measurements: Sequence[Measurement]) -> list[Th
 
 
 def lost_v(cell: Cell, record: ThinnedRecord, soc0: float, given: Sequence[ActiveEffect]) -> Array:
-    """(n_thin,) V that thinning takes from the voltage of the declared model: its voltage on the whole record, averaged
-    over the thinned rows, less its voltage on the thinned record; nought where it cannot be simulated.
+    """(n_thin,) V, error of the declared model's voltage by thinning: its voltage on the whole record, averaged over
+    the thinned rows, minus its voltage on the thinned record; zero where it cannot be simulated.
 
     The two differ since kinetics are not linear in the current: the average of a voltage over a step of the current is
     not the voltage at the average current.

@@ -1,4 +1,4 @@
-"""How far the declared parameters, and where records begin, are believed."""
+"""How far the declared parameters and the initial states of records are believed."""
 
 from __future__ import annotations
 
@@ -8,32 +8,34 @@ from aesi.parameters import Parameter
 from aesi.physics.effect import Effect
 
 Trust = Literal["exact", "tight", "loose", "measured", "lasting", "beside"]
-"""How far the declared parameters are believed. exact: fitted to this very cell by this very model.  tight: a careful
-parametrisation of this cell.  loose: one of another cell of its make.  measured: fitted to this very cell by a model
-that errs as models of measured cells do, its records read by instruments that may be off.  lasting: the same, where
-what is gone within seconds does not count.  beside: as lasting, with records of the cell that are known to be good, so
-that the question is what is different about the others."""
+"""How far the declared parameters are believed.
+exact: fitted to this very cell with this very model.
+tight: a careful parametrisation of this cell.
+loose: a parametrisation of another cell of the same make.
+measured: fitted to this very cell, with a model error as usual for measured cells and instruments that may be off.
+lasting: as measured, without the part of the error within seconds.
+beside: as lasting, with records of the cell that are known to be good; the question is how the others differ."""
 MEASURED_CELL: tuple[Trust, ...] = ("measured", "lasting", "beside")
-"""Where the file is believed, and the model errs as models of measured cells do."""
+"""Trusts at which the file is believed, with a model error as usual for measured cells."""
 AGEING: tuple[Trust, ...] = ("loose", "measured", "lasting")
-"""Where the records of a cell may be of several ages: not where something explains them all, and what is sought beside
-good records is what has changed since."""
+"""Trusts at which records may be of several ages. At exact and tight a model has to explain all records at one age; at
+beside, an age that differs from the good records' is itself an answer."""
 BESIDE_SOC0_SD = 5e-3
 """Least standard deviation of an initial state of charge beside good records: starts at a full charge are off by 0.33 %
 RMS on 24 pairs of development records (`python -m aesi.bench.real.repeatability`)."""
 EXACT_SHARE = 0.1
-"""Share of the tight spread of a declared parameter that is left to it where the file is believed exactly. A
-convention: not nought, so that round-off of the numerics is no evidence for an effect."""
+"""Factor on the tight spread of a declared parameter where the file is believed exactly. A convention: not zero, so
+that round-off of the numerics is no evidence for an effect."""
 
 
 def start_sd(trust: Trust, read_sd: float) -> float:
-    """Standard deviation of an initial state of charge.  read_sd : as it was read from the record."""
+    """Standard deviation of an initial state of charge.  read_sd : the one that was read from the record."""
     return max(read_sd, BESIDE_SOC0_SD) if trust == "beside" else read_sd
 
 
 def own_sd(trust: Trust, effect: Effect, p: Parameter, capacity_ah: float) -> float | None:
-    """Standard deviation of a parameter that the model of a cell of this capacity declares, of its logarithm where it
-    has a logarithmic scale; None where nothing is open."""
+    """Prior standard deviation of a declared parameter of a cell of this capacity (Ah), in the parameter's unit, or of
+    its logarithm where it has a logarithmic scale; None where the parameter is fixed at this trust."""
     if p.spread is None:
         return None
     measured_cell = trust in MEASURED_CELL

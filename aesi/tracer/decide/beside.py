@@ -1,9 +1,10 @@
-"""What is different about some records, with others of the same cell beside them that are known to be good?
+"""How do some records differ from other records of the same cell that are known to be good?
 
-The model errs on all of them. The good records say how large its error is in this cell, and what of the instruments
-all of them share; effects act on the others alone. What is named is a difference between records, and what a right
-answer may leave is what the model leaves of the good ones. What the cell is made with is alike in all. Its age should
-be, and is asked about: a cell that has lost lithium since the good records reads like one whose current reads too low.
+The model errs on all records. The good ones show how large its error is for this cell, and which instrument errors all
+records share. Effects act on the other records alone, so that a named effect is a difference between records. A right
+answer may leave an error as large as that on the good records. The design of the cell is the same in all records. Its
+age should be, and is checked: a cell that has lost lithium since the good records looks like one whose current reads
+too low.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ from aesi.tracer.search.wrong_parameters import NINETY
 def gathered_beside(
     problem: InverseProblem, max_effects: int, archive: Archive, thresholds: Thresholds, report: Report
 ) -> Answer:
-    """Search for what the records have that the good ones have not, and judge.
+    """The search for effects that act on the other records and not on the good ones, with its verdict.
 
     Raises DataError where the model cannot be simulated on the records.
     """
@@ -68,8 +69,7 @@ def _settled(path: Path, verdict: Verdict) -> Evidence:
 
 
 def _of_another_age(path: Path, archive: Archive) -> list[FittedHypothesis]:
-    """What would be left of the records if, instead of what is named, the cell had aged since the good ones; the
-    best first."""
+    """The fitted hypotheses in which the cell has aged since the good records, one ageing effect each; best first."""
     names = [name for name, effect in path.problem.effects.items() if effect.of_age]
     grown = grown_with(Parent(path.problem, path.blocks, path.base), names, archive)
     fits = (fitted_hypothesis(path.problem, path.blocks, one.hypothesis, one, archive) for one in grown)
@@ -77,11 +77,11 @@ def _of_another_age(path: Path, archive: Archive) -> list[FittedHypothesis]:
 
 
 def of_one_age(verdict: Verdict, believed: Explanation, aged: Sequence[Explanation]) -> Verdict:
-    """The verdict, with what an age of its own would say as well of the records among the look-alikes; no name where
-    it says more.
+    """The verdict, checked against ageing. Ageing effects that score as well join the look-alikes; where one scores
+    better, the verdict is `unknown` without a name.
 
-    believed : what the verdict names, or the model without an effect.  aged : what an age would say instead, the best
-    first.
+    believed : the hypothesis of the verdict, or the model without an effect.  aged : hypotheses with an ageing effect
+    instead, best first.
     """
     better = tuple(one for one in aged if not alike(one, believed))
     if better:
@@ -114,10 +114,10 @@ def of_one_age(verdict: Verdict, believed: Explanation, aged: Sequence[Explanati
 
 @dataclass(frozen=True)
 class Usual:
-    """What a right answer may leave of the records in question, V beyond the noise.
+    """Error that a right answer may leave on the records in question, V RMS beyond the noise.
 
-    good_v : what the model leaves of the good records.  usual_v : with what a right hypothesis leaves of any.
-    allowed_v : with chance, by which the errors of two records differ.
+    good_v : error of the model on the good records.  usual_v : that and the tolerance for any right hypothesis, added
+    as squares.  allowed_v : usual_v, enlarged by the difference that two records may have by chance.
     """
 
     good_v: float
@@ -126,26 +126,26 @@ class Usual:
 
     @classmethod
     def of(cls, path: Path, believed: FittedHypothesis, thresholds: Thresholds) -> Usual:
-        """The usual error in a search, by the hypothesis that is believed."""
+        """The errors under the hypothesis that is believed."""
         problem, good = path.problem, path.problem.good_rows
         good_v = left_v(path, believed, good & problem.compared)
         usual_v = float(np.hypot(good_v, tolerance_v(problem, thresholds)))
         return cls(good_v, usual_v, usual_v * (1.0 + NINETY * _relative_sd(problem, good)))
 
     def said_nats(self, path: Path, one: FittedHypothesis) -> float:
-        """Nats that a hypothesis gains over none, weighed by the error that these records show for themselves: where
-        more is left than may be, by the ratio of the two mean squares."""
+        """Gain of a hypothesis over the bare model, nats. Where it leaves more than `allowed_v` on the records in
+        question, the gain is multiplied by the ratio of the mean squares (usual_v / left)**2."""
         left = left_v(path, one, ~path.problem.good_rows)
         return path.gain(one) * (1.0 if left <= self.allowed_v else (self.usual_v / left) ** 2)
 
 
 def judged_beside(path: Path, thresholds: Thresholds) -> Verdict:
-    """The verdict on a search beside good records; its confidence is still to be read off the margin."""
+    """The verdict on a search beside good records, without its confidence (`evidence.with_confidence`)."""
     problem, usual = path.problem, Usual.of(path, path.chosen, thresholds)
     before, left = (left_v(path, one, ~problem.good_rows) for one in (path.base, path.chosen))
     named = path.chosen.hypothesis
     if left > usual.allowed_v and usual.said_nats(path, path.chosen) < path.admission_nats:
-        # Of the error that these records show by themselves it does not say enough: what is told is of the rest.
+        # The gain is too small for the error on these records: the verdict is on the model without an effect.
         named, left, usual = (), before, Usual.of(path, path.base, thresholds)
     allowed = usual.allowed_v
     groups, margin = look_alikes(path, thresholds, max(allowed, left)) if named else ((), -best_gain(path))
@@ -164,12 +164,12 @@ def judged_beside(path: Path, thresholds: Thresholds) -> Verdict:
 
 
 def left_v(path: Path, one: FittedHypothesis, rows: BoolArray) -> float:
-    """V RMS that a hypothesis leaves beyond noise on some rows, in blocks that it has not seen."""
+    """RMS error of a hypothesis beyond noise, V, on `rows` (n,) of left-out blocks."""
     return beyond(rms(held_out_residual(path.blocks, one)[rows]), rms(path.problem.white_v[rows]))
 
 
 def _relative_sd(problem: InverseProblem, good: BoolArray) -> float:
-    """Relative standard deviation of the difference between the root mean squares of both kinds of record: each of N
-    independent samples is uncertain by one over the root of 2 N."""
+    """Relative standard deviation of the difference between the RMS errors of the two kinds of record: an RMS of N
+    independent samples has a relative standard deviation of one over the root of 2 N."""
     many = [float(problem.independent[rows].sum()) for rows in (good, ~good)]
     return float(np.sqrt(sum(0.5 / n for n in many)))

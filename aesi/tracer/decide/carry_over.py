@@ -1,4 +1,4 @@
-"""Does what was fitted carry over: to records that it has not seen, and over the range that the cell file declares?"""
+"""Does a fit carry over to records that it has not seen, and over the range that the cell file declares?"""
 
 from __future__ import annotations
 
@@ -23,13 +23,14 @@ from aesi.tracer.search.fitted import values_without
 
 ORDINARY_C = (1.0, -0.5)
 FAST_C = (2.0, 3.0)
-"""Full discharges and charges that a model has to be good for; fast ones can deplete the electrolyte of a real cell."""
+"""C-rates (discharge positive) of full discharges and charges that a model has to run; fast ones can deplete the
+electrolyte of a real cell."""
 BY_CHANCE = 1.0 + (2.0 / RANGES / INDEPENDENT_CHARGE) ** -0.5
-"""Factor by which an error over one range of charge may differ by chance, given how long the errors of measured
-cells last: an RMS of N independent samples has a relative standard deviation of one over the root of 2 N."""
+"""Factor by which an RMS error over one range of charge may differ by chance, given how long errors of measured cells
+stay correlated: an RMS of N independent samples has a relative standard deviation of one over the root of 2 N."""
 LEAST_SHARE = 0.8
-"""Least share of the declared model's time that a model has to run on a full discharge: one that runs empty later
-has its voltage all but at the limit. On development records of `aesi bench real` without their temperature, models
+"""Least duration of a full discharge, over that of the declared model: a model that runs empty later is already close
+to its voltage limit. On development records of `aesi bench real` without their temperature, models
 that ran empty at 85 and 90 % of it left 7.1 and 5.0 mV of the last part (declared 22.9), those at 68 and 3 % left
 152 and 94 (what was named alone 78)."""
 STEP_S = 10.0
@@ -38,10 +39,10 @@ STEP_S = 10.0
 
 @dataclass(frozen=True)
 class LeftOut:
-    """What one model leaves on data that it has not seen, V RMS; infinite where it could not be simulated.
+    """Errors of one model on data that it has not seen, V RMS; infinite where it could not be simulated.
 
-    by_record : (k,) each record, all rows as measured, where the others put the model.  by_range : (p,) of what fits
-    see of those in turn, by range of charge, as far as where they begin is known.
+    by_record : (k,) on each record, all rows as measured, with the model fitted to the other records.  by_range : (p,)
+    on the thinned rows of each record by range of charge, down-weighted where the initial state is too uncertain.
     """
 
     by_record: tuple[float, ...]
@@ -49,21 +50,21 @@ class LeftOut:
 
     @property
     def pooled_v(self) -> float:
-        """Root mean square over the records, V."""
+        """RMS of `by_record`, V."""
         return rms(self.by_record)
 
     def harms(self, other: LeftOut) -> bool:
-        """Whether the model is worse than another one in a range of charge, by more than models of measured cells
-        err by and by more than chance."""
+        """Whether the model is worse than another one in a range of charge, by more than the usual error of measured
+        cells and by more than chance."""
         allowed = np.maximum(np.hypot(other.by_range, MOST_MEASURED_V), BY_CHANCE * np.array(other.by_range))
         return bool(np.any(np.array(self.by_range) > allowed))
 
 
 def left_out_errors(problem: InverseProblem, blocks: Blocks, one: FittedHypothesis | None) -> LeftOut:
-    """What a hypothesis leaves on each record, fitted to the other records (of a single record: on its last third,
-    fitted to the rest).
+    """The errors of a hypothesis on each record, fitted to the other records; for a single record, on its last third,
+    fitted to the rest.
 
-    None stands for the model as declared.
+    one : the hypothesis; None takes the declared model.
     """
     folds = blocks.folds["record" if len(problem.records) > 1 else "end"]
     charges = [np.isin(blocks.of_row, charge) for charge in blocks.folds["charge"]]
@@ -79,11 +80,11 @@ def left_out_errors(problem: InverseProblem, blocks: Blocks, one: FittedHypothes
 
 
 def _tells(problem: InverseProblem) -> Array:
-    """(n,) weight of each row as evidence of a fault of the model, where its record is left out.
+    """(n,) weight of each row, 0 to 1, as evidence of a fault of the model, where its record is left out.
 
-    How such a record begins (`ModelState.simulated`) is uncertain. Where that is worth more than models of measured
-    cells are off by, as on the knee at the end of a discharge, an error is no evidence of harm. A left-out part of a
-    single record begins where the rest of it ends, which is known.
+    The initial state of such a record (`ModelState.simulated`) is uncertain. Where it changes the voltage by more than
+    the usual error of measured cells, as on the knee at the end of a discharge, an error is no evidence against the
+    model. The left-out part of a single record begins at the end of the rest, where the state is known.
     """
     if len(problem.records) == 1:
         return np.ones(len(problem.measured))
@@ -93,10 +94,10 @@ def _tells(problem: InverseProblem) -> Array:
 def _left_out_residuals(
     problem: InverseProblem, blocks: Blocks, one: FittedHypothesis | None, k: int, fold: Sequence[int]
 ) -> tuple[Array, Array]:
-    """V of the rows of a fold, which are of record k: (n_whole,) all as measured, and (n_out,) those that fits see;
-    where the model fails infinite, the first in one row.
+    """(residual of all rows as measured (n_whole,), residual of the thinned rows (n_out,)), V, over a fold of record k.
+    Where the model fails both are infinite, the first with a single row.
 
-    What fits see are means over seconds, in which an instrument's lag is gone that a step of the current shows.
+    Thinned rows are means over seconds, which hide a lag of an instrument that the rows as measured show.
     """
     out = np.isin(blocks.of_row[problem.slices[k]], fold)
     record = problem.records[k]
@@ -115,11 +116,11 @@ def _left_out_residuals(
 
 
 def range_fault(state: ModelState, rates_c: Sequence[float] = (*ORDINARY_C, *FAST_C)) -> str | None:
-    """Why the model cannot be simulated over the range that the cell declares, although the declared model can: full
-    discharges and charges at these rates, at the temperatures of the records; None where it can.
+    """Why the model fails on a full discharge or charge that the declared model can run, a sentence; None where it runs
+    them all: at these C-rates, at the temperatures of the records.
 
-    Where a surface runs out of lithium at the very end of a discharge, the voltage is all but at its limit: a model is
-    at fault where it runs out long before the declared one ends.
+    A particle surface may run out of lithium at the very end of a discharge, with the voltage close to its limit. The
+    model is at fault only where it runs out long before the declared one ends.
     """
     declared = ModelState(state.problem)
     for temperature in temperatures_degc(state.problem):
@@ -134,7 +135,7 @@ def range_fault(state: ModelState, rates_c: Sequence[float] = (*ORDINARY_C, *FAS
 
 
 def temperatures_degc(problem: InverseProblem) -> tuple[float | None, ...]:
-    """The least and the largest measured temperature of the records; None alone where none was measured."""
+    """The lowest and the highest measured temperature of the records, degC; (None,) where none was measured."""
     measured = [r.data.temperature_degc for r in problem.records]
     known = [t for t in measured if t is not None]
     if not known:
@@ -143,8 +144,8 @@ def temperatures_degc(problem: InverseProblem) -> tuple[float | None, ...]:
 
 
 def _end(state: ModelState, rate: float, temperature: float | None) -> tuple[float, str | None]:
-    """Seconds until a full discharge or charge ends, and a sentence where the model runs empty before the voltage
-    reaches its limit."""
+    """(s until a full discharge or charge ends; a sentence where the model runs empty before its voltage limit, else
+    None)."""
     cell = state.problem.cell
     profile, soc0 = full_course(cell, rate, temperature)
     time = profile.time_s
@@ -165,11 +166,10 @@ def _end(state: ModelState, rate: float, temperature: float | None) -> tuple[flo
 
 
 def full_course(cell: Cell, rate_c: float, degc: float | None) -> tuple[Measurement, float]:
-    """A discharge from full to empty (rate > 0) or a charge at a constant current, without voltages, and the state of
-    charge at its first row.
+    """(full discharge (rate_c > 0) or charge at constant current, without voltages; state of charge at its first row).
 
-    rate_c : 1/h, of the nominal capacity. It lasts as long as the charge between the limits of stoichiometry does,
-    which may be more than the nominal capacity: the knee of a discharge lies at its very end.
+    rate_c : C-rate, 1/h, of the nominal capacity.  degc : temperature, degC, or None. The course moves all charge
+    between the stoichiometry limits, which may exceed the nominal capacity: the knee of a discharge lies at its end.
     """
     current_a = rate_c * cell.nominal_capacity_ah
     steps = math.ceil(SECONDS_PER_HOUR * cell.capacity_ah / abs(current_a) / STEP_S)

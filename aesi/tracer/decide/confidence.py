@@ -1,4 +1,4 @@
-"""How often a verdict of this kind, with this margin, is right: measured on blind cases, read from a file.
+"""The confidence of a verdict: how often verdicts of its kind with its margin were right on blind cases.
 
     p = 1 / (1 + exp(-(a + b m)))        m the margin of the verdict, a and b by kind of verdict
 
@@ -26,22 +26,22 @@ from aesi.numerics.typing import Array
 
 FILE = "confidence.json"
 SLOPE_PRIOR = 0.1
-"""Prior precision (one over the variance) of the slope. Three per standard deviation of margin keeps a few cases
-from making a step; a convention."""
+"""Prior precision (one over the variance) of the slope: a standard deviation of three per unit of margin, so that a few
+cases cannot make a step. A convention."""
 HIGHEST = 0.99
 """Highest confidence that some hundred cases can vouch for."""
 
 
 @dataclass(frozen=True)
 class FrequencyMap:
-    """Intercept and slope of one kind of verdict; cases : behind them."""
+    """Logistic map from margin to frequency for one kind of verdict.  cases : number of cases that it was fitted to."""
 
     intercept: float
     slope: float
     cases: int
 
     def frequency(self, margin: float) -> float:
-        """How often a verdict with this margin is right."""
+        """Frequency, 0 to 1, with which a verdict with this margin is right."""
         return min(float(1.0 / (1.0 + np.exp(-(self.intercept + self.slope * margin)))), HIGHEST)
 
 
@@ -63,7 +63,7 @@ def fitted_map(margins: Sequence[float], right: Sequence[bool]) -> FrequencyMap:
     m, y = np.append(m, [middle, middle]), np.append(y, [1.0, 0.0])
 
     def surprise(weights: Array) -> tuple[float, Array]:
-        """Nats, and their slopes."""
+        """(negative log likelihood with the prior, nats; its gradient)."""
         line = weights[0] + weights[1] * m
         nats = -float(np.sum(y * log_expit(line) + (1.0 - y) * log_expit(-line)))
         off = expit(line) - y

@@ -1,4 +1,4 @@
-"""All that a verdict rests on: the searches at each trust in the declared parameters, and what carries over."""
+"""The evidence for a verdict: the searches at each trust in the declared parameters, and which model carries over."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ from aesi.tracer.search.plausible import most_plausible, plausibility
 from aesi.tracer.search.wrong_parameters import beyond_spread, with_wrong_parameters
 
 MEASURED_EFFECTS = 1
-"""Most names beside `unknown`. What is left after one is mostly no larger than what models of measured cells leave,
-and of eight second names on development records of `aesi bench real` one was right. Whoever wants more can search on
+"""Most effects named together with `unknown`. With one, the error left is mostly no larger than usual for measured
+cells, and of eight second names on development records of `aesi bench real` one was right. A further search can start
 from the written model."""
 STAND_INS = 1
 """Most effects that are written, without being named, beside open own parameters. On the NMC cell (C/20, C/2, 1C and
@@ -45,12 +45,12 @@ MOST_EFFECTS: dict[Trust, int] = {"measured": MEASURED_EFFECTS, "loose": STAND_I
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """All that the verdict and the written model rest on.
+    """A verdict with its searches and models.
 
     path : the search that the verdict is about.  paths : all searches, by trust.  recalibrated : the declared model
-    with all of its own parameters open.  after : the model that is written.
-    fault : why the chosen hypothesis, or the recalibrated model, is not what is written.  limits : where the written
-    model stops short of the declared one.
+    with all of its own parameters fitted.  after : the model that is written.
+    fault : why the chosen hypothesis, or the recalibrated model, is not written; None where it is.  limits : sentences
+    on loads that the declared model can run and the written one cannot.
     """
 
     path: Path
@@ -64,10 +64,9 @@ class Evidence:
 
 @dataclass(frozen=True, eq=False)
 class _Searches:
-    """How a case is searched, and what was searched so far.
+    """The searches of a case at each trust, made on demand.
 
-    paths : by trust in the declared parameters, each searched where it is first asked for.
-    shallower : the same with fewer effects.
+    paths : trust -> search made so far.  shallower : the same of an earlier search with fewer effects.
     """
 
     max_effects: int
@@ -90,10 +89,10 @@ class _Searches:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """The answer of the searches with one model of the cell, before it is settled what to write.
+    """The answer of the searches with one model of the cell, before the written model is chosen.
 
-    path : the search that is believed.  verdict : on it.  paths : all of them so far, by trust.
-    settled : gives, for a verdict on that path, the evidence with the model that is written.
+    path : the search that is believed.  verdict : on it.  paths : all searches so far, by trust.
+    settled : verdict on that path -> evidence, with the written model.
     """
 
     path: Path
@@ -110,9 +109,9 @@ def gathered(
     report: Report,
     shallower: Answer | None = None,
 ) -> Answer:
-    """Search and judge; what carries over is checked where the answer is settled.
+    """The searches of a case with their verdict. `Answer.settled` checks what carries over.
 
-    shallower : of the same searches with fewer effects.
+    shallower : answer of the same searches with fewer effects, to be reused.
     Raises DataError where the model cannot be simulated on the records.
     """
     begun = {} if shallower is None else shallower.paths
@@ -131,8 +130,8 @@ def _settled(problem: InverseProblem, path: Path, searches: _Searches, verdict: 
 
 
 def _best_explanation(problem: InverseProblem, searches: _Searches) -> tuple[Path, Verdict]:
-    """The search that is believed of those at the trusts `tight` and `exact`, and the verdict on it: `unknown` where
-    none of them explains the data."""
+    """(the believed one of the searches at the trusts `tight` and `exact`, the verdict on it); the verdict is `unknown`
+    where neither explains the data."""
     archive, thresholds = searches.archive, searches.thresholds
     path = searches.at(problem, "tight")
     verdict = judged(path, thresholds)
@@ -153,10 +152,10 @@ def _best_explanation(problem: InverseProblem, searches: _Searches) -> tuple[Pat
 
 
 def _unexplained(problem: InverseProblem, path: Path, verdict: Verdict, searches: _Searches) -> Evidence:
-    """Evidence where nothing explains the data: the names of the coarsened search beside `unknown`, and the model that
-    carries over best.
+    """Evidence where nothing explains the data: `unknown` with the effects that the coarsened search names, and the
+    model that carries over best.
 
-    path, verdict : the search that is believed, and `unknown`.
+    path, verdict : the search that is believed, and its verdict `unknown`.
     """
     archive, tight = searches.archive, searches.paths["tight"]
     recalibrations = _recalibrations(problem, tight, archive)
@@ -167,7 +166,7 @@ def _unexplained(problem: InverseProblem, path: Path, verdict: Verdict, searches
         options += _with_stand_ins(searches.at(problem, "loose"), blocks)
     named: list[Option] = []
     if path.beyond_reach_v is not None:
-        path = measured  # the only one that tried anything
+        path = measured  # no other search tried an effect
     if measured.chosen.hypothesis:
         path, verdict = measured, partly(measured, verdict, searches.thresholds)
         named = named_options(lasting, tight, blocks, archive)
@@ -181,7 +180,7 @@ def _unexplained(problem: InverseProblem, path: Path, verdict: Verdict, searches
 
 
 def of_several_ages(problem: InverseProblem, archive: Archive) -> bool:
-    """Whether the declared parameters gain on unseen data where each record has a capacity of its own.
+    """Whether the declared model gains on unseen data when each record has a capacity of its own.
 
     On the NMC cell's records, all of one age, they lose 4 to 5 nats. Those of the LG M50T, the LG HG2 and the
     Panasonic, which took weeks, gain 20, 3 to 5 and 2 to 3.
@@ -194,14 +193,14 @@ def of_several_ages(problem: InverseProblem, archive: Archive) -> bool:
 
 
 def believed(one: tuple[Path, Verdict], other: tuple[Path, Verdict]) -> bool:
-    """Whether the second of two searches is believed rather than the first.
+    """True where the second of two searches is believed rather than the first.
 
     A search that explains the data is believed before one that does not; otherwise the hypotheses that they chose
-    decide. The one with more names is believed only where both kinds of evidence, unseen data and marginal likelihood,
-    speak for it, as where a name is admitted.
+    decide. The one with more names is believed only where both its score on unseen data and its marginal likelihood are
+    higher, as in the admission of an effect.
 
-    A blind case that lacks nothing said 3.5 nats more of unseen data with another radius and a plating that made the
-    data less likely by 17.
+    On a blind case that lacks nothing, another radius with plating scored 3.5 nats more on unseen data, with a marginal
+    likelihood lower by 17 nats.
     """
     unknown = [verdict.word == "unknown" for _, verdict in (one, other)]
     if unknown[0] != unknown[1]:
@@ -217,12 +216,12 @@ def believed(one: tuple[Path, Verdict], other: tuple[Path, Verdict]) -> bool:
 
 
 def consistent(path: Path, verdict: Verdict) -> Verdict:
-    """The verdict, or `unknown` in place of one that rests on declared parameters further off than cell files are
-    without naming them.
+    """The verdict, or `unknown` where the fit has declared parameters further off than cell files are and does not name
+    them.
 
-    A smooth record can be fitted to the noise by a cell that does not exist: the 1C discharge of the NMC cell by
-    itself, a development record, by another potential with conductivity, initial state and voltage offset four
-    deviations off.
+    A smooth record can be fitted to the noise with an impossible cell: the 1C discharge of the NMC cell by itself, a
+    development record, with another potential and with conductivity, initial state and voltage offset off by four
+    standard deviations.
     """
     beyond = beyond_spread(path.problem, path.chosen) if path.problem.trust == "tight" else []
     if verdict.word == "unknown" or not beyond:
@@ -238,7 +237,7 @@ def consistent(path: Path, verdict: Verdict) -> Verdict:
 def _sharpened(
     problem: InverseProblem, path: Path, verdict: Verdict, archive: Archive, thresholds: Thresholds
 ) -> tuple[Path, Verdict]:
-    """The same finding with the own parameters believed exactly, where that says as much of unseen data."""
+    """(path, verdict) of the same finding at the trust `exact`, where that scores as well on unseen data."""
     exact = replace(problem, trust="exact")
     found = refitted(exact, path, archive)
     if found is None:
@@ -253,7 +252,7 @@ def _sharpened(
 def _with_one_cause(
     path: Path, verdict: Verdict, archive: Archive, thresholds: Thresholds
 ) -> tuple[Path, Verdict]:
-    """The same finding by one cause, where one says as much as several wrong parameters together."""
+    """(path, verdict) of the same finding with one effect, where one scores as well as several wrong parameters."""
     one, group = in_one(path, archive)
     if not group:
         return path, verdict
@@ -262,22 +261,22 @@ def _with_one_cause(
 
 
 def with_confidence(verdict: Verdict) -> Verdict:
-    """The verdict with its confidence read off its margin."""
+    """The verdict with its confidence, from its margin."""
     kind = kind_of(verdict.word, verdict.effects)
     return replace(verdict, confidence=frequency_maps()[kind].frequency(verdict.margin))
 
 
 def named_options(path: Path, tight: Path, blocks: Blocks, archive: Archive) -> list[Option]:
-    """What was named with the own parameters as declared, with activation energies as declared, too, where they are
-    open, and with own parameters as far off as they may be.
+    """The models with the named effects: (1) own parameters as declared; (2) activation energies as declared too, where
+    they are open; (3) own parameters fitted within their tight spreads.
 
-    On a drive of the HG2 at 0 degC without its temperature, a development record of `aesi bench real`, the two leave
+    On a drive of the HG2 at 0 degC without its temperature, a development record of `aesi bench real`, 1 and 3 leave
     23.0 and 8.2 mV of the last part, the declared model 97.5, the own parameters alone 67.6; on one of the Panasonic at
     10 degC 8.1, 5.0, 22.9 and 7.1; on one at -10 degC 42.8 and 82.1, of which the first is written. With open energies
-    alone, of which one record foretells little elsewhere, five of eleven development drives of its archive without
-    their temperature were written as declared that are not with the file's.
+    alone, which one record determines only near its own temperature, five of eleven development drives of its archive
+    without their temperature were written as declared that are not with the file's.
 
-    blocks : by which all options are held against each other.
+    blocks : by which all options are compared.
     """
     named, held = [path], replace(path.problem, energies=False)
     hypothesis = path.chosen.hypothesis
@@ -290,26 +289,26 @@ def named_options(path: Path, tight: Path, blocks: Blocks, archive: Archive) -> 
 
 
 def _by_what_lasts(problem: InverseProblem, measured: Path, archive: Archive) -> Path:
-    """What a search on a measured cell named, fitted by what lasts of the model error alone: seconds tell which effect
-    it is, but what is written has to hold over hours.
+    """The path of a measured cell, with its choice refitted at the trust `lasting`: the response within seconds
+    identifies the effect, but the written model has to hold over hours.
 
-    Of a Panasonic drive read 2 s late, a development record of `aesi bench real`, 2.9 mV are left so and 3.9 by both
-    scales, of its drive at -10 degC with its temperature 15.4 and 18.3.
+    On a Panasonic drive read 2 s late, a development record of `aesi bench real`, this leaves 2.9 mV and a fit with
+    both parts of the error 3.9; on its drive at -10 degC with its temperature 15.4 and 18.3.
     """
     found = refitted(replace(problem, trust="lasting"), measured, archive)
     return measured if found is None else found
 
 
 def _with_stand_ins(wide: Path, blocks: Blocks) -> list[Option]:
-    """The recalibrations with effects that a search with all own parameters open wide went through."""
+    """The recalibrated models with added effects, from the steps of a search at the trust `loose`."""
     taken = [step.admitted for step in wide.steps if step.admitted is not None]
     fits = {one.hypothesis: one for one in (*taken, wide.chosen) if one.hypothesis}
     return [Option.of(wide.problem, blocks, one) for one in fits.values()]
 
 
 def _recalibrations(problem: InverseProblem, tight: Path, archive: Archive) -> list[Option]:
-    """The declared model with its own parameters moved, as far as they may be off and further, where that does no worse
-    than the declared ones on what it saw."""
+    """The declared model with its own parameters fitted, within their tight and their loose spreads; only fits that do
+    no worse than the declared values on the fitted rows."""
     loose = replace(problem, trust="loose")
     wide = base_of(loose, blocks_of(loose), archive)
     declared = ModelState(problem)
@@ -323,7 +322,7 @@ def _recalibrations(problem: InverseProblem, tight: Path, archive: Archive) -> l
 
 
 def _recalibrated(problem: InverseProblem, recalibrations: Sequence[Option]) -> ModelState:
-    """The recalibration that carries best, the declared model where there is none."""
+    """The recalibrated model that carries over best; the declared model where there is none."""
     return carries_best(recalibrations).state if recalibrations else ModelState(problem)
 
 
@@ -333,7 +332,8 @@ def _adopted(
     verdict: Verdict,
     recalibrated: ModelState,
 ) -> Evidence:
-    """The model with what was found, or the bare model where that cannot be simulated over the declared range."""
+    """Evidence with the found effects in the written model, or with the bare model where that one fails over the
+    declared range."""
     chosen = ModelState.of(path.problem, path.chosen)
     fault = range_fault(chosen, ORDINARY_C)
     if fault is not None:

@@ -1,8 +1,8 @@
-"""How well a fit predicts ordinary use: full discharges and charges, wherever the records themselves have been.
+"""How well a fit predicts ordinary use: full discharges and charges, whatever range the records themselves cover.
 
     sd(t)^2 = s(t) C s(t)'          s the slopes of the voltage over the parameters, C their covariance in the fit   (1)
 
-Parameters that hardly move what was seen can move the knee at the end of a discharge by hundreds of millivolts.
+Parameters that hardly change the fitted records can move the knee at the end of a discharge by hundreds of millivolts.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from aesi.tracer.likelihood.model_error import PRIORS
 def foretold_in_use(
     problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis, allowed_v: float
 ) -> float:
-    """As `verdict.foretold_share`, of full discharges and charges at ordinary rates, within the limits of voltage
-    and at the temperatures of the records. Nought where the fit cannot be simulated there, 1 where the declared
-    model cannot."""
+    """`verdict.foretold_share` for full discharges and charges at ordinary rates, within the voltage limits and at the
+    temperatures of the records, 0 to 1. It is 0 where the fit cannot be simulated there, 1 where the declared model
+    cannot."""
     most = PRIORS[problem.trust].median._replace(delta_v=allowed_v)
     covariance = covariance_at(problem, blocks, fit, most)
     told = []
@@ -44,7 +44,8 @@ def foretold_in_use(
 
 
 def _courses(problem: InverseProblem) -> Iterator[tuple[BoolArray, Measurement, float]]:
-    """The courses that the declared model can go through: rows between the limits, current, initial state of charge."""
+    """The full courses that the declared model can run: (rows within the voltage limits, record without voltages,
+    initial state of charge)."""
     cell = problem.cell
     for degc, rate in product(temperatures_degc(problem), ORDINARY_C):
         course, soc0 = full_course(cell, rate, degc)
@@ -61,8 +62,8 @@ def _courses(problem: InverseProblem) -> Iterator[tuple[BoolArray, Measurement, 
 def _slopes_v(
     problem: InverseProblem, fit: FittedHypothesis, course: Measurement, soc0: float
 ) -> Array | None:
-    """(n, k) V per standard deviation of each parameter's prior, by one-sided differences within its bounds; what is of
-    single records moves nothing. None where the fit cannot be simulated, or not beside one of them."""
+    """(n, k) V, sensitivities per prior standard deviation, by one-sided differences within the bounds; zero for
+    parameters of single records. None where the fit, or a point next to it, cannot be simulated."""
 
     def voltage_v(x: Array) -> Array | None:
         try:

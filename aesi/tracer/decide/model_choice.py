@@ -1,13 +1,13 @@
-"""Single particle or porous electrode: settled before an effect is blamed on the cell.
+"""The model of the cell, single particle or porous electrode, chosen before an effect is blamed on the cell.
 
-Parameters that were fitted with one of the two hold what it approximates, and are of that one.
-Where the two models of the declared cell, or of what the single particle ends with, differ by a notable share of the
-noise, all hypotheses use the fuller one; but not where the single particle cannot explain the data, and could not
-though all of that difference were taken off what it leaves: what is missing is something else then, and a search takes
-ten times as long. Where nothing was tried with the single particle, as all effects together leave too much, and that
-may be the difference, it is searched for what it leaves first: a drive of a measured LFP cell takes 39 s, not 608.
-What was measured may still be a single particle's (a thin electrode, a file made with one): what the two searches end
-with is weighed as any two hypotheses are.
+Parameters that were fitted with one of the two models compensate for its approximations, and are valid for that one.
+Where the two models differ by a notable share of the noise, on the declared cell or on the cell that the single
+particle ends with, all hypotheses use the porous electrode. The exception is a single particle that cannot explain the
+data and could not even if the whole difference were subtracted from its error: then something else is missing, and a
+search with the porous electrode takes ten times as long. Where no effect was tried with the single particle, since all
+effects together leave too large an error, and the difference may be the reason, it is searched once more with this
+error allowed: a drive of a measured LFP cell takes 39 s, not 608. The data may still be those of a single particle (a
+thin electrode, a file made with one), so that the results of the two searches are compared like any two hypotheses.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from aesi.tracer.search.path import Path
 
 
 class Search(Protocol):
-    """Searches and judges a case with the model of its problem.
+    """A search with the model of its problem, and its verdict.
 
-    most : effects that may be named.  shallower : the answer of the same search with fewer names, where there is one.
+    most : most effects that may be named.  shallower : answer of the same search with fewer effects, to be reused.
     """
 
     def __call__(
@@ -37,20 +37,23 @@ class Search(Protocol):
 
 
 FIRST_LOOK = 1
-"""Names that the single particle is tried with before the porous electrode, where the declared cell asks for that one:
-what it approximates, no names explain, and looking for two and three of them takes most of the time. They are looked
-for where one explains the data, where none could, or where the porous electrode needs names, too: before that one is
-searched for them, since it could only be believed with as few. A lag and a contact at 10 Hz on a blind case took 119 s
-so and 233 s in the other order, a triple 37 and 112; of 23 blind cases all answer the same, with 0.6 to 1.1 times the
-simulations."""
+"""Most effects that the single particle is searched for before the porous electrode, where the two models of the
+declared cell differ notably: no effect explains an approximation of the model, and searches for two and three effects
+take most of the time. The single particle is searched for more where one effect explains the data, where none could, or
+where the porous electrode needs effects too. This comes before the search with the porous electrode, which is believed
+only with no more effects. A lag and a contact at 10 Hz on a blind case took 119 s so and 233 s in the other order, a
+triple 37 and 112; of 23 blind cases all answer the same, with 0.6 to 1.1 times the simulations."""
 ArchiveOf = Callable[[InverseProblem, Archive | None], Archive]
-"""The archive of a problem with one model of the cell, which knows that of the same case with the other one."""
+"""(problem with one model of the cell, archive of the same case with the other model) -> archive of the problem."""
 
 
 @dataclass(frozen=True)
 class ModelChoice:
-    """model : that every hypothesis used.  sentence : which one and why, and by how much the two differ.
-    reduction : that difference, None where one of them cannot be simulated on these records."""
+    """The model of the cell that every hypothesis uses.
+
+    sentence : names the model, the reason, and the difference of the two models.  reduction : that difference; None
+    where one of them cannot be simulated on these records.
+    """
 
     model: ModelName
     sentence: str
@@ -60,12 +63,12 @@ class ModelChoice:
 def with_model(
     problem: InverseProblem, wanted: ModelName | None, search: Search, archive_of: ArchiveOf, max_effects: int
 ) -> tuple[Evidence, ModelChoice]:
-    """Choose the model of the cell and search with it.
+    """The evidence of a case and the model of the cell that it was searched with.
 
     The first of these that applies: the model that the user asks for; the one that the cell's file was fitted with; the
-    single particle, where good records stand beside; the one that the records ask for.
+    single particle, where good records are given; the one chosen by the records.
 
-    wanted : by the user.  max_effects : effects that may be named.
+    wanted : model that the user asks for.  max_effects : most effects that may be named.
     """
     declared = reduction_of(problem)
     settled = wanted or problem.cell.fitted_with
@@ -86,7 +89,7 @@ def with_model(
 
 @dataclass(frozen=True, eq=False)
 class _Look:
-    """The answer of the single particle.  whole : it was searched for all names that may be given."""
+    """The answer of the single particle.  whole : whether it was searched for as many effects as may be named."""
 
     answer: Answer
     whole: bool
@@ -94,8 +97,10 @@ class _Look:
 
 @dataclass(frozen=True, eq=False)
 class _Single:
-    """The single particle of a case, and how it is asked.  declared : what the two models of the declared cell differ
-    by."""
+    """The searches of a case with the single particle.
+
+    declared : difference of the two models of the declared cell.
+    """
 
     problem: InverseProblem
     archive: Archive
@@ -104,12 +109,12 @@ class _Single:
     declared: Reduction | None
 
     def whole(self, shallower: Answer | None = None) -> Answer:
-        """The search for all names that may be given.  shallower : the same for fewer."""
+        """The search for as many effects as may be named.  shallower : the same for fewer."""
         return self.search(self.problem, self.archive, self.max_effects, shallower)
 
     def looked(self) -> _Look:
-        """The search for `FIRST_LOOK` names where the two models differ notably, and for all where they do not, where
-        one of the few explains the data, and where none could."""
+        """The search for `FIRST_LOOK` effects where the two models differ notably. It goes on to all effects where the
+        models do not differ, where the first search explains the data, and where no effect could."""
         few = min(FIRST_LOOK, self.max_effects) if _notable(self.declared) else self.max_effects
         first = self.search(self.problem, self.archive, few)
         if few == self.max_effects:
@@ -119,8 +124,8 @@ class _Single:
         return _Look(first, False)
 
     def may_explain(self, answer: Answer) -> bool:
-        """Whether an answer explains the data, or leaves no more than what the two models may differ by. Where
-        nothing was tried, since all effects together leave too much, a search for what it leaves decides."""
+        """Whether an answer explains the data, or leaves no more than the two models may differ by. Where no effect was
+        tried, since all effects together leave too much, a search that allows for this error decides."""
         if not _explains(answer, self.declared):
             return False
         if answer.paths["tight"].beyond_reach_v is None or not _notable(self.declared):
@@ -132,8 +137,8 @@ class _Single:
 def _asked_by_records(
     single: _Single, problem: InverseProblem, archive_of: ArchiveOf
 ) -> tuple[Evidence, ModelChoice]:
-    """The single particle where the two models do not differ notably, be it on what it ended with, and where it leaves
-    far more than they differ by; else the one that is believed of both."""
+    """The single particle, where the two models do not differ notably (on the declared cell and on the one it ended
+    with), or where it leaves far more than they differ by; else the believed one of both."""
     look = single.looked()
     explained = single.may_explain(look.answer)
     reduction = _larger(single.declared, look.answer.paths["tight"]) if explained else single.declared
@@ -148,9 +153,9 @@ def _asked_by_records(
 def _weighed(
     single: _Single, look: _Look, full: InverseProblem, archive: Archive, reduction: Reduction
 ) -> tuple[Evidence, ModelChoice]:
-    """The model whose search is believed, each asked for as many names as could be.
+    """The model whose search is believed, after a search with each.
 
-    full, archive : of the porous electrode. Where that one needs names, the single particle is asked for all of them.
+    full, archive : of the porous electrode. Where that one needs effects, the single particle is searched for all.
     """
     needs_names = not look.whole and single.search(full, archive, 0).verdict.word == "unknown"
     by_single = single.whole(look.answer) if needs_names else look.answer
@@ -161,27 +166,27 @@ def _weighed(
 
 
 def _fine(problem: InverseProblem, name: ModelName) -> InverseProblem:
-    """The problem with one model of the cell, as finely resolved as that one has to be."""
+    """The problem with one model of the cell, on fine numerics where that model needs them."""
     return with_fine_numerics(replace(problem, model=name))
 
 
 def _of_both(believed_one: Answer, other: Answer) -> Answer:
-    """The answer of the model that is believed, with the look-alikes of both searches."""
+    """The answer of the believed model, with the look-alikes of both searches."""
     return replace(believed_one, verdict=across_models(believed_one.verdict, other.verdict))
 
 
 def _chosen(
     answer: Answer, name: ModelName, reduction: Reduction | None, why: str = ""
 ) -> tuple[Evidence, ModelChoice]:
-    """The answer of a search with one model, and the choice of that model."""
+    """(evidence from the answer of a search with one model, the choice of that model).  why : clause, the reason."""
     differ = "" if reduction is None else f"; {reduction.sentence}"
     words = f"all hypotheses use {MODEL_WORDS[name]}{why}{differ}."
     return answer.settled(answer.verdict), ModelChoice(name, words, reduction)
 
 
 def _likelier(answer: Answer) -> str:
-    """Why the single particle is believed where both models were searched."""
-    if answer.verdict.word == "unknown":  # and so is that of the porous electrode, else it would be believed
+    """Why the single particle is believed where both models were searched, a clause."""
+    if answer.verdict.word == "unknown":  # the porous electrode's is unknown too, or it would be believed
         return (
             ", because it says as much with fewer or likelier names, though neither model explains the data"
         )
@@ -202,10 +207,10 @@ def _larger(declared: Reduction | None, path: Path) -> Reduction | None:
 
 
 def most_names(single: Answer, max_effects: int) -> int:
-    """How many effects a search with the porous electrode may name and still be believed over the single particle's.
+    """Most effects that a search with the porous electrode may name and still be believed over the single particle's.
 
-    All of `max_effects`, unless the single particle explains the data without a model error beyond what two solvers
-    differ by: then nothing is left for further names to explain, and the porous electrode may name no more than it did.
+    It is `max_effects`, unless the single particle explains the data with a model error no larger than the difference
+    of two solvers. Nothing is left to explain then, and the porous electrode may name no more than the single particle.
     """
     chosen = single.path.chosen
     if single.verdict.word == "unknown" or chosen.score.delta_v > LEAST_V:
@@ -214,8 +219,8 @@ def most_names(single: Answer, max_effects: int) -> int:
 
 
 def _explains(single: Answer, reduction: Reduction | None) -> bool:
-    """Whether a search with the single particle explains the data, or leaves no more beyond a right hypothesis than
-    what the two models of the declared cell differ by."""
+    """Whether a search with the single particle explains the data, or leaves an error beyond that of a right hypothesis
+    no larger than the difference of the two models of the declared cell."""
     path = single.paths["tight"]
     if single.verdict.word != "unknown":
         return True

@@ -1,8 +1,8 @@
 """One cause in place of several declared parameters that came out wrong together.
 
-A particle radius that is off looks like a diffusivity off by 1/f^2 and a rate constant off by 1/f: declared parameters
-have tolerances, so that the search finds the two before the one. What says as much with fewer numbers is the better
-name; what it stands for is told as its look-alikes.
+A particle radius that is off by a factor f looks like a diffusivity off by 1/f^2 and a rate constant off by 1/f. Since
+declared parameters have tolerances, the search finds these two before the radius. An effect that scores as well with
+fewer parameters is the better name; the parameters that it replaces become its look-alikes.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from aesi.tracer.search.plausible import most_plausible
 
 
 def in_one(path: Path, archive: Archive) -> tuple[Path, tuple[str, ...]]:
-    """The path with one effect in the place of all of its effects, and the group of look-alikes that it heads.
+    """(path with one effect in place of all of its effects, group of look-alikes that begins with it).
 
-    The path as it was, and no group, where it does not name several declared parameters, or no single cause says as
-    much as they do.
+    The path as it was, with an empty group, where it does not name several declared parameters, or where no single
+    effect scores as well.
     """
     chosen = path.chosen
     effects = path.problem.effects
@@ -38,5 +38,5 @@ def in_one(path: Path, archive: Archive) -> tuple[Path, tuple[str, ...]]:
 
 
 def _tolerated(effect: Effect) -> bool:
-    """Whether cell files declare what the effect moves, with a tolerance."""
+    """Whether the effect moves parameters that cell files declare, with a tolerance."""
     return any(p.spread is not None for p in effect.parameters.values())

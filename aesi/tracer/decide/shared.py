@@ -1,8 +1,8 @@
-"""What the good records have too: no difference between them and the others, however much of the others it explains.
+"""Effects that the good records show too: they are no difference from the others, however much they explain.
 
-Half of what all records share is taken up by an effect on the others alone, so that a contact that the file lacks reads
-like one that has become worse. So what is found is held against the same effect in all records. Where that is believed
-it is opened there, as a declared parameter is, and the others are asked once more for what they have beyond it.
+An effect on the other records alone takes up half of what all records share: a contact resistance that the file lacks
+looks like one that has increased. A found effect is therefore compared with the same effect in all records. Where that
+is believed, the effect is opened in all records like a declared parameter, and the search for differences is repeated.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from aesi.tracer.search.plausible import most_plausible
 
 @dataclass(frozen=True, eq=False)
 class Unshared:
-    """A search for what some records have beside good ones, with all open that these share with them.
+    """A search for effects on the other records alone, with shared effects opened in all records.
 
-    archive : of that search.  shared : sentences on what was opened in all records.
+    archive : of that search.  shared : sentences on the effects that were opened in all records.
     """
 
     path: Path
@@ -32,9 +32,9 @@ class Unshared:
 
 
 def searched_unshared(problem: InverseProblem, most: int, archive: Archive, report: Report) -> Unshared:
-    """Search, and search again with what was found open in all records, while that is believed instead.
+    """The search, repeated with the found effect open in all records for as long as that is believed instead.
 
-    most : effects that may be named, at most one.  Raises DataError where the model cannot be simulated on the records.
+    most : effects that may be named, 0 or 1.  Raises DataError where the model cannot be simulated on the records.
     """
     found, opened = Unshared(searched(problem, most, archive, report), archive), set[str]()
     while found.path.chosen.hypothesis and not opened.issuperset(found.path.chosen.hypothesis):
@@ -48,7 +48,7 @@ def searched_unshared(problem: InverseProblem, most: int, archive: Archive, repo
 
 
 def _with_shared(found: Unshared, name: str, most: int, report: Report) -> Unshared | None:
-    """The search with an effect open in all records; None where that is not believed rather than what was found."""
+    """The search with an effect open in all records; None where the effect on the other records alone is believed."""
     alone, problem = found.path.chosen, in_all_records(found.path.problem, name)
     archive = Archive(found.archive.path, context_of(problem))
     base = base_of(problem, found.path.blocks, archive)
@@ -68,9 +68,10 @@ def _with_shared(found: Unshared, name: str, most: int, report: Report) -> Unsha
 
 
 def in_all_records(problem: InverseProblem, name: str) -> InverseProblem:
-    """The problem with an effect open in all records, as far as it may go where it is tried.
+    """The problem with an effect open in all records, with the priors that it has as an effect under test.
 
-    A parameter with whose square alone the voltage moves cannot leave nought so, and its effect stays a difference.
+    A parameter that moves the voltage by its square alone cannot leave zero in this way, so that its effect remains a
+    difference between records.
     """
     effect = problem.effects[name]
     tried = {one.name: one.sd for one in problem.parameters_of(name)}

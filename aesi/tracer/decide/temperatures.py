@@ -1,4 +1,4 @@
-"""Which records contradict their own temperature, and whether that explains more than what was fitted at it."""
+"""Which records contradict their own temperature, and whether another temperature explains more than a fit does."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ from aesi.tracer.case.records import PreparedRecord
 from aesi.tracer.likelihood.model_state import ModelState
 
 LEAVES_TIMES = 2.0
-"""A fitted model explains less than a change of temperature where it leaves more than this many times what the
-declared model leaves at another temperature. A convention: with the zeros of a dead column it leaves 2.8 times that
-on a drive of the NMC cell, with nine parameters moved."""
+"""Ratio of the error of a fitted model to that of the declared model at another temperature, above which the change of
+temperature explains more. A convention: with the zeros of a dead temperature column the ratio is 2.8 on a drive of the
+NMC cell, with nine parameters moved."""
 
 
 def other_temperatures(problem: InverseProblem) -> dict[int, OtherTemperature]:
-    """Number of a record -> the temperature at which the declared model follows what fits see of it, for those
-    records that contradict their own column of temperature."""
+    """Number of a record -> the temperature at which the declared model follows its fitted rows, for records that
+    contradict their own temperature column."""
     pairs = zip(problem.records, problem.seen, strict=True)
     found = {index: _other(problem, record, seen) for index, (record, seen) in enumerate(pairs)}
     return {index: other for index, other in found.items() if other is not None}
 
 
 def of_unseen(fitted: ModelState, records: Sequence[PreparedRecord]) -> dict[str, OtherTemperature]:
-    """Name of a record that no fit has seen -> the same, for those records that a fitted model does not explain at
-    their own temperature: they are judged at one that is not theirs."""
+    """Name of a record that was not fitted -> the temperature at which the declared model follows it, for records that
+    contradict their own temperature and that the fitted model does not explain at it."""
     out = {}
     for record in records:
         other = _other(fitted.problem, record, record.thin)
@@ -44,7 +44,7 @@ def of_unseen(fitted: ModelState, records: Sequence[PreparedRecord]) -> dict[str
 
 
 def _other(problem: InverseProblem, record: PreparedRecord, seen: Measurement) -> OtherTemperature | None:
-    """seen : the thinned rows that are looked at."""
+    """The temperature that a record indicates in place of its own, if any.  seen : the thinned rows to compare."""
     if seen.temperature_degc is None:
         return None
     declared_degc = problem.cell.initial_temperature_k - ZERO_CELSIUS_K
@@ -61,9 +61,9 @@ def _left_v(problem: InverseProblem, record: PreparedRecord, seen: Measurement, 
 
 
 def left_by_fit(fitted: ModelState, others: Mapping[int, OtherTemperature]) -> dict[int, OtherTemperature]:
-    """Those of the records that a fitted model does not explain at their own temperature: it leaves more of them
-    than the declared model does at another one, or is not simulated to their end. What it leaves less of, as where
-    the kinetics are off, is explained."""
+    """Those of `others` that a fitted model does not explain at their own temperature: its error is larger than that of
+    the declared model at another temperature, or it cannot be simulated to the end. With a smaller error (the kinetics
+    were off) the record is explained."""
     records = fitted.problem.records
     return {
         index: other for index, other in others.items() if not _explains(fitted, records[index], index, other)
@@ -78,15 +78,16 @@ def _explains(fitted: ModelState, record: PreparedRecord, index: int | None, oth
 
 
 def _left_by_v(fitted: ModelState, record: PreparedRecord, index: int | None) -> float:
-    """RMS, V, of what fits see of a record, or of all of one that they do not.  index : among the fitted ones."""
+    """RMS residual, V, on the fitted rows of a record, or on all thinned rows of one that was not fitted.
+    index : number among the fitted records, or None."""
     seen = record.thin.take(slice(0, record.n_fit))
     run = fitted.simulated(replace(record, thin=seen), index, thin=True)
     return rms(np.asarray(seen.voltage_v - run.voltage_v))
 
 
 def fitted_at_fault(written: ModelState, others: Mapping[int, OtherTemperature]) -> str | None:
-    """Why a fitted model is not written: of a record that contradicts its temperature it leaves far more than the
-    declared model does at another one, so what it moved only makes up for the temperature. None where there is no
+    """Why a fitted model is not written, a clause: on a record that contradicts its temperature it errs far more than
+    the declared model at another temperature, so that its fit only makes up for the temperature. None where there is no
     such record."""
     if written.values is None:
         return None

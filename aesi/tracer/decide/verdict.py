@@ -1,4 +1,4 @@
-"""Found, none or unknown: a pure function of what the searches left.
+"""The verdict (found, none or unknown): a pure function of the finished searches.
 
 Thresholds are in one place, `Thresholds`, each with the command that measured it, and are passed in by the caller.
 """
@@ -22,28 +22,29 @@ from aesi.tracer.search.plausible import ALIKE_NATS, ALIKE_SDS, alike, lag, sds_
 
 Word = Literal["found", "none", "unknown"]
 GROUP_SIZE = 3
-"""Names that a group of look-alikes shows at most; the others are told in a note."""
+"""Most names in a group of look-alikes as shown; a note lists the others."""
 MOST_SDS = 50.0
-"""Standard deviations that are reported where nothing comes close."""
+"""Margin, standard deviations, where no rival comes close."""
 RANGE_OF = {"rate": "current", "charge": "charge"}
-"""Partition -> the quantity by whose ranges its blocks are left out together, in words."""
+"""Partition -> the quantity whose ranges it leaves out in turn, in words."""
 FORETOLD_SHARE = 0.5
-"""Least share of the rows of left-out conditions that the other rows have to foretell. A convention, see
-`Thresholds` and `decide.written.Option` for what was seen on either side of it."""
+"""Least share of the rows of left-out conditions that a fit to the other rows has to predict. A convention;
+`Thresholds` and `decide.written.Option` have measured values on either side of it."""
 
 
 @dataclass(frozen=True)
 class Thresholds:
-    """What decides a verdict.
+    """The thresholds of a verdict.
 
-    noise_share, solver_v : what a right hypothesis may leave on unseen data beyond the noise: this share of the noise
-    (which is itself estimated) and this much (V), added as squares. The share is a convention: 0.45 of the noise lifts
-    an error by a tenth of it. On development cases right hypotheses left at most 0.4 mV.
+    noise_share, solver_v : error that a right hypothesis may leave on unseen data beyond the noise: this share of the
+    noise (which is itself an estimate) and this voltage (V), added as squares. The share is a convention: 0.45 of the
+    noise raises an error by a tenth of the noise. On development cases right hypotheses left at most 0.4 mV.
     alike_sds, alike_nats : hypotheses that lag by fewer standard deviations of the paired block differences, or by
-    fewer nats, are not told apart.
-    foretold_share : of the rows, that a hypothesis has to foretell where ranges of the current or of charge are left
-    out; either bears it out. 31 right ones foretold 69 to 98 % on development cases of `aesi bench blind`, what fits a
-    smooth discharge of a measured cell to its noise (the NMC cell's at 1C and C/20, cut at 50 to 85 %) 9 to 12 %.
+    fewer nats, are look-alikes.
+    foretold_share : least share of the rows that a hypothesis has to predict where ranges of the current, or of charge,
+    are left out; one of the two suffices. 31 right hypotheses predicted 69 to 98 % on development cases of `aesi bench
+    blind`; fits of a smooth discharge of a measured cell to its noise (the NMC cell's at 1C and C/20, cut at 50 to
+    85 %) 9 to 12 %.
     """
 
     noise_share: float = 0.45
@@ -55,15 +56,17 @@ class Thresholds:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What may be said.
+    """The answer of a discovery.
 
-    effects : ids in the order in which they were added.  confidence_sets : all that the data do not tell from a member
-    of `effects`, with which each begins; the better ones first.  structured_v, tolerance_v : what is left on unseen
-    data beyond noise, and how much may be.
-    margin : what the confidence is read off, see `decide.confidence`. Of an answer with names, standard deviations by
-    which the closest rival lags, or of the weakest name's gain. Of `none` the nats that the best effect says less. Of
-    `unknown` without names the logarithm of what is left over what may be, nought where too little was foretold.
-    aged : what would explain more than is named if the good records beside the others are of another age.
+    word : "found", "none" or "unknown".  effects : ids of the named effects, in the order in which they were added.
+    confidence_sets : for each of `effects` that has look-alikes, itself and the effects that the data do not tell from
+    it, best first.  confidence : frequency with which such a verdict is right, 0 to 1.
+    structured_v, tolerance_v : error beyond noise on unseen data, and the largest that a right answer may leave, V RMS.
+    reason : a clause with these figures.
+    margin : input of the confidence map, see `decide.confidence`. With names: standard deviations by which the closest
+    rival lags, or of the weakest name's gain, whichever are fewer. `none`: minus the largest gain of an effect, nats.
+    `unknown` without names: ln(structured_v / tolerance_v), or 0 where too few rows were predicted.
+    aged : effects that explain more than the named ones if the good records are of another age than the others.
     """
 
     word: Word
@@ -78,12 +81,12 @@ class Verdict:
 
     @property
     def groups(self) -> tuple[tuple[str, ...], ...]:
-        """The look-alikes that are shown: the best of each confidence set."""
+        """The look-alikes that are shown: the first `GROUP_SIZE` of each confidence set."""
         return tuple(one[:GROUP_SIZE] for one in self.confidence_sets)
 
     @property
     def alike_too(self) -> tuple[str, ...]:
-        """A sentence about each confidence set that has more members than are shown."""
+        """A sentence for each confidence set that has more members than are shown."""
         return tuple(
             f"the data do not tell {one[0]} from {', '.join(one[1:])}: {len(one)} effects explain them about as well, "
             f"of which the first {GROUP_SIZE} are shown as look-alikes."
@@ -93,23 +96,23 @@ class Verdict:
 
 
 def beyond(rmse_v: float, noise_v: float) -> float:
-    """Root mean square of what is left beyond white noise, V."""
+    """Error beyond white noise, V RMS: root of the difference of the mean squares, at least 0."""
     return float(np.sqrt(max(rmse_v**2 - noise_v**2, 0.0)))
 
 
 def structured_v(path: Path, one: Explanation) -> float:
-    """V RMS that a hypothesis leaves beyond noise on blocks that it has not seen."""
+    """Error of a hypothesis beyond noise on left-out blocks, V RMS."""
     return beyond(unseen_rmse_v(path.blocks, one), path.problem.noise_v)
 
 
 def unexplained_v(problem: InverseProblem, blocks: Blocks, one: Explanation, allowed_v: float) -> float:
-    """`structured_v`, with only those rows of unseen blocks that a right hypothesis could have predicted, V.
+    """`structured_v`, V, with each row of a left-out block weighted by how well a right hypothesis could predict it.
 
-    A row counts in full where its prediction, by the parameters that the other blocks give, is far less uncertain than
-    the noise and `allowed_v`, and little where it is far more so: a potential with nine coefficients cannot be known
-    where no other block has been.
+    A row counts in full where its prediction, with the parameters fitted to the other blocks, is far less uncertain
+    than the noise and `allowed_v`, and little where it is far more uncertain: a potential with nine coefficients cannot
+    be known where no other block has been.
 
-    The noise is taken off in full all the same: with w = s**2/(s**2 + sd**2) and s**2 = noise**2 + allowed**2 a right
+    The noise is still subtracted in full: with w = s**2/(s**2 + sd**2) and s**2 = noise**2 + allowed**2 a right
     hypothesis has E[r**2] = s**2 + sd**2, so that E[w r**2] = s**2 whatever sd is, and `allowed_v` is left.
 
     allowed_v : V beyond the noise that a right hypothesis may leave.
@@ -121,7 +124,7 @@ def unexplained_v(problem: InverseProblem, blocks: Blocks, one: Explanation, all
 
 
 def told_share(white_v: Array | float, sd_v: Array, allowed_v: float) -> Array:
-    """(n,) how far a row counts by how well it is predicted: 1 for a sure prediction, towards 0 for an unsure one.
+    """(n,) weight of each row by how well it is predicted: 1 for a certain prediction, towards 0 for an uncertain one.
 
     sd_v : (n,) V, standard deviation of the prediction.  white_v : V, noise.  allowed_v : as for `unexplained_v`.
     """
@@ -132,11 +135,11 @@ def told_share(white_v: Array | float, sd_v: Array, allowed_v: float) -> Array:
 def foretold_share(
     problem: InverseProblem, blocks: Blocks, one: LinearForm, allowed_v: float, partition: str
 ) -> float:
-    """Share of the rows that put a hypothesis to the test, where the conditions of a partition are left out in turn.
+    """Share of the rows that test a hypothesis, 0 to 1, where the conditions of a partition are left out in turn.
 
-    Of the other rows it predicts so little that nothing they could be would speak against it. Its parameters are taken
-    to be as uncertain as a model that errs by `allowed_v` leaves them: a smooth discharge foretells all of its ranges
-    of charge by a model without error, and hardly any by one that may be off by 0.4 mV.
+    The other rows are predicted with so much uncertainty that no measured value would contradict the hypothesis. The
+    parameters are as uncertain as a model error of `allowed_v` (V) leaves them: with a model without error, a smooth
+    discharge predicts all of its ranges of charge, and with one that may be off by 0.4 mV hardly any.
     """
     most = PRIORS[problem.trust].median._replace(delta_v=allowed_v)
     sd_v = prediction_sd_v(problem, blocks, one, most, partition)
@@ -144,14 +147,14 @@ def foretold_share(
 
 
 def tolerance_v(problem: InverseProblem, thresholds: Thresholds) -> float:
-    """V RMS that a right hypothesis may leave on unseen data beyond the noise."""
+    """Largest error that a right hypothesis may leave on unseen data beyond the noise, V RMS."""
     return float(np.hypot(thresholds.noise_share * problem.noise_v, thresholds.solver_v))
 
 
 def judged(path: Path, thresholds: Thresholds) -> Verdict:
-    """The verdict on a search that trusts the declared parameters as those of a careful parametrisation.
+    """The verdict on a search at the trust `tight` or `exact`.
 
-    Its confidence is 0 until it is read off the margin (`evidence.with_confidence`).
+    Its confidence is 0 until `evidence.with_confidence` sets it from the margin.
     """
     allowed = tolerance_v(path.problem, thresholds)
     left = unexplained_v(path.problem, path.blocks, path.chosen, allowed)
@@ -191,7 +194,7 @@ def _with_what(path: Path) -> str:
 
 
 def partly(path: Path, verdict: Verdict, thresholds: Thresholds) -> Verdict:
-    """An `unknown` that names the effects whose gain is beyond what models of measured cells are usually off by.
+    """The verdict `unknown`, with the names of effects whose gain exceeds the usual error of measured cells.
 
     path : the search at the trust `measured`.
     """
@@ -213,17 +216,17 @@ def partly(path: Path, verdict: Verdict, thresholds: Thresholds) -> Verdict:
 
 
 def best_gain(path: Path) -> float:
-    """The largest gain of an effect at any step, admitted or not, nats; nought where none could be grown."""
+    """The largest gain of an effect at any step, admitted or not, nats; 0 where no effect could be grown."""
     return max((step.best_gain for step in path.steps if step.grown), default=0.0)
 
 
 def look_alikes(
     path: Path, thresholds: Thresholds, allowed_v: float
 ) -> tuple[tuple[tuple[str, ...], ...], float]:
-    """Sets of effects that these data do not tell apart, and by how many standard deviations the next one lags.
+    """(sets of effects that these data do not tell apart, margin as in `Verdict`).
 
     They are a model confidence set, Hansen, Lunde & Nason, Econometrica 79 (2011) 453, over paired block differences.
-    allowed_v : what a right hypothesis may leave on unseen data beyond the noise.
+    allowed_v : largest error that a right hypothesis may leave on unseen data beyond the noise, V RMS.
     """
     groups, margin = [], np.inf
     tried = {frozenset(e.hypothesis): e for e in path.explanations()}
@@ -246,11 +249,11 @@ def look_alikes(
 
 
 def across_models(verdict: Verdict, other: Verdict) -> Verdict:
-    """A finding with what a search with the other model of the cell names in the place of one of its effects, where all
-    others are the same: a look-alike, though each model tells the two apart.
+    """The verdict, with one more look-alike where the search with the other model of the cell names another effect in
+    place of one of its effects and the same otherwise.
 
-    Both searches explain the data to the noise, so that which of the names it is rests on what one of the models
-    approximates.
+    Both searches explain the data to the noise. Each tells the two effects apart, but only by the approximations of its
+    model.
     """
     instead = set(other.effects) - set(verdict.effects)
     same_count = len(other.effects) == len(verdict.effects)
@@ -263,13 +266,13 @@ def across_models(verdict: Verdict, other: Verdict) -> Verdict:
 
 
 def _as_adequate(path: Path, other: Explanation, anchor: Explanation, allowed_v: float) -> bool:
-    """Whether a rival leaves about as little, of what it could tell, as the hypothesis that it is held against."""
+    """Whether a rival leaves about as small an error, on the rows that it can predict, as its `anchor`."""
     left_v = [unexplained_v(path.problem, path.blocks, one, allowed_v) for one in (other, anchor)]
     return left_v[0] <= 1.2 * max(allowed_v, left_v[1])
 
 
 def _weakest_sds(path: Path, tried: Mapping[frozenset[str], Explanation]) -> float:
-    """Standard deviations by which the weakest of the chosen effects improves on the rest without it."""
+    """Smallest gain of a chosen effect over the hypothesis without it, in standard deviations."""
     chosen = frozenset(path.chosen.hypothesis)
     rests = (tried.get(chosen - {name}) for name in chosen)
     gains = [path.chosen.score.total - rest.score.total for rest in rests if rest is not None]
@@ -279,9 +282,9 @@ def _weakest_sds(path: Path, tried: Mapping[frozenset[str], Explanation]) -> flo
 def _rivals(
     path: Path, name: str, tried: Mapping[frozenset[str], Explanation]
 ) -> Iterator[tuple[Explanation, Explanation, str]]:
-    """Hypotheses with another effect in the place of one that was chosen: rival, what it is held against, other effect.
+    """(hypothesis to compare with, rival, its other effect): a rival has another effect in place of the chosen `name`.
 
-    Beside all else that was chosen, or, where that was not tried, beside what there was when the effect was admitted.
+    The rival has all other chosen effects or, where that was not tried, those chosen before `name` was admitted.
     """
     named: set[str] = set()
     admitted = (

@@ -1,4 +1,4 @@
-"""Which model is written where nothing explains the data, and why it is not what was named."""
+"""The model to write where nothing explains the data, and why it is not the one with the named effects."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from aesi.tracer.likelihood.model_error import MEASURED_V
 from aesi.tracer.likelihood.model_state import ModelState
 
 AS_GOOD = 1.05
-"""What was named, or else the declared model, is preferred where its worst ratio is at most this many times the
-least one. A convention."""
+"""The model with the named effects, or else the declared one, is preferred where its `worst_ratio` is at most this many
+times the smallest one. A convention."""
 HARM = "on data left out it is worse than the declared model in a range of charge"
 UNTESTED = "these data cannot bear it out, at other states of charge or currents it could be anything"
 LESS_ELSEWHERE = "another model leaves less on records left out"
@@ -27,16 +27,17 @@ LESS_ELSEWHERE = "another model leaves less on records left out"
 
 @dataclass(frozen=True, eq=False)
 class Option:
-    """A model that may be written, what it leaves on records that it has not seen, and whether these data could speak
-    against it.
+    """A model that may be written.
 
-    What was fitted to one record says something of its last third, left out. Where it says nothing of a range of
-    charge, as far as models of measured cells are off there, it may be anything beyond the record. On development
-    records of `aesi bench real` recalibrations with all open wide foretold 33 to 47 % of the rows, and left 14.4, 201,
-    12.2, 137 and 3.9 mV on the last part where others left 12.2, 84.7, 18.4, 63.0 and 3.5; a diffusivity over
-    concentration fitted to a 1C discharge 38 %, and left 1,880 mV where the declared model left 287. What was named on
-    six others foretold 71 to 84 %, recalibrations within what files are off by 94 % and more. At one current nothing is
-    foretold of another: the NMC cell's 1C fitted with own parameters open leaves 51 to 561 mV, 14 as declared.
+    left_out : its errors on data that it has not seen.  tested : whether these data could contradict it.
+
+    A fit to one record predicts its last third. Where it cannot predict a range of charge to within the usual error of
+    measured cells, it may be arbitrarily wrong beyond the record. On development records of `aesi bench real`
+    recalibrations at the trust `loose` predicted 33 to 47 % of the rows, and left 14.4, 201, 12.2, 137 and 3.9 mV on
+    the last part where others left 12.2, 84.7, 18.4, 63.0 and 3.5; a diffusivity over concentration fitted to a 1C
+    discharge 38 %, and left 1,880 mV where the declared model left 287. Named effects on six others predicted 71 to
+    84 %, recalibrations within the tight spreads 94 % and more. A fit at one current predicts nothing at another: the
+    NMC cell's 1C fitted with own parameters open leaves 51 to 561 mV, 14 as declared.
     """
 
     state: ModelState
@@ -45,7 +46,7 @@ class Option:
 
     @classmethod
     def of(cls, problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis | None) -> Option:
-        """A fit, None for the declared model."""
+        """The option of a fit; None takes the declared model."""
         if fit is None:
             return cls(ModelState(problem), left_out_errors(problem, blocks, fit))
         return cls(
@@ -56,9 +57,9 @@ class Option:
 
 
 def _tested(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis) -> bool:
-    """Whether these data could have spoken against a fit. Several records could, where it foretells something of
-    ordinary use. A single record could, as far as its ranges of charge foretell each other; where own parameters are
-    open, which are known by how they answer to the current, its ranges of current have to as well."""
+    """Whether these data could have contradicted a fit. Several records could where the fit predicts enough of ordinary
+    use. A single record could where its ranges of charge predict each other and, if own parameters are open, its ranges
+    of current too, since the response to the current determines these parameters."""
     if len(problem.records) > 1:
         return foretold_in_use(problem, blocks, fit, MEASURED_V) >= FORETOLD_SHARE
     conditions = ("charge",) if problem.trust in MEASURED_CELL else ("rate", "charge")
@@ -69,17 +70,17 @@ def _tested(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis) -> b
 
 
 def worst_ratio(one: Option, options: Sequence[Option]) -> float:
-    """The largest ratio, over records left out, of what this model leaves of one to what the best model leaves."""
+    """The largest ratio, over left-out records, of the model's RMS error to that of the best model."""
     least = np.min([other.left_out.by_record for other in options], axis=0)
-    told = np.isfinite(least)  # where no model runs, none is better than another
+    told = np.isfinite(least)  # a record that no model can run decides nothing
     return float(np.max(np.array(one.left_out.by_record)[told] / least[told], initial=0.0))
 
 
 def carries_best(options: Sequence[Option]) -> Option:
-    """The model, of at least one, whose worst ratio is least; the first of several that are as good.
+    """The option with the smallest `worst_ratio`; the first of several equal ones.
 
-    Such a model is never far worse than another on any record left out. A mean over the records would let a gain on one
-    pay for a loss on another.
+    options : at least one. The choice is never far worse than another model on any left-out record; a mean over the
+    records would let a gain on one pay for a loss on another.
     """
     return min(options, key=lambda one: worst_ratio(one, options))
 
@@ -87,13 +88,14 @@ def carries_best(options: Sequence[Option]) -> Option:
 def written(
     declared: Option, recalibrated: Sequence[Option], named: Sequence[Option] = ()
 ) -> tuple[ModelState, str | None]:
-    """The model that is written, and why it is not what was named (None where it is, or where nothing was).
+    """(model to write, why it is not the one with the named effects; None where it is, or where nothing was named).
 
-    It is the model that carries over best; what was named, or else the declared model, is preferred where that does as
-    well. Whatever is written may do harm in no range of charge, and has to run over the declared range.
+    It is the model that carries over best. The model with the named effects, or else the declared one, is preferred
+    where it is as good within `AS_GOOD`. The written model must be worse than the declared one in no range of charge,
+    and must run over the declared range.
 
-    recalibrated : models with own parameters open, some of them with effects that stand in for what the cell lacks.
-    named : what was named, with the own parameters as declared, then with these open.
+    recalibrated : models with own parameters fitted, some of them with effects that stand in for what the cell lacks.
+    named : models with the named effects, own parameters as declared first, then fitted.
     """
     own = [one for one in recalibrated if _fault(one, declared, (*ORDINARY_C, *FAST_C)) is None]
     faults = [_fault(one, declared, ORDINARY_C) for one in named]
@@ -114,10 +116,10 @@ def written(
 def of_refit(
     declared: Option, recalibrations: Sequence[Option], options: Sequence[Option], taken: ModelState
 ) -> str | None:
-    """Why the recalibration that carries best is not what is written, and what is in its place where that is not the
-    declared model; None where it is written, or where nothing speaks against it.
+    """Why the recalibrated model that carries over best is not written, a clause that also names the refit written in
+    its place, if any; None where it is written, or has no fault.
 
-    options : recalibrations that may be written, those among them.
+    options : recalibrated models that may be written, `recalibrations` among them.  taken : the written model.
     """
     if not recalibrations:
         return None
@@ -137,7 +139,7 @@ def of_refit(
 
 
 def stand_ins(state: ModelState, named: Sequence[str]) -> tuple[str, ...]:
-    """A sentence on effects that are written though they are not named."""
+    """A sentence on effects of the written model that the verdict does not name; empty where there is none."""
     beside = [name for name in state.hypothesis if name not in named]
     if not beside:
         return ()
@@ -148,7 +150,7 @@ def stand_ins(state: ModelState, named: Sequence[str]) -> tuple[str, ...]:
 
 
 def limits_of(state: ModelState) -> tuple[str, ...]:
-    """Sentences on where a model that is written stops short of the declared one."""
+    """Sentences on fast full discharges and charges that the declared model can run and the written one cannot."""
     fast = range_fault(state, FAST_C)
     return () if fast is None else (f"with what was found, {fast}; the declared model does not.",)
 

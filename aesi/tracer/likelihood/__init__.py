@@ -1,1 +1,1 @@
-"""One likelihood for every hypothesis: noise, model error, priors; its fits and its score on unseen data."""
+"""The likelihood of a hypothesis (noise, model error, priors), its fits, and its score on unseen data."""

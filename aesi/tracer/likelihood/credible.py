@@ -1,7 +1,7 @@
 """Credible intervals of parameters that have bounds.
 
-A parameter inside its bounds has a normal density, to both sides. One that the data push onto a bound has a normal
-density that is cut off there, (3) of `gaussian.py`; its interval is what lies nearest the bound.
+A parameter inside its bounds has a normal density and a symmetric interval. One that the data push onto a bound has a
+normal density truncated there, (3) of `gaussian.py`, and an interval that begins at the bound.
 Johnson, Kotz & Balakrishnan, Continuous Univariate Distributions 1 (1994), section 13.10.
 """
 
@@ -15,9 +15,9 @@ from aesi.tracer.likelihood.gaussian import Posterior, along_bounds, held_at_bou
 
 
 def reaches(posterior: Posterior, bounds: Array, share: float) -> Array:
-    """(m, 2) distances from each parameter to the ends, lower and upper, of the interval with `share` of its density.
+    """(m, 2) distances, at least 0, from each parameter to the lower and the upper end of its credible interval.
 
-    bounds : (m, 2) of the coordinates, in which the distances are, too.
+    bounds : (m, 2) of the coordinates.  share : posterior probability of the interval.  Distances are in coordinates.
     """
     to_bounds, held = held_at_bounds(posterior, bounds)
     free, place = np.flatnonzero(~held), posterior.x + to_bounds
@@ -33,7 +33,7 @@ def reaches(posterior: Posterior, bounds: Array, share: float) -> Array:
 
 
 def _distance(slope: float, curvature: float, share: float) -> float:
-    """The quantile of (3) of `gaussian.py`: this share of it lies nearer."""
+    """Distance from the bound within which `share` of the density (3) of `gaussian.py` lies."""
     sd = curvature**-0.5
     beyond = -slope * sd  # from the middle of the uncut normal to the bound, in its standard deviations
     quantile = -ndtri_exp(log_ndtr(-beyond) + np.log1p(-share))

@@ -29,16 +29,17 @@ from aesi.tracer.likelihood.model_error import PRIORS, Size, SplitTable, off_wit
 from aesi.tracer.likelihood.size_sums import SizeSums
 
 GAIN_NATS = 0.05
-"""A descent stops where a step gains less than this, in nats by an error as large as what is left
-(`beyond_expected`)."""
+"""A descent stops where a step gains less than this, nats. The gain counts relative to the mean square of the whitened
+errors, where that exceeds 1 (`beyond_expected`)."""
 
 
 @dataclass(frozen=True, eq=False)
 class FittedHypothesis:
-    """A hypothesis where the data put it.
+    """A fitted hypothesis.
 
-    free : what moves.  point : the linear form there.  score : on unseen data.  simulations : spent.
-    as_declared : whether the linear form is about the declared values of the own parameters, instead of the optimum.
+    hypothesis : ids of its effects.  free : its parameters.  point : linearisation at the optimum.  score : on unseen
+    data.  simulations : spent on the fit.
+    as_declared : True where the linearisation is at the declared values of the own parameters, not at the optimum.
     """
 
     hypothesis: tuple[str, ...]
@@ -60,7 +61,7 @@ class FittedHypothesis:
 
     @property
     def rmse_v(self) -> float:
-        """Root mean square of the residual on what was seen, V."""
+        """RMS residual on the fitted rows, V."""
         return rms(self.point.residual_v)
 
     @property
@@ -74,7 +75,7 @@ class FittedHypothesis:
 
 
 class HypothesisFitter:
-    """Simulations, slopes and descents of one hypothesis."""
+    """Simulations, sensitivities and Gauss-Newton descents of one hypothesis."""
 
     def __init__(self, problem: InverseProblem, blocks: Blocks, hypothesis: Sequence[str]) -> None:
         self.problem, self.blocks, self.hypothesis = problem, blocks, tuple(hypothesis)
@@ -86,7 +87,7 @@ class HypothesisFitter:
         self._last_slopes: tuple[bytes, Array | None] = (b"", None)
 
     def residual(self, x: Array) -> Array | None:
-        """(n,) V, or None where the model fails."""
+        """(n,) V, measured - model; None where the model fails."""
         key = x.tobytes()
         if key not in self._errors:
             self.simulations += 1
@@ -95,7 +96,8 @@ class HypothesisFitter:
         return self._errors[key]
 
     def jacobian(self, x: Array, residual: Array) -> Array | None:
-        """(n, k) V per standard deviation of the prior, by one-sided differences within the bounds."""
+        """(n, k) V, sensitivities of the model per prior standard deviation, by one-sided differences within the
+        bounds; None where the model fails."""
         if self._last_slopes[0] == x.tobytes():
             return self._last_slopes[1]
         columns = []
@@ -109,7 +111,7 @@ class HypothesisFitter:
         return out
 
     def _slope(self, x: Array, residual: Array, j: int) -> tuple[Array | None, int]:
-        """(n,) V, None where the model fails on both sides, and the simulations that it took."""
+        """(column j of the jacobian (n,) V, or None where the model fails on both sides; number of simulations)."""
         only = self.free[j].record
         rows = slice(None) if only is None else self.problem.slices[only]
         simulations = 0
@@ -135,10 +137,10 @@ class HypothesisFitter:
         slopes_v: Array | None = None,
         without: Sequence[int] = (),
     ) -> Array:
-        """Coordinates after a descent at one size of the model error.
+        """Coordinates after a descent from x with a fixed size of the model error.
 
-        slopes_v : (n, k) V, the model's sensitivities as they are near x, to begin with.  without : blocks that are
-        not looked at.
+        rounds : most evaluations of the jacobian.  slopes_v : (n, k) V, approximate sensitivities at x to begin with.
+        without : blocks that are left out.
         """
         whitened_one = _Whitened(self, size, ~np.isin(self.blocks.of_row, without))
         begin = None if slopes_v is None else whitened_one.columns(slopes_v)
@@ -147,7 +149,7 @@ class HypothesisFitter:
         return descend(whitened_one, x, self.low, self.high, rounds, tolerance, begin).known_x
 
     def finished(self, x: Array) -> FittedHypothesis | None:
-        """The fit at a point, scored."""
+        """The fit that ended at x, with its score; None where the model fails there."""
         e = self.residual(x)
         jacobian = None if e is None else self.jacobian(x, e)
         if e is None or jacobian is None:
@@ -161,28 +163,28 @@ class HypothesisFitter:
 def beyond_expected(white: Array) -> float:
     """Mean square of whitened errors (n,), at least 1.
 
-    Where errors are larger than the noise and the model error that they were whitened by, a difference of two squared
-    errors overstates what it is worth, by this factor.
+    Where errors are larger than the noise and the model error by which they were whitened, a difference of two sums of
+    squares is too large by this factor, as evidence.
     """
     return max(float(np.mean(white**2)), 1.0)
 
 
 def scored(problem: InverseProblem, blocks: Blocks, point: Linearised) -> PredictiveScore:
-    """The predictive score of a linear form, over sizes of the model error."""
+    """The predictive score of a linearised hypothesis, at the size of the model error where it is highest."""
     prior, sums = PRIORS[problem.trust], SizeSums(SplitTable(problem, blocks, point.table()))
     said = [said_at(sums, point, size, prior.log_density(size)) for size in prior.sizes]
     return best_over_sizes(said, len(point.x))
 
 
 def said_at(sums: SizeSums, point: Linearised, size: Size, log_prior: float = 0.0) -> Weighed:
-    """A linear form, scored at one size of the model error.  sums : of its table."""
+    """The score of a linearised hypothesis at one size of the model error.  sums : over its `point.table()`."""
     return weighed(sums.table.blocks, sums.at(size), point.padded_x, point.padded_bounds, size, log_prior)
 
 
 @dataclass(frozen=True, eq=False)
 class _Whitened:
-    """What a descent minimises at one size of the model error: whitened residual of the rows that are looked at (n,),
-    less what the file may be off by at the scale of seconds, then the coordinates."""
+    """Least-squares residual that a descent minimises at one size of the model error: the whitened residual of the rows
+    `seen`, projected off the errors that the file may have within seconds, then the coordinates (their prior)."""
 
     fitter: HypothesisFitter
     size: Size
@@ -190,13 +192,13 @@ class _Whitened:
 
     @cached_property
     def _off(self) -> Array:
-        """(n + k, k) orthonormal basis of what the file may be off by, over its prior."""
+        """(n + k, k) orthonormal basis of the errors that the file may have within seconds, with their prior."""
         fitter = self.fitter
         off = self._seen(off_within_seconds(fitter.problem, fitter.blocks, fitter.hypothesis))
         return np.asarray(np.linalg.qr(np.vstack([off, np.eye(off.shape[1])]))[0])
 
     def errors(self, error_v: Array) -> Array:
-        """Whitened (n,) V, and what of it the file may be off by."""
+        """(n + k,) a residual (n,) V, whitened and projected."""
         return np.asarray(self._white(error_v[:, None])[:, 0])
 
     def residual(self, x: Array) -> Array | None:
@@ -221,7 +223,7 @@ class _Whitened:
 
 
 class LinearForm(Protocol):
-    """A hypothesis about a point, with its score."""
+    """A hypothesis that is linearised about a point, with its score."""
 
     @property
     def point(self) -> Linearised: ...
@@ -230,7 +232,7 @@ class LinearForm(Protocol):
 
 
 def held_out_residual(blocks: Blocks, fit: LinearForm) -> Array:
-    """(n,) V: the residual of each block at the parameters that the other blocks give, linearly."""
+    """(n,) V, residual of each block at the parameters fitted to the other blocks, by the linearised model."""
     shifts = fit.score.shifts["block"][blocks.of_row]
     return fit.point.residual_v - np.einsum("ij,ij->i", fit.point.jacobian_v, shifts)
 
@@ -242,14 +244,13 @@ def _posterior(
     size: Size,
     folds: tuple[tuple[int, ...], ...] = (),
 ) -> Posterior:
-    """Posterior of the parameters, and of what the file may be off by within seconds, at this size of the model
-    error."""
+    """Posterior of the parameters, followed by the file's errors within seconds, at this size of the model error."""
     white, log_det = whitened(problem, blocks, fit.point.table(), size)
     return Posterior(block_sums(blocks, white, log_det), fit.point.padded_x, folds)
 
 
 def covariance_at(problem: InverseProblem, blocks: Blocks, fit: LinearForm, size: Size) -> Array:
-    """(m, m) of the parameters, in standard deviations of their priors, where the model errs by as much as `size`."""
+    """(m, m) posterior covariance of the coordinates, for a model error of this size."""
     own = slice(0, len(fit.point.x))
     return _posterior(problem, blocks, fit, size).covariance[own, own]
 
@@ -257,10 +258,10 @@ def covariance_at(problem: InverseProblem, blocks: Blocks, fit: LinearForm, size
 def prediction_sd_v(
     problem: InverseProblem, blocks: Blocks, fit: LinearForm, size: Size, partition: str = "block"
 ) -> Array:
-    """(n,) V, standard deviation of what is predicted of each block by the parameters that those outside its fold give,
-    where the model errs by as much as `size`.
+    """(n,) V, standard deviation of the predicted voltage of each block, with the parameters fitted to the blocks
+    outside its fold, for a model error of this size.
 
-    partition : of `blocks.folds`, in which each block is left out once.
+    partition : one of `blocks.folds` in which each block is left out once.
     """
     x, jacobian = fit.point.x, fit.point.jacobian_v
     folds = blocks.folds[partition]

@@ -1,4 +1,4 @@
-"""The linear-Gaussian form of a hypothesis about a point, by blocks, and what it predicts of blocks left out.
+"""A hypothesis linearised about a point, with Gaussian errors, and its predictive density of left-out blocks.
 
     y = f(x) + J z + e,   x + z ~ N(0, 1),   e ~ N(0, C), independent between blocks    (1)
 
@@ -6,12 +6,12 @@ With whitened residual r and sensitivities J, a set S of blocks has the marginal
 
     -2 log p(y_S) = r'r + x'x - b'A^-1 b + log|A| + log|C| + n log 2 pi,   A = 1 + J'J,   b = J'r - x     (2)
 
-and what is said of blocks F by those outside is log p(y_F | y_-F) = log p(y) - log p(y_-F).
+and the log predictive density of blocks F, given the others, is log p(y_F | y_-F) = log p(y) - log p(y_-F).
 Bishop, Pattern Recognition and Machine Learning (2006), section 3.5.
 
 Parameters have bounds, which (1) does not know. Those that all data together push onto a bound are held there, and (2)
-is of the rest. The evidence is an integral over those that are held, too: along the distance d >= 0 of one from its
-bound, with the free ones marginalised and the others held where they are, the density is
+is for the others. The evidence (marginal likelihood) also integrates over a held parameter: along its distance d >= 0
+from the bound, with the free parameters marginalised and the other held ones fixed, the density is
 
     p(d) ~ exp(g d - a d^2 / 2)    g < 0 where the data push onto the bound, a > 0 their curvature    (3)
 
@@ -38,7 +38,7 @@ from aesi.tracer.likelihood.model_error import LOG_2PI, Size
 class BlockSums:
     """Sums over the rows of each block, whitened.
 
-    square : (b,) r'r.  moment : (b, m) J'r.  gram : (b, m, m) J'J.  log_det : (b,) log|C|.  rows : (b,) how many.
+    square : (b,) r'r.  moment : (b, m) J'r.  gram : (b, m, m) J'J.  log_det : (b,) log|C|.  rows : (b,) their number.
     """
 
     square: Array
@@ -58,14 +58,14 @@ class BlockSums:
         )
 
     def moved(self, z: Array) -> BlockSums:
-        """The sums about a point that lies z (m,) further."""
+        """The sums about the point x + z, z (m,)."""
         along = self.gram @ z
         square = self.square - 2.0 * self.moment @ z + along @ z
         return BlockSums(square, self.moment - along, self.gram, self.log_det, self.rows)
 
 
 def block_sums(blocks: Blocks, table: Array, log_det: Array) -> BlockSums:
-    """table : (n, 1 + m), whitened residual and sensitivities.  log_det : (n,)."""
+    """The sums of each block.  table : (n, 1 + m), whitened residual and sensitivities.  log_det : (n,) of each row."""
     m = table.shape[1]
     count = len(blocks)
     products = np.empty((count, m, m))
@@ -75,7 +75,8 @@ def block_sums(blocks: Blocks, table: Array, log_det: Array) -> BlockSums:
 
 
 def sums_of_products(blocks: Blocks, products: Array, log_det: Array) -> BlockSums:
-    """products : (b, 1 + m, 1 + m), of the whitened residual and sensitivities with each other.  log_det : (n,)."""
+    """The sums of each block.  products : (b, 1 + m, 1 + m) products of the whitened residual and sensitivities with
+    each other.  log_det : (n,) of each row."""
     return BlockSums(
         products[:, 0, 0],
         products[:, 1:, 0],
@@ -86,7 +87,7 @@ def sums_of_products(blocks: Blocks, products: Array, log_det: Array) -> BlockSu
 
 
 class Solved(NamedTuple):
-    """The solution A^-1 b of (2); it may be that of a stack of systems.
+    """The solution A^-1 b of (2), for one system or for a stack of them.
 
     root : (m, m) lower triangular factor of A.  shift : (m,) A^-1 b.
     """
@@ -105,7 +106,8 @@ class Solved(NamedTuple):
 def gains(gram: Array, moment: Array, x: Array) -> Array:
     """(f,) b'A^-1 b - log|A| of (2), nats.  gram : (f, m, m) J'J.  moment : (f, m) J'r.  x : (m,) the point.
 
-    A factor of A with b below it holds L^-1 b in its last row, L that of A, so that nothing has to be solved.
+    The Cholesky factor of A bordered by b has L^-1 b in its last row (L: factor of A), so that nothing has to be
+    solved.
     """
     m, b = len(x), moment - x
     bordered = np.zeros((len(b), m + 1, m + 1))
@@ -206,11 +208,11 @@ class Posterior:
 
 @dataclass(frozen=True, eq=False)
 class Linearised:
-    """A hypothesis about a point: coordinates (m,), residual (n,) V, sensitivities of the model (n, m) V, and bounds
-    (m, 2) of the coordinates.
+    """A hypothesis linearised about a point.
 
-    off_v : (n, k) V, what the file may be off by at the scale of seconds alone, for one standard deviation of each:
-    part of the model error, not of the model.
+    x : (m,) coordinates.  residual_v : (n,) V, measured - model.  jacobian_v : (n, m) V, sensitivities of the model.
+    bounds : (m, 2) of the coordinates.  off_v : (n, k) V, errors that the file may have within seconds, per standard
+    deviation: part of the model error, not of the model.
     """
 
     x: Array
@@ -220,17 +222,17 @@ class Linearised:
     off_v: Array
 
     def table(self) -> Array:
-        """(n, 1 + m + k)."""
+        """(n, 1 + m + k) V: residual, sensitivities, errors of the file within seconds."""
         return np.column_stack([self.residual_v, self.jacobian_v, self.off_v])
 
     @property
     def padded_x(self) -> Array:
-        """(m + k,) with what the file is off by at nought."""
+        """(m + k,) coordinates, zero for the errors of the file within seconds."""
         return np.concatenate([self.x, np.zeros(self.off_v.shape[1])])
 
     @property
     def padded_bounds(self) -> Array:
-        """(m + k, 2), of what the file is off by as of its own parameters."""
+        """(m + k, 2) bounds; the errors of the file within seconds have those of own parameters."""
         return np.vstack([self.bounds, bounds_of_own(self.off_v.shape[1])])
 
 
@@ -244,12 +246,14 @@ PARTITIONS_OF_CONDITIONS = ("record", "rate", "charge")
 
 @dataclass(frozen=True, eq=False)
 class PredictiveScore:
-    """What a hypothesis says of data that it has not seen, at the size of the model error at which it says most.
+    """Cross-validated score of a hypothesis, at the size of the model error where its total is highest.
 
-    size : that size.  log_density : by partition, (f,) nats of each fold.  total : half over blocks, half over the
-    mean of the conditions, and the log prior of the size.  evidence : log marginal likelihood at that size.
-    shifts : by partition, (f, m) change of the parameters without each fold.  shift, covariance : (m,) and (m, m), the
-    change to where all data put them, and what they are uncertain by there; zero of what is held on a bound.
+    size : that size.  log_density : partition -> (f,) log predictive density of each left-out fold, nats.
+    total : mean of the sum over blocks and of the mean over the partitions by condition, plus the log prior of the
+    size, nats.  evidence : log marginal likelihood at that size, nats.
+    shifts : partition -> (f, m) change of the coordinates when each fold is left out.  shift : (m,) change of the
+    coordinates from the point to the optimum of all data.  covariance : (m, m) posterior covariance there. Both are
+    zero for a parameter that is held on a bound.
     """
 
     size: Size
@@ -262,7 +266,7 @@ class PredictiveScore:
 
     @property
     def delta_v(self) -> float:
-        """Size of what lasts of the model error, V."""
+        """Size of the lasting part of the model error, V."""
         return self.size.delta_v
 
     def of(self, columns: IntArray) -> PredictiveScore:
@@ -273,8 +277,8 @@ class PredictiveScore:
 
 
 def held_at_bounds(posterior: Posterior, bounds: Array) -> tuple[Array, BoolArray]:
-    """Change (m,) that takes those parameters to their bounds that all data together push there, zero for the others,
-    and which (m,) are held.  bounds : (m, 2) of the coordinates."""
+    """(change (m,) of the coordinates, held (m,)): the parameters that all data together push onto a bound are moved to
+    it and held there; the change is zero for the others.  bounds : (m, 2) of the coordinates."""
     low, high = bounds[:, 0] - posterior.x, bounds[:, 1] - posterior.x
     root, best = posterior.solved
     if np.all((low < best) & (best < high)):
@@ -287,7 +291,7 @@ def held_at_bounds(posterior: Posterior, bounds: Array) -> tuple[Array, BoolArra
 
 
 class AtBound(NamedTuple):
-    """(3) of one parameter that is held.  slope : g.  curvature : a."""
+    """The density (3) of one held parameter.  slope : g.  curvature : a."""
 
     slope: float
     curvature: float
@@ -300,9 +304,9 @@ class AtBound(NamedTuple):
 
 
 def along_bounds(sums: BlockSums, place: Array, bounds: Array, held: BoolArray) -> dict[int, AtBound]:
-    """(3) of each parameter that is held, by its number.
+    """Number of each held parameter -> its density (3).
 
-    sums : about `place` (m,), where some parameters are on their bounds (m, 2).  held : (m,) which these are.
+    sums : about `place` (m,), where the held parameters are on their bounds (m, 2).  held : (m,) True for these.
     """
     a = sums.gram.sum(axis=0) + np.eye(len(place))
     b = sums.moment.sum(axis=0) - place
@@ -322,12 +326,11 @@ def on_lower_bound(place: float, bounds: Array) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Weighed:
-    """A hypothesis at one size of the model error, worked out as far as it takes to compare sizes.
+    """A linearised hypothesis at one size of the model error, evaluated as far as sizes have to be compared.
 
-    posterior : of the parameters that are free.  folds : by partition.  x : (m,) the point.  bounds : (m, 2).
-    sums : of all of them about that point.
-    to_bounds, held : (m,) change to the bounds of those that are not free, and which these are.  log_prior : of the
-    size.
+    posterior : of the free (not held) parameters.  folds : by partition.  x : (m,) the point.  bounds : (m, 2).
+    sums : over all parameters, about that point.  to_bounds : (m,) change that moves the held parameters to their
+    bounds.  held : (m,) True for these.  log_prior : of the size, nats.
     """
 
     posterior: Posterior
@@ -358,7 +361,7 @@ class Weighed:
 
     @property
     def score(self) -> PredictiveScore:
-        """All that is said at this size."""
+        """The full score at this size."""
         posterior, free, m = self.posterior, np.flatnonzero(~self.held), len(self.x)
         whole = np.tile(self.to_bounds, (len(posterior.folds), 1))
         whole[:, free] = posterior.shifts
@@ -371,7 +374,7 @@ class Weighed:
 
     @property
     def _evidence(self) -> float:
-        """As `PredictiveScore.evidence`: that of the free parameters, with what (3) and the prior say of the others."""
+        """As `PredictiveScore.evidence`: that of the free parameters, plus (3) and the prior of the held ones."""
         if not self.held.any():
             return self.posterior.evidence
         place = self.x + self.to_bounds
@@ -383,7 +386,7 @@ class Weighed:
 def weighed(
     blocks: Blocks, sums: BlockSums, x: Array, bounds: Array, size: Size, log_prior: float
 ) -> Weighed:
-    """A hypothesis at one size of the model error.
+    """A linearised hypothesis at one size of the model error.
 
     x : (m,) the point.  bounds : (m, 2) of the coordinates.
     """
@@ -397,6 +400,6 @@ def weighed(
 
 
 def best_over_sizes(sizes: Sequence[Weighed], own: int) -> PredictiveScore:
-    """The score at the size of the model error at which most is said, of the first `own` parameters; the others are
+    """The score at the size of the model error with the highest total, for the first `own` parameters; the others are
     marginalised."""
     return max(sizes, key=lambda one: one.total).score.of(np.arange(own))

@@ -41,7 +41,7 @@ from aesi.tracer.likelihood.model_error import PRIORS, Size, SplitTable, off_wit
 from aesi.tracer.likelihood.size_sums import SizeSums
 
 ROUNDS = 6
-"""Most times that a descent takes slopes anew."""
+"""Most evaluations of the sensitivities in one descent."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,7 @@ class Parent:
     _whitening: Lock = field(default_factory=Lock, init=False)
 
     def white(self, size: Size) -> tuple[Array, Array]:
-        """Whitened sensitivities and what the file may be off by (n, m + k), and log|C| (n,), worked out once."""
+        """(whitened sensitivities and errors of the file within seconds (n, m + k), log|C| (n,)); cached."""
         with self._whitening:
             if size not in self._white:
                 self._white[size] = self._columns.whitened(size)
@@ -67,8 +67,9 @@ class Parent:
 
     @cached_property
     def movable(self) -> IntArray:
-        """Numbers of the parameters that may move to first order: all but those on a hard bound, such as nought of a
-        resistance, beyond which the linear form would go. A bound at FURTHEST_SDS is none: the prior holds there."""
+        """Numbers of the parameters that may move to first order: all but those on a hard bound (a resistance of zero),
+        which a linear form would cross. A bound at FURTHEST_SDS is not a hard one: there the prior keeps the parameter
+        back."""
         bounds = np.array([f.bounds for f in self.fit.free]).reshape(-1, 2)
         reached = np.column_stack(at_ends(self.fit.point.x, bounds[:, 0], bounds[:, 1]))
         hard = np.abs(bounds) < FURTHEST_SDS - TINY
@@ -77,11 +78,11 @@ class Parent:
 
 @dataclass(frozen=True, eq=False)
 class Grown:
-    """A parent and one effect: its parameters fitted, the rest to first order.
+    """A parent hypothesis with one more effect: the effect's parameters are fitted, the parent's move to first order.
 
-    free, point : the movable parameters and the linear form in them.  on_bounds : values of the effect's others.
-    held : values of the parent's others.
-    u : (k,) coordinates of the effect's own parameters.  slopes_v : (n, k) V, their sensitivities there.
+    free, point : the movable parameters and the linearisation in them.  on_bounds : values of those parameters of the
+    effect that ended on a bound.  held : values of the parent's parameters on a hard bound.
+    u : (k,) coordinates of the effect's parameters.  slopes_v : (n, k) V, their sensitivities there.
     """
 
     hypothesis: tuple[str, ...]
@@ -96,23 +97,23 @@ class Grown:
 
     @property
     def placed(self) -> dict[tuple[str, str], float]:
-        """(owner, name) -> value, with the first-order change of the rest."""
+        """(owner, name) -> value, those of the parent with their first-order change."""
         x = self.point.x + self.score.shift
         moved = {f.key: f.value(float(v)) for f, v in zip(self.free, x, strict=True)}
         return {**self.on_bounds, **moved}
 
     @property
     def values(self) -> dict[str, dict[str, float]]:
-        """owner -> name -> value, with what the parent has on a hard bound."""
+        """owner -> name -> value, with the parent's parameters that are held on a hard bound."""
         return by_owner({**self.held, **self.placed}, self.hypothesis)
 
 
 class EffectGrowth:
-    """A parent and an effect that is being fitted on it.
+    """The fit of one effect on top of a parent.
 
-    size : one of the tried sizes, at which the effect's parameters are fitted.
-    known : coordinates of the effect's parameters where an earlier descent ended.  near : where one with the other
-    model of the cell did, to start from; None: from the best of several starts.
+    size : size of the model error at which the effect's parameters are fitted, one of those tried.
+    known : coordinates of the effect's parameters at the end of an earlier descent.  near : the same at the end of a
+    descent with the other model of the cell, as a start; None starts from the best of several starts.
     """
 
     def __init__(
@@ -141,14 +142,13 @@ class EffectGrowth:
 
     @cached_property
     def q(self) -> Array:
-        """Orthonormal basis of the columns that the other parameters can take up, over their prior."""
+        """Orthonormal basis of the whitened sensitivities of the other parameters, with their prior."""
         off = whitened(self.problem, self.parent.blocks, self.off_v, self.size)[0]
         known_columns = np.column_stack([self.parent.white(self.size)[0][:, self.rest], off])
         return np.linalg.qr(np.vstack([known_columns, np.eye(known_columns.shape[1])]))[0]
 
     def from_own_starts(self) -> EffectGrowth:
-        """The same growth, begun at the effect's own starts wherever another descent ended; itself where it begins
-        there."""
+        """The same growth, started from the effect's own starts and not from the end of another descent."""
         return self if self.near is None else EffectGrowth(self.parent, self.effect, self.size)
 
     def error_v(self, u: Array) -> Array | None:
@@ -177,13 +177,13 @@ class EffectGrowth:
         return out
 
     def projected(self, columns: Array, tail: Array) -> Array:
-        """Whitened columns over those of the rest's prior, less what the rest can take up."""
+        """Whitened columns, stacked on `tail`, minus their projection onto `q`."""
         white = whitened(self.problem, self.parent.blocks, columns, self.size)[0]
         stacked = np.vstack([white, tail, np.zeros((self.off_v.shape[1], columns.shape[1]))])
         return stacked - self.q @ (self.q.T @ stacked)
 
     def residual(self, u: Array) -> Array | None:
-        """(1) as a descent minimises it: the residual with the inner minimum taken, then the coordinates."""
+        """Least-squares residual of (1): the whitened residual at the inner minimum, then the coordinates."""
         e = self.error_v(u)
         if e is None:
             return None
@@ -199,7 +199,7 @@ class EffectGrowth:
         return np.vstack([self.projected(-jacobian, np.zeros((len(self.rest), len(u)))), np.eye(len(u))])
 
     def held_on_bounds(self) -> dict[tuple[str, str], float]:
-        """(owner, name) -> value of what the parent has on a hard bound, and which stays there."""
+        """(owner, name) -> value of the parent's parameters on a hard bound, where they stay."""
         movable, fit = set(self.parent.movable.tolist()), self.parent.fit
         return {
             f.key: f.value(float(x))
@@ -208,8 +208,9 @@ class EffectGrowth:
         }
 
     def marks(self) -> Array:
-        """(n, c) V: the slopes at each start, and where the descent ended if it did, and what lies between the parent
-        and it; none where it cannot be simulated."""
+        """(n, c) V, changes of the voltage that the effect can make: at each start, and at the end of its descent where
+        it has one, the sensitivities there and the change from the parent to there; c is 0 where none can be
+        simulated."""
         columns = [np.zeros((len(self.parent.fit.point.residual_v), 0))]
         end = [] if self.known is None else [self.known]
         for u in {one.tobytes(): one for one in (*self.starts, *end)}.values():
@@ -220,13 +221,13 @@ class EffectGrowth:
         return np.hstack(columns)
 
     def first_slopes(self) -> Array | None:
-        """(n, k) V: the slopes where a descent begins; None where it cannot be simulated there."""
+        """(n, k) V, sensitivities at the start of the descent; None where it cannot be simulated there."""
         u = self._most_promising()
         e = None if u is None else self.error_v(u)
         return None if u is None or e is None else self.jacobian(u, e)
 
     def ended(self) -> Grown | None:
-        """Where a descent ends, within the bounds; None where the effect cannot be simulated."""
+        """The growth at the end of its descent, within the bounds; None where the effect cannot be simulated."""
         self.known = u = self._descended() if self.known is None else self.known
         if u is None:
             return None
@@ -248,7 +249,7 @@ class EffectGrowth:
         return self.parent.fit.point.residual_v[:, None]
 
     def _most_promising(self) -> Array | None:
-        """The start from which a step promises most; None where no start can be simulated."""
+        """The start from which one step reduces the objective most; None where no start can be simulated."""
         if len(self.starts) == 1:
             return self.starts[0]
         promised = []
@@ -261,10 +262,10 @@ class EffectGrowth:
 
 
 def promise(parent: Parent, slopes_v: Array) -> float:
-    """Nats that a parent with one more effect promises to gain on unseen data, to first order, without a simulation.
+    """Expected gain of a parent with one more effect on unseen data, nats, to first order and without a simulation.
 
-    slopes_v : (n, k) V, those of the effect as they were on another parent.
-    The model error has the size that the parent needs or the one that a right hypothesis leaves, whichever gives more.
+    slopes_v : (n, k) V, sensitivities of the effect as they were on another parent.
+    The model error has the size of the parent's score or that of a right hypothesis, whichever gives more.
     """
     fit, prior = parent.fit, PRIORS[parent.problem.trust]
     own = SplitTable(parent.problem, parent.blocks, np.column_stack([fit.point.residual_v, slopes_v]))
@@ -283,7 +284,7 @@ def promise(parent: Parent, slopes_v: Array) -> float:
 def _scored(growth: EffectGrowth, u: Array, e: Array, jacobian: Array) -> Grown:
     parent, fit = growth.parent, growth.parent.fit
     lowest, highest = at_ends(u, growth.low, growth.high)
-    inside = ~(lowest | highest)  # a linear form cannot see a bound
+    inside = ~(lowest | highest)  # a linear form ignores bounds
     x = np.concatenate([fit.point.x[growth.rest], u[inside]])
     bounds = np.vstack(
         [fit.point.bounds[growth.rest], np.column_stack([growth.low, growth.high])[inside].reshape(-1, 2)]
@@ -305,8 +306,8 @@ def _scored(growth: EffectGrowth, u: Array, e: Array, jacobian: Array) -> Grown:
 
 
 def _sums_of(growth: EffectGrowth, point: Linearised) -> Callable[[Size], BlockSums]:
-    """Size of the model error -> sums of a linear form whose first parameters are the parent's: where these have to be
-    whitened at each size, they are as they were for all that grows on it."""
+    """Size of the model error -> sums of a linear form whose first parameters are the parent's. Where columns have to
+    be whitened at each size, those of the parent are shared by all growths on it."""
     parent, blocks = growth.parent, growth.parent.blocks
     if blocks.windows is not None:
         return SizeSums(SplitTable(growth.problem, blocks, point.table())).at
@@ -322,4 +323,4 @@ def _sums_of(growth: EffectGrowth, point: Linearised) -> Callable[[Size], BlockS
 
 
 Explanation = FittedHypothesis | Grown
-"""A hypothesis as it was tried: fitted with the whole model, or to first order but for its last effect."""
+"""A hypothesis that was tried: fitted with the whole model, or grown (to first order, except its last effect)."""

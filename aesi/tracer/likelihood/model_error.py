@@ -1,17 +1,17 @@
-"""What the model of a right hypothesis misses: its size in the likelihood, and how likely that size is.
+"""The model error: the error that even a right hypothesis leaves. Its size in the likelihood, and the prior of that.
 
     a(t)**2 = delta**2 + zeta**2 (dU/dz)**2        dU/dz in V, slope of the open-circuit voltage over state of charge
 
-A model errs by some voltage, delta, and by some state of charge, zeta, which shows where the open-circuit voltage is
+A model errs by a voltage, delta, and by a state of charge, zeta, which shows where the open-circuit voltage is
 steep. delta has a log-normal prior: tight for a cell whose file was measured on it, loose for another of its make. zeta
-is delta where the balance of the electrodes is held as declared; where it is free, it takes up errors of charge itself,
-and zeta is no larger than for the cell that was measured.
+is delta where the balance of the electrodes is held as declared. Where the balance is free, it takes up errors of
+charge itself, and zeta is no larger than for the cell that was measured.
 
-Where the cell is a measured one, nothing is known of this error but its size and how long it lasts: no stationary
-process describes it, and one that is fitted to it counts its details as evidence. The likelihood is coarsened then:
-rows count as many samples as are independent, with the size of the error as their deviation (Miller & Dunson, J. Am.
-Stat. Assoc. 114 (2019) 1113). What is gone from a mean over seconds is smaller and has a size of its own; beside it the
-file may be off in how the cell responds within seconds.
+For a measured cell only the size of this error and its correlation time are known. No stationary process describes it,
+and a process fitted to it would count its details as evidence. The likelihood is therefore coarsened: rows count as
+many samples as are independent, with the size of the error as their standard deviation (Miller & Dunson, J. Am. Stat.
+Assoc. 114 (2019) 1113). The part of the error within seconds (its deviation from a mean over seconds) is smaller and
+has a size of its own. In addition the file may be wrong in the response of the cell within seconds.
 """
 
 from __future__ import annotations
@@ -33,12 +33,13 @@ LOG_2PI = float(np.log(2.0 * np.pi))
 SIZES_V = tuple(float(v) for v in 1e-3 * np.geomspace(0.0125, 25.6, 12))
 """Sizes that are tried, a factor of two apart."""
 MEASURED_V = 9e-3
-"""What calibrated and published files leave of a measured drive at the temperature that they are of: 4 to 13 mV on
-eight development records of `aesi bench real`, geometric mean 9 mV. Less is no evidence of anything missing."""
+"""RMS error, V, of calibrated and published files on a measured drive at the temperature of the file: 4 to 13 mV on
+eight development records of `aesi bench real`, geometric mean 9 mV. A smaller error is no evidence of a missing
+effect."""
 BESIDE_V = 4.5e-3
-"""V, as MEASURED_V, where good records of the cell show it on rows at the states of charge of the others: 2 to 13 mV
-on 24 pairs of development records (`python -m aesi.bench.real.repeatability`). The geometric mean is 4.6 mV with the
-cell files that the number was chosen with and 5.0 mV with the present ones."""
+"""As MEASURED_V, V, on good records of the same cell at the states of charge of the others: 2 to 13 mV on 24 pairs of
+development records (`python -m aesi.bench.real.repeatability`). The geometric mean is 4.6 mV with the cell files that
+the number was chosen with and 5.0 mV with the present ones."""
 FAST_V = 3e-3
 """V, as MEASURED_V, of the part within 20 s: 2.0 to 6.0 mV on six development records, geometric mean 2.8 mV
 (`python -m aesi.bench.fast_error`). Less is no evidence either."""
@@ -47,24 +48,24 @@ MOST_MEASURED_V = 13e-3
 
 
 class Size(NamedTuple):
-    """Size of the model error, V.  delta_v : of the lasting part.  fast_v : of the part within seconds, nought where
-    the two are not told apart."""
+    """Size of the model error, V.  delta_v : of the lasting part.  fast_v : of the part within seconds; zero where the
+    error has a single part."""
 
     delta_v: float
     fast_v: float = 0.0
 
 
 def replace_fast(size: Size, by: Size) -> Size:
-    """A size with what another one has of errors that are gone within seconds."""
+    """`size` with the `fast_v` of `by`."""
     return Size(size.delta_v, by.fast_v)
 
 
 @dataclass(frozen=True)
 class SizePrior:
-    """Prior of the size of the model error.
+    """Log-normal prior of the size of the model error.
 
-    median_v : V.  sd : of the natural logarithm.  sizes_v : those that are tried, V.  fast : the same of the part
-    within seconds, where it is told apart.
+    median_v : V.  sd : of the natural logarithm.  sizes_v : sizes that are tried, V.  fast : prior of the part within
+    seconds; None where the error has a single part.
     """
 
     median_v: float
@@ -74,7 +75,7 @@ class SizePrior:
 
     @property
     def sizes(self) -> tuple[Size, ...]:
-        """All that are tried."""
+        """All sizes that are tried."""
         fast_v = (0.0,) if self.fast is None else self.fast.sizes_v
         return tuple(Size(slow, fast) for slow in self.sizes_v for fast in fast_v)
 
@@ -90,7 +91,7 @@ class SizePrior:
         return fast - 0.5 * off**2 - float(np.log(self.sd))
 
     def nearest(self, size: Size) -> Size:
-        """The size that is tried next to one."""
+        """The tried size nearest to `size`."""
         fast_v = 0.0 if self.fast is None else _nearest(self.fast.sizes_v, size.fast_v or self.fast.median_v)
         return Size(_nearest(self.sizes_v, size.delta_v), fast_v)
 
@@ -100,7 +101,7 @@ def _nearest(sizes_v: tuple[float, ...], to_v: float) -> float:
 
 
 FILES_V = tuple(MEASURED_V * 2.0**k for k in range(5))
-"""Sizes that are tried for a measured cell whose file is believed: no less than files leave."""
+"""Sizes that are tried for a measured cell whose file is believed, V: none smaller than the usual error of files."""
 PRIORS: dict[Trust, SizePrior] = {
     "exact": SizePrior(1.7e-5, 0.77),
     "tight": SizePrior(1.7e-5, 0.77),
@@ -117,11 +118,11 @@ PRIORS: dict[Trust, SizePrior] = {
 """exact, tight : what this model and an independent solver of the same cell leave of each other: most likely on the
 right hypotheses of 40 development cases of `aesi bench blind` (`python -m aesi.bench.solver_error`), where 0.2 mV and
 0.7 said 100 nats less.
-loose, measured, lasting : what files of measured cells leave; less where all their parameters are open, no less where
-they are as declared."""
+loose, measured, lasting : the usual error of files on measured cells. It may be smaller where all parameters are open
+(loose), and not where they are as declared."""
 LOOSE_CHARGE = 2e-4
-"""Share of the charge by which a model with all parameters open may err: little, since the balance of the electrodes
-is open as well. A convention."""
+"""zeta of a model with all parameters open, share of the charge: small, since the balance of the electrodes is open as
+well. A convention."""
 CHARGE_PER_V = 0.4
 """Error of a measured cell's model in charge (share) over its error in voltage (V): the same records are off by 0.1
 to 0.6 % of charge."""
@@ -139,8 +140,8 @@ def amplitude_v(steepness: Array, delta_v: float, trust: Trust) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class SplitTable:
-    """Columns (n, m) in V that are whitened at several sizes of the model error: what lasts and what is gone within
-    seconds are told apart once for all of them."""
+    """Columns (n, m) in V, to be whitened at several sizes of the model error. They are split only once into the part
+    that lasts and the part within seconds."""
 
     problem: InverseProblem
     blocks: Blocks
@@ -148,24 +149,24 @@ class SplitTable:
 
     @cached_property
     def _parts(self) -> tuple[Array, Array]:
-        """Means over the windows, and the rest: (n, m) V each."""
+        """(means over the windows, deviations from these), (n, m) V each."""
         assert self.blocks.windows is not None
         slow = self.blocks.windows.means(self.table)
         return slow, self.table - slow
 
     @cached_property
     def at_one_volt(self) -> tuple[Array, Array]:
-        """Where both are told apart, what lasts and what is gone within seconds, each whitened at a size of 1 V: (n, m)
-        each, which another size divides, since the amplitude of a measured cell's error is proportional to it."""
+        """(part that lasts, part within seconds), (n, m) each, whitened at a size of 1 V. Division by another size
+        whitens at that one, since the amplitude of a measured cell's error is proportional to its size."""
         slow, rest = self._parts
         root = np.sqrt(self.problem.independent)[:, None]
         return slow * root / self._amplitude(Size(1.0))[:, None], rest * root
 
     def whitened(self, size: Size) -> tuple[Array, Array]:
-        """The columns (n, m), whitened at a size, and log|C| by rows (n,).
+        """(columns (n, m) whitened at a size, log|C| by rows (n,)).
 
-        By the noise and an error that wanders, block by block; or, of a measured cell, with rows that count as many
-        samples as are independent, over the size of the error alone.
+        C is that of noise and a wandering model error, block by block. For a measured cell rows count as many samples
+        as are independent, with the size of the error as their standard deviation.
         """
         problem, amplitude = self.problem, self._amplitude(size)
         if not problem.coarse:
@@ -178,7 +179,7 @@ class SplitTable:
         return over * root[:, None], self.log_det(size)
 
     def log_det(self, size: Size) -> Array:
-        """(n,) log|C| by rows of a coarsened likelihood: of so many samples, not of a row."""
+        """(n,) log|C| by rows of a coarsened likelihood: that of the row's number of independent samples."""
         share, windows = self.problem.independent, self.blocks.windows
         of_lasting = share * (2.0 * np.log(self._amplitude(size)) + LOG_2PI) - LOG_2PI
         if windows is None:
@@ -186,7 +187,7 @@ class SplitTable:
         return np.asarray(of_lasting + share * windows.fast_dof * (2.0 * np.log(size.fast_v) + LOG_2PI))
 
     def _amplitude(self, size: Size) -> Array:
-        """(n,) V of what lasts."""
+        """(n,) V, standard deviation of the lasting part."""
         return amplitude_v(self.problem.steepness, size.delta_v, self.problem.trust)
 
 
@@ -196,7 +197,7 @@ def whitened(problem: InverseProblem, blocks: Blocks, table: Array, size: Size) 
 
 
 def off_within_seconds(problem: InverseProblem, blocks: Blocks, hypothesis: Sequence[str]) -> Array:
-    """(n, k) V: what the file may be off by within seconds beside a hypothesis, one standard deviation of each:
-    `InverseProblem.off_at_seconds` less its means over the windows, in which the file is believed."""
+    """(n, k) V, errors that the file may have within seconds under a hypothesis, per standard deviation:
+    `InverseProblem.off_at_seconds` minus its means over the windows, in which the file is believed."""
     columns = problem.off_at_seconds(hypothesis)
     return columns if blocks.windows is None else columns - blocks.windows.means(columns)

@@ -1,4 +1,4 @@
-"""The model in each state that a report compares: as declared, recalibrated, and with what was found."""
+"""The models that a report compares: declared, recalibrated, and with the effects that were found."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ from aesi.tracer.likelihood.growth import Explanation
 
 @dataclass(frozen=True, eq=False)
 class ModelState:
-    """A model that can be simulated: a problem and the values of what moved in it (none: as declared).
+    """A model that can be simulated.
 
-    hypothesis : the effects on top of the declared model.
+    values : owner -> name -> value of the fitted parameters; None for the declared model.
+    hypothesis : ids of the effects added to the declared model.
     """
 
     problem: InverseProblem
@@ -33,7 +34,7 @@ class ModelState:
         return cls(problem, one.values, one.hypothesis)
 
     def of_one_age(self) -> ModelState:
-        """The model as it is written: with the file's capacity in every record, whatever a fit gave it in each."""
+        """The model as it is written: with the file's capacity in every record, in place of the fitted shares."""
         if self.values is None or CAPACITY_SHARE not in self.values:
             return self
         return replace(self, values={o: v for o, v in self.values.items() if o != CAPACITY_SHARE})
@@ -45,12 +46,12 @@ class ModelState:
         return self.problem.active(self.values, good)
 
     def simulated(self, record: PreparedRecord, index: int | None, thin: bool) -> Run:
-        """One record.
+        """Simulation of one record.
 
-        index : place among the fitted records, None for one that was not. That goes on from a fitted one where it
-        continues it; else its cell has the file's capacity, and it begins at the state of charge that was given, of a
-        full charge where the fitted full charges begin, or where this model rests at its first voltage. Where it cannot
-        be at rest there, it begins as the declared cell does.
+        index : number among the fitted records; None for one that was not fitted. Such a record takes capacity and
+        initial state from the fitted record that it continues. Otherwise it has the file's capacity, and its initial
+        state of charge is the first that applies: the one given; for a full charge, the mean fitted start of the full
+        charges; that at which this model rests at the first voltage; that of the declared cell.
         """
         index = record.continues if index is None else index
         data, hold = (record.thin, record.thin_hold) if thin else (record.data, record.hold)
@@ -65,9 +66,9 @@ class ModelState:
             return self.problem.run(data, record.soc0, effects, hold)
 
     def _start(self, record: PreparedRecord, index: int | None) -> float | None:
-        """State of charge at a record's first row, None where it is that at which this model rests at its voltage.
+        """State of charge at a record's first row; None where the model's rest at the first voltage determines it.
 
-        index : of the fitted record that it is or continues, None where there is none.
+        index : number of the fitted record that it is or continues; None where there is none.
         """
         if self.values is None:
             return record.soc0
@@ -78,8 +79,8 @@ class ModelState:
         return record.soc0 if record.start.rest_voltage_v is None else None  # it was given
 
     def start_slope_v(self, record: PreparedRecord) -> Array:
-        """(n,) V of a whole record that was not fitted: what one standard deviation of its initial state of charge is
-        worth.  Raises AesiError where it cannot be simulated there."""
+        """(n,) V, change of the voltage on a whole record that was not fitted, by one standard deviation of its initial
+        state of charge.  Raises AesiError where it cannot be simulated there."""
         return self.problem.start_slope_of_v(record, record.data, self.effects(record.good), record.hold)
 
     def _full(self, otherwise: float) -> float:
@@ -90,8 +91,8 @@ class ModelState:
         return sum(full) / len(full) if full else otherwise
 
     def settled(self) -> tuple[Folded, float]:
-        """The cell with all in it that a cell file can hold, but for what infers a measurement that may come, and the
-        state of charge at the first sample in the windows of that cell."""
+        """(cell that holds all values which a cell file can hold, except effects that infer a quantity a later record
+        may have measured; state of charge at the first sample, in the stoichiometry windows of that cell)."""
         declared, fixed = self.problem.cell, self.problem.fixed
         inside = folded(
             declared, self.effects(), lambda active: active in fixed or active.effect.infers is not None

@@ -1,10 +1,10 @@
-"""Sums over the rows of each block, whitened at one size of the model error after another.
+"""Sums over the rows of each block, whitened at many sizes of the model error.
 
-Where what lasts is told apart from what is gone within seconds, a whitened row is s/delta + r/phi, and at every size
+With s the part that lasts and r the part within seconds, a whitened row is s/delta + r/phi, and at every size
 
     J'J = S'S/delta^2 + (S'R + R'S)/(delta phi) + R'R/phi^2     (1)
 
-so that 30 sizes take three products of columns. Where it is not, the rows are whitened at each.
+so that 30 sizes take three products of columns. Where the error has a single part, rows are whitened at each size.
 """
 
 from __future__ import annotations

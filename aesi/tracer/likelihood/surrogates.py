@@ -1,9 +1,9 @@
-"""How much an effect has to gain to be admitted: more than the best of all effects gains by chance.
+"""The gain that an effect needs to be admitted: more than the best of all effects gains by chance.
 
 Surrogates are data drawn from a hypothesis, with its model error and noise, so that it lacks nothing on them. The
-largest gain of any effect on many such draws is what chance alone gives the best of so many; a quantile of it is an
-admission test, for which only the family-wise error rate has to be chosen. Gains are to first order, with the slopes
-that the effects have where they were fitted to the data.
+largest gain of any effect on each draw is the gain of the best effect by chance. A quantile of it over many draws is
+the threshold of an admission test, for which only the family-wise error rate has to be chosen. Gains are to first
+order, with the sensitivities of the effects where they were fitted to the data.
 White, Econometrica 68 (2000) 1097, for the largest of many as the statistic.
 """
 
@@ -23,16 +23,16 @@ from aesi.tracer.likelihood.growth import Parent
 from aesi.tracer.likelihood.model_error import whitened
 
 DRAWS = 400
-"""The 99 % quantile of so many is known to a tenth of its value."""
+"""Number of surrogates: the 99 % quantile is then known to a tenth of its value."""
 FAMILY_WISE = 0.01
-"""Chance that any effect at all is admitted at a step where nothing is missing, and of cells whose declared parameters
-scatter as their spreads say, the share that have one which is called wrong."""
+"""Family-wise error rate: the probability that any effect is admitted at a step where nothing is missing. Also the
+share of cells with a declared parameter that is called wrong, where the parameters scatter by their spreads."""
 
 
 def admission_nats(parent: Parent, slopes_v: Mapping[str, Array], seed: int = 0) -> float:
     """The gain on unseen data that an effect has to reach to be admitted, nats.
 
-    slopes_v : id of an effect -> (n, k) V, what its parameters do; without any effect the gain to reach is 0.
+    slopes_v : id of an effect -> (n, k) V, sensitivities of its parameters; the gain is 0 where there is no effect.
     """
     if not slopes_v:
         return 0.0
@@ -54,9 +54,9 @@ def largest_gains(
 
 
 def _drawn(problem: InverseProblem, windows: Windows | None, draws: int, rng: np.random.Generator) -> Array:
-    """(n, draws) of model error and noise, whitened: standard normal numbers. Under a coarsened likelihood the rows
-    that make up one independent sample share its draw; what is gone within seconds has a draw in each row, less the
-    mean of its window."""
+    """(n, draws) of model error and noise, whitened: standard normal numbers. Under a coarsened likelihood the rows of
+    one independent sample share one draw; the part within seconds has a draw in each row, minus the mean of its
+    window."""
     if not problem.coarse:
         return rng.normal(size=(len(problem.time_s), draws))
     sample = np.floor(np.cumsum(problem.independent) - problem.independent).astype(int)
@@ -95,7 +95,7 @@ class _Sums:
 
 
 def _gains(blocks: Blocks, sums: _Sums, known: int, effects: Sequence[tuple[int, int]]) -> Array:
-    """(e, s) nats: what each effect says of unseen data more than nothing, on each of s surrogates, blocks and
+    """(e, s) gain on unseen data, nats, of each of e effects over none, on each of s surrogates, with blocks and
     conditions weighted as in `gaussian.Weighed`.
 
     sums : with the sensitivities of the `known` parameters first.  effects : first column of each and the one after its

@@ -1,1 +1,1 @@
-"""What a finished search tells: candidates, errors by file, what is left, which experiment comes next."""
+"""The report of a finished search: candidates, errors by file, structure of the residual, the next experiment."""

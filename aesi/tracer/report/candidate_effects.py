@@ -1,4 +1,4 @@
-"""The ranking of what was tried: one row an effect, at its best among the hypotheses that hold it."""
+"""The ranking of the effects that were tried: one row per effect, from its best hypothesis."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from aesi.tracer.search.plausible import plausibility
 SHARE = 0.9
 """Share of the posterior density of a parameter that its interval covers."""
 DIGITS = 6
-"""After the point, of scores that are told apart. Round-off of a simulation, 4e-15 V, is carried on by fits: it moved
-scores of four discoveries by 1e-10 to 7e-8 nats, and those of what says nothing by 1e-14."""
+"""Decimals to which scores (nats) are rounded for the ranking. Fits amplify the round-off of a simulation, 4e-15 V: it
+moved scores of four discoveries by 1e-10 to 7e-8 nats, and scores near zero by 1e-14."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A parameter with its 90 % interval."""
+    """A parameter with its 90 % credible interval, in `unit`."""
 
     value: float
     low: float
@@ -35,10 +35,11 @@ class Estimate:
 
 @dataclass(frozen=True)
 class CandidateEffect:
-    """One effect as it competed.
+    """One effect in the ranking, in its best hypothesis.
 
-    score : nats that it says more of unseen data than the hypothesis without effects.
-    hypothesis : the effects beside which it did best.
+    score : gain of that hypothesis on unseen data over the one without effects, nats.  test_rmse_v : its RMSE on the
+    test part, V; None where it cannot be simulated there.  parameters : name -> estimate.
+    hypothesis : ids of all its effects.  remark : "in the verdict", or why the hypothesis was not chosen.
     """
 
     effect: str
@@ -53,8 +54,8 @@ class CandidateEffect:
 def ranking(
     path: Path, verdict: Verdict, test_rmse_v: Callable[[Explanation], float | None]
 ) -> tuple[CandidateEffect, ...]:
-    """Rows for every effect that could be simulated, best first: one of the verdict as it stands in the chosen
-    hypothesis, another one at its best alone or beside those chosen."""
+    """A row for every effect that could be simulated, best first. An effect of the verdict is shown in the chosen
+    hypothesis, any other in its best one."""
     chosen = path.chosen
     rows = []
     for effect in path.problem.effects.values():
@@ -79,12 +80,12 @@ def ranking(
 
 
 def best_first(rows: Sequence[CandidateEffect]) -> tuple[CandidateEffect, ...]:
-    """Those that say the same stay in the order given."""
+    """The rows by score, highest first; equal ones stay in the order given."""
     return tuple(sorted(rows, key=lambda row: -round(row.score, DIGITS)))
 
 
 def refused(path: Path, one: Explanation) -> str:
-    """Why a hypothesis is not the one that was chosen."""
+    """Why a hypothesis was not chosen, a clause."""
     rest = path.chosen.score.total
     if isinstance(one, FittedHypothesis) and one.at_bounds:
         return f"ends on a bound: {', '.join(one.at_bounds)}"
@@ -95,7 +96,7 @@ def refused(path: Path, one: Explanation) -> str:
 
 
 def _why_not(path: Path, better: Explanation) -> str:
-    """By which rule a hypothesis that says more of unseen data is not the one that was chosen."""
+    """The rule by which a hypothesis with a higher score on unseen data was not chosen, a clause."""
     if not isinstance(better, FittedHypothesis):
         return "to first order: it was not among the best that were fitted with the whole model"
     chosen, competing = path.chosen, len(path.problem.competing())
@@ -109,12 +110,12 @@ def _why_not(path: Path, better: Explanation) -> str:
 
 
 def estimates(path: Path, one: Explanation, effect: str) -> dict[str, Estimate]:
-    """The parameters of one effect of a hypothesis, each with what 90 % of its posterior density covers: to both sides
-    of one inside its bounds, from the bound inwards of one that the data push onto it."""
+    """Name -> estimate, for the parameters of one effect of a hypothesis. The 90 % interval is symmetric for a
+    parameter inside its bounds, and begins at the bound for one that the data push onto it."""
     known = path.problem.parameters_of(effect)
     reach, placed, out = _reach(path, one), one.placed, {}
     for free in known:
-        if free.key not in placed:  # stays where the hypothesis had it that this one grew from
+        if free.key not in placed:  # keeps its value in the parent
             out[free.name] = estimates(path, _parent(path, one), effect)[free.name]
             continue
         x, (below, above) = free.coordinate(placed[free.key]), reach[free.key]
@@ -130,7 +131,7 @@ def _parent(path: Path, one: Explanation) -> FittedHypothesis:
 
 
 def _reach(path: Path, one: Explanation) -> dict[tuple[str, str], tuple[float, float]]:
-    """(owner, name) -> how far below and above a parameter its interval reaches, in deviations of its prior."""
+    """(owner, name) -> (distance to the lower end, to the upper end) of the interval, in prior standard deviations."""
     point, keys = one.point, [free.key for free in one.free]
     if isinstance(one, Grown):  # a score leaves out what a descent left on a bound
         added = path.problem.parameters_of(one.hypothesis[-1])

@@ -1,4 +1,4 @@
-"""What a residual depends on: how much of it each variable of the model explains unseen."""
+"""What a residual depends on: the share of its variance that each family of variables explains on left-out rows."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from aesi.numerics.typing import Array
 from aesi.records import Run
 
 MEMORIES_S = (10.0, 60.0, 300.0, 1800.0)
-"""Low-passes of the current that stand for slow states."""
+"""Time constants, s, of low-pass filters of the current, as substitutes for slow states."""
 TURNS_S = (120.0, 900.0)
-"""Low-passes of the sign of the current that stand for hysteresis."""
+"""Time constants, s, of low-pass filters of the sign of the current, as substitutes for hysteresis."""
 REST_SHARE = 0.02
 """Share of the RMS of all records' current below which a current has no sign."""
 FOLDS = 5
@@ -23,16 +23,16 @@ FOLDS = 5
 BLOCKS = 25
 """Contiguous blocks of rows, dealt out to the folds in turn; long against the correlation of neighbours."""
 RIDGES = (1e-4, 1e-2, 1.0, 1e2, 1e4)
-"""The one that predicts left-out blocks best is taken."""
+"""Ridge weights that are tried; the one that predicts left-out blocks best is used."""
 SATURATION = 0.5
 """Share of the RMS of all records' current at which the saturating feature bends."""
 
 
 @dataclass(frozen=True)
 class Scales:
-    """What currents and states of charge are scaled by, alike in all records: one column stands for one quantity.
+    """Scales of current and state of charge, the same in all records, so that a column means the same in each.
 
-    current_a : RMS of the current, A.  least_soc, most_soc : of the states of charge.
+    current_a : RMS of the current, A.  least_soc, most_soc : range of the states of charge.
     """
 
     current_a: float
@@ -41,7 +41,7 @@ class Scales:
 
     @classmethod
     def of(cls, runs: Sequence[Run]) -> Scales:
-        """Of all rows of some records."""
+        """The scales from all rows of some records."""
         soc = np.concatenate([run.series["soc"] for run in runs])
         current_a = rms(np.concatenate([run.current_a for run in runs])) + 1e-12
         return cls(current_a, float(soc.min()), float(soc.max()))
@@ -78,8 +78,8 @@ def features(run: Run, scales: Scales) -> dict[str, Array]:
 
 
 def _filtered(time_s: Array, signal: Array, tau_s: float) -> Array:
-    """First-order low-pass of a signal that holds since the row before, from nought; rows may be uneven, as those of
-    thinned records of steady currents are."""
+    """(n,) first-order low-pass of a signal that is constant from the row before, starting at zero. Rows may be
+    unevenly spaced, as in thinned records of steady currents."""
     kept = np.exp(-np.diff(time_s) / tau_s)
     out = np.zeros(len(signal))
     for row, (share, value) in enumerate(zip(kept.tolist(), signal[1:].tolist(), strict=True), start=1):
@@ -108,7 +108,7 @@ def _standard(table: Array) -> Array:
 
 
 def _unseen(table: Array, target: Array, folds: Array) -> float:
-    """Smallest mean square over the ridges of the error on rows that were left out."""
+    """Mean square error on left-out rows, with the ridge weight where it is smallest."""
     design = np.column_stack([np.ones(len(table)), table])
     errors = np.zeros(len(RIDGES))
     for fold in range(FOLDS):

@@ -1,4 +1,4 @@
-"""Errors as declared, recalibrated and with the effects added, on every file as it was measured."""
+"""Errors of the declared, recalibrated and written model on every file as measured."""
 
 from __future__ import annotations
 
@@ -50,13 +50,14 @@ class Errors:
 
 @dataclass(frozen=True, eq=False)
 class FileOutcome:
-    """One part of one file.
+    """The models on one part of one file.
 
     voltages : state -> (n,) V, NaN where that model cannot be simulated on this part.  unsimulated : state -> why it
-    cannot.  noise_v : of the measured voltage.  gain_v : RMSE recalibrated minus after, with its 95 % block-bootstrap
-    interval; NaN where one of them has no voltage.  emptied_s : state -> s, where its simulation ran out of charge or
-    salt, if it did.
-    start_slope_v : (n,) V of `after`, what one standard deviation of an initial state that was not fitted is worth.
+    cannot.  noise_v : standard deviation of the measured voltage's noise, V.  gain_v : RMSE of `recalibrated` minus
+    that of `after`, with its 95 % block-bootstrap interval, V; NaN where one of them has no voltage.  emptied_s : state
+    -> time at which its simulation ran out of lithium or salt, s; only states that did.
+    start_slope_v : (n,) V, change of the voltage of `after` by one standard deviation of an initial state that was not
+    fitted; None where it was fitted.
     """
 
     name: str
@@ -77,7 +78,7 @@ class FileOutcome:
         return self.measured_v - self.voltages[state]
 
     def beyond_start_v(self) -> Array:
-        """(n,) V that `after` leaves once the initial state is where it fits best, as far as it is uncertain."""
+        """(n,) V, residual of `after` once the initial state is refitted within its uncertainty."""
         left = self.residual_v("after")
         if self.start_slope_v is None:
             return left
@@ -95,7 +96,7 @@ def outcomes(
     tests: Sequence[PreparedRecord],
     rng: np.random.Generator,
 ) -> tuple[FileOutcome, ...]:
-    """Every file, cut into the part that fits have seen and the part that chose nothing."""
+    """The models on every file, fit part and test part apart."""
     out = []
     for index, record in enumerate(records):
         runs = {name: _followed(state, record, index) for name, state in states.items()}
@@ -117,8 +118,10 @@ def outcomes(
 
 @dataclass(frozen=True, eq=False)
 class _Followed:
-    """A model over the rows of a record: voltage, V, state of charge, and whether it ran out, each (n,), NaN or False
-    from the row on from which it cannot be simulated.  why : the sentence that says so; '' where there is no such row.
+    """A simulation over the rows of a record.
+
+    voltage_v, soc : (n,), NaN from the row on where it fails.  empty : (n,) True where lithium or salt ran out.
+    why : a sentence on the failure; '' where there is none.
     """
 
     voltage_v: Array
@@ -128,7 +131,7 @@ class _Followed:
 
 
 def _followed(state: ModelState, record: PreparedRecord, index: int | None) -> _Followed:
-    """A model over a record, or over the part of it that was fitted where it cannot be simulated further."""
+    """A simulation over a record, or over its fit part alone where it fails beyond that."""
     n = len(record.data)
     try:
         run = state.simulated(record, index, thin=False)
@@ -188,7 +191,7 @@ def _outcome(
 
 
 def emptied(files: Sequence[FileOutcome]) -> tuple[str, ...]:
-    """A sentence for each file on which a model ran out before the end: its voltage means nothing from there on."""
+    """A sentence for each file on which a model ran out of lithium or salt, after which its voltage is meaningless."""
     first: dict[str, dict[State, float]] = {}
     for f in files:
         for state, at_s in f.emptied_s.items():
@@ -218,7 +221,7 @@ def rmse_difference(
 def test_rmse_v(
     state: ModelState, records: Sequence[PreparedRecord], tests: Sequence[PreparedRecord]
 ) -> float:
-    """RMSE on what the fits have not seen (on the fit parts where there is nothing else), thinned, V."""
+    """RMSE on the test data, thinned, V; on the fit parts where there are no test data."""
     parts = [_residual_v(state, record, None)[record.lead_rows_thin :] for record in tests]
     for index, record in enumerate(records):
         if record.n_fit < len(record.thin):

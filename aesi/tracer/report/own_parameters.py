@@ -1,4 +1,4 @@
-"""What a fit made of the parameters that the cell's file declares: how far each went, and which ended on its limit."""
+"""The declared parameters of the cell after a fit: how far each moved, and which ended on its limit."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ LIMIT_SHARE = 0.01
 class OwnParameter:
     """A declared parameter after a fit.
 
-    owner : the effect that restates it, or one of OF_ONE_RECORD, whose `name` is then that of the record.
-    declared, value : in `unit`; a factor is declared as 1.  deviations : from declared, in standard deviations of its
-    prior in that fit.  one_sd : how far one of these is from declared, on the side where it went, in `unit`.
-    at_limit : whether it ended at the end of the range in which it may move.
+    owner : id of the effect that restates it, or one of OF_ONE_RECORD; `name` is then that of the record.
+    declared, value : in `unit`; a factor is declared as 1.  deviations : value - declared, in prior standard deviations
+    of that fit.  one_sd : size of one standard deviation on the side to which it moved, in `unit`.
+    at_limit : whether it ended at the end of its range.
     """
 
     owner: str
@@ -35,7 +35,7 @@ class OwnParameter:
 
 
 def own_parameters(state: ModelState) -> tuple[OwnParameter, ...]:
-    """The declared parameters that were open in a fit, furthest first; none where nothing was fitted."""
+    """The declared parameters that a fit moved, largest deviation first; empty where nothing was fitted."""
     if state.values is None:
         return ()
     problem = state.problem
@@ -48,7 +48,7 @@ def own_parameters(state: ModelState) -> tuple[OwnParameter, ...]:
 
 
 def ages_told(states: Sequence[ModelState]) -> str:
-    """A sentence on the capacity that the cell had in each record, by the first state that has one; '' where none
+    """A sentence on the fitted capacity of the cell in each record, from the first state that has them; '' where none
     has."""
     for state in states:
         shares = (state.values or {}).get(CAPACITY_SHARE)
@@ -74,5 +74,5 @@ def _own_parameter(free: FreeParameter, value: float, name: str) -> OwnParameter
 
 
 def _one_sd(free: FreeParameter, x: float) -> float:
-    """How far one standard deviation is from declared on the side of `x`, in the parameter's unit."""
+    """Size of one standard deviation from the declared value, on the side of `x`, in the parameter's unit."""
     return free.centre * abs(np.expm1(np.copysign(free.sd, x))) if free.log else free.sd

@@ -1,4 +1,4 @@
-"""Which experiment would tell look-alikes apart: what the files of the effects say of it."""
+"""The experiment that would tell look-alikes apart, from the declarations of the effects."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Warnings where the test part, which chose nothing, contradicts what was found or written; they change neither."""
+"""Warnings where the test part, to which nothing was fitted, contradicts the verdict or the written model. They change
+neither."""
 
 from __future__ import annotations
 
@@ -16,9 +17,8 @@ OTHERS: tuple[State, ...] = ("before", "recalibrated")
 
 
 def contradicted_by_v(files: Sequence[FileOutcome], verdict: Verdict) -> float | None:
-    """V beyond the noise that an explanation of the data leaves of the test part, where that is more than a right one
-    may leave; else None.  The initial state of a test record is as uncertain as it is read: what it explains is no
-    contradiction."""
+    """Error of an explanation on the test part, V RMS beyond the noise, where it exceeds what a right one may leave;
+    else None. Errors within the uncertainty of a test record's initial state do not count."""
     tests = [f for f in _tests(files) if "after" not in f.unsimulated]
     if verdict.word == "unknown" or not tests:
         return None
@@ -29,10 +29,11 @@ def contradicted_by_v(files: Sequence[FileOutcome], verdict: Verdict) -> float |
 
 
 def warnings(files: Sequence[FileOutcome], verdict: Verdict, rest_a: float = 0.0) -> tuple[str, ...]:
-    """Sentences on where the test part contradicts a verdict that explains the data, where the written model does worse
-    than another one there or on what was fitted, or cannot be simulated, and where the test part has no load.
+    """Sentences where the test part contradicts a verdict that explains the data; where the written model is worse than
+    another one, on the test part or on the fitted rows; where a model cannot be simulated; and where the test part has
+    no load.
 
-    rest_a : A, below which the cell rests.
+    rest_a : current below which the cell rests, A.
     """
     told = [f for f in files if not f.unsimulated]
     said = (
@@ -69,9 +70,9 @@ def _of_contradiction(files: Sequence[FileOutcome], verdict: Verdict) -> str | N
 
 
 def _of_worse_on_tests(tests: Sequence[FileOutcome], named: bool) -> str | None:
-    """A sentence on the other models that do better than the written one on the test part.
+    """A sentence on the models that are better than the written one on the test part; None where there is none.
 
-    named : whether the verdict names an effect, which the written model has where it is none of the others.
+    named : whether the verdict names an effect.
     """
     after_mv = _left_mv(tests, "after")
     less = _less_than(tests, after_mv)
@@ -121,17 +122,17 @@ def _tests(files: Sequence[FileOutcome]) -> list[FileOutcome]:
 
 
 def _same(tests: Sequence[FileOutcome], state: State) -> bool:
-    """Whether the written model is no other than that of `state`."""
+    """Whether the written model is the one of `state`."""
     return all(np.array_equal(f.voltages["after"], f.voltages[state]) for f in tests)
 
 
 def _less_than(files: Sequence[FileOutcome], after_mv: float) -> dict[str, float]:
-    """The other models that leave less than the written one, in words, with what they leave, mV."""
+    """Model in words -> RMS error, mV, for the models with a smaller error than the written one."""
     return {NAMES[state]: left_mv for state in OTHERS if (left_mv := _left_mv(files, state)) < after_mv}
 
 
 def _left_mv(files: Sequence[FileOutcome], state: State) -> float:
-    """RMS that a model leaves, mV, to the hundredth that is shown; 0 where there are no rows."""
+    """RMS error of a model, mV, rounded to the hundredth that is shown; 0 where there are no rows."""
     if not files:
         return 0.0
     return round(MV_PER_V * rms(np.concatenate([f.residual_v(state) for f in files])), 2)

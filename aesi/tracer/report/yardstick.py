@@ -1,8 +1,8 @@
-"""The yardstick: what a sparse correction could still explain of a residual, and what its terms point to.
+"""The yardstick: how much of a residual a sparse correction could still explain, and the causes that its terms suggest.
 
 A correction of the voltage error learnt from the model's states (`aesi.sparse`: Chebyshev and hyperbolic terms, an
-ensemble over resampled blocks, thresholded ridge) knows no physics. What it explains of pieces that it has not seen, in
-free run, is structure that a physical effect could explain as well; which of its terms are needed says where to look.
+ensemble over resampled blocks, thresholded ridge) contains no physics. The error that it explains on left-out pieces,
+in free run, is structure that a physical effect could explain as well. The terms that it needs suggest where to look.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ POINTS_TO: Mapping[str, tuple[str, ...]] = {
     "current of the last minutes: hysteresis, heat or slow diffusion": ("I_300s",),
     "the error's own past: hysteresis, or a slow state that the model lacks": (ERROR,),
 }
-"""What a need for terms in these variables says."""
+"""Possible cause -> the variables whose terms suggest it."""
 INPUTS = (*INPUT_NAMES, "I_300s")
 ORDER, DEGREE = 3, 2
 RESAMPLES = 20
-"""Few, and blocks of BLOCK_S in PIECES left-out pieces: the yardstick asks for the order of what is left, not for a
-model to keep."""
+"""Resamples of the ensemble, in blocks of BLOCK_S (s), with PIECES left-out pieces. Few suffice: only the order of
+magnitude of the structure is asked for, no model is kept."""
 BLOCK_S = 100.0
 PIECES = 10
 RIDGES = (1.0, 100.0)
@@ -38,12 +38,13 @@ RIDGES = (1.0, 100.0)
 THRESHOLD = 1e-3
 """Coefficients below this are dropped."""
 SHOWN = 4
-"""Terms that are named for each of POINTS_TO."""
+"""Most terms that are named for each of POINTS_TO."""
 
 
 @dataclass(frozen=True)
 class Pointer:
-    """One of POINTS_TO: the share of the residual's mean square that its terms explain unseen, and the chosen ones."""
+    """One of POINTS_TO.  share : of the residual's mean square that its terms explain on left-out pieces, 0 to 1.
+    terms : names of the chosen terms."""
 
     share: float
     terms: tuple[str, ...] = ()
@@ -51,17 +52,18 @@ class Pointer:
 
 @dataclass(frozen=True)
 class Yardstick:
-    """explained_v : V, root mean square that the correction explains of pieces that it has not seen; None where the
-    data are too few for one, or too little varies in them."""
+    """explained_v : RMS of the residual that the correction explains on left-out pieces, V; None where the data are too
+    few for a correction, or vary too little.  pointers : possible cause -> `Pointer`."""
 
     explained_v: float | None = None
     pointers: Mapping[str, Pointer] = field(default_factory=dict)
 
 
 def measure(runs: Sequence[Run], residuals: Sequence[Array]) -> Yardstick:
-    """What a sparse correction explains of the residuals of some records; of those whose sampling gives enough for one.
+    """The yardstick over some records, from those with enough rows at their sampling rate.
 
-    runs, residuals : one a record, (n,) V measured - model.  Records of different sampling are learnt apart.
+    runs, residuals : one per record; residuals (n,) V, measured - model. Records of different sampling rates have a
+    correction each.
     """
     groups: dict[int, list[ErrorSeries]] = {}
     for run, residual in zip(runs, residuals, strict=True):
@@ -80,7 +82,7 @@ def measure(runs: Sequence[Run], residuals: Sequence[Array]) -> Yardstick:
 
 
 def _even(run: Run, residual: Array) -> ErrorSeries:
-    """The record resampled evenly at its median spacing; a row has the inputs of the next sample, which it predicts."""
+    """The record resampled evenly at its median spacing. A row holds the inputs of the next row, which it predicts."""
     inputs = np.column_stack([run.current_a if name == "I" else run.series[name] for name in INPUT_NAMES])
     series = ErrorSeries(
         name="record",
@@ -159,18 +161,18 @@ def _candidate(problem: Problem, terms: BoolArray, ridge: float, feedback: bool)
 
 
 def _share(candidate: Candidate | None) -> float:
-    """Share of the mean square error that the candidate explains of pieces that it has not seen, in free run."""
+    """Share of the mean square error that the candidate explains on left-out pieces in free run, 0 to 1."""
     return 0.0 if candidate is None else max(0.0, 1.0 - candidate.loss_valid)
 
 
 def _of(library: Library, names: Sequence[str]) -> BoolArray:
-    """(m,) the constant, and the terms that hold no variables but these."""
+    """(m,) True for the constant and for the terms in no other variables than these."""
     wanted = {library.variables.index(name) for name in names if name in library.variables}
     return np.array([{variable for variable, _ in term.factors} <= wanted for term in library.terms])
 
 
 def _chosen(candidate: Candidate | None, names: Sequence[str]) -> tuple[str, ...]:
-    """The chosen terms that hold one of the variables, largest coefficient first."""
+    """Names of the `SHOWN` terms with the largest coefficients that hold one of the variables, largest first."""
     if candidate is None:
         return ()
     model = candidate.stability

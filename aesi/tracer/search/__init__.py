@@ -1,1 +1,1 @@
-"""Forward search: hypotheses fitted and grown, the steps that were taken, and what is kept of the fits."""
+"""Forward search over hypotheses: growth by one effect, fits, the steps taken, and the archive of fits."""

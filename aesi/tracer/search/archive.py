@@ -1,9 +1,9 @@
-"""Where fits ended, kept in a file, so that an interrupted search goes on where it was.
+"""Fitted coordinates kept in a file, so that an interrupted search resumes.
 
-The file is keyed on all that a fit depends on: cell, data, own parameters, what each effect *is* (its code, its
-parameters, its bounds) and the program itself, so that an edited effect, or another version, is fitted again. The code
-of an effect of the user's own may read what is in no file that can be seen here, a helper module or a table: such an
-effect is known by the voltages that it makes of the records, too.
+The file is keyed on all that a fit depends on: cell, data, own parameters, the definition of each effect (its code, its
+parameters, its bounds) and the program itself, so that an edited effect, or another version, is fitted again. A user's
+own effect may depend on a helper module or a table that cannot be found from here. Its key therefore also holds the
+errors that it leaves on the records.
 """
 
 from __future__ import annotations
@@ -30,14 +30,13 @@ from aesi.tracer.case.problem import InverseProblem, ValuesByOwner
 from aesi.tracer.likelihood.fit import FittedHypothesis
 
 PROGRAM = __name__.partition(".")[0]
-"""The package whose digest tells of its own effects."""
+"""The package whose digest covers the code of its own effects."""
 
 
 class Archive:
-    """Coordinates by name of a fit, appended one JSON line each; lines of another case are passed over.
+    """Coordinates by name of a fit, appended as one JSON line each; lines of another case are skipped.
 
-    fits : of this search, by the same name, with all that was simulated at the coordinates.
-
+    fits : fits of this run by the same name, with their simulations.
     other_model : the archive of the same case with the other model of the cell.
     """
 
@@ -65,7 +64,7 @@ class Archive:
         return None if self.other_model is None else self.other_model.get(name, size)
 
     def put(self, name: str, x: Array) -> None:
-        """Keep where a fit ended, unless it is there."""
+        """Store the coordinates of a fit, unless its name is stored already."""
         with self._lock:
             if name in self._kept:
                 return
@@ -78,15 +77,14 @@ class Archive:
 
 
 def fit_name(problem: InverseProblem, kind: str, hypothesis: Sequence[str]) -> str:
-    """Name of a fit in the archive: its kind, what is believed of the own parameters and records, its effects in
-    order."""
+    """Name of a fit in the archive: its kind, the trust and the open ages and energies, its effects in order."""
     ages = ", several ages" if problem.several_ages else ""
     energies = "" if problem.energies else ", energies as declared"
     return f"{kind} {problem.trust}{ages}{energies}: {'+'.join(hypothesis)}"
 
 
 def context_of(problem: InverseProblem) -> str:
-    """Changes whenever a stored fit would no longer be the same fit."""
+    """Digest of all that a fit of this problem depends on: a stored fit is valid as long as it stays the same."""
     text = [
         source_digest(),
         _told(problem.cell),
@@ -106,7 +104,7 @@ def context_of(problem: InverseProblem) -> str:
 
 
 def identity(effect: Effect) -> str:
-    """All that makes an effect what it is: id, parameters with bounds and spreads, and the code of the file that
+    """The definition of an effect as a text: id, parameters with bounds and spreads, and the code of the file that
     defines it, with the values that its functions are bound to."""
     return f"{effect.id} {_parameters(effect.parameters)} {[_told(place) for place in _places(effect)]}"
 
@@ -116,7 +114,8 @@ def _places(effect: Effect) -> tuple[Callable[..., object] | None, ...]:
 
 
 def _users_own(effect: Effect) -> bool:
-    """Whether an effect acts by a function that is not of this program, whose digest tells nothing of it."""
+    """Whether a function of an effect is defined outside this program, so that the program's digest does not cover
+    it."""
     return any(not _module(place).startswith(f"{PROGRAM}.") for place in _places(effect) if place is not None)
 
 
@@ -125,8 +124,8 @@ def _module(function: Callable[..., object]) -> str:
 
 
 def _answers(problem: InverseProblem, effect: Effect) -> list[str]:
-    """What an effect leaves of the records where fits of it begin, where it is typically seen and at the ends of its
-    bounds."""
+    """RMS residual on the records (`_answer`) with an effect at the starts of its fits, at its typical values and at
+    its bounds."""
     free = problem.parameters_of(effect.id)
     ends = np.array([(*one.bounds, one.coordinate(one.typical)) for one in free]).reshape(-1, 3)
     return [
@@ -136,7 +135,7 @@ def _answers(problem: InverseProblem, effect: Effect) -> list[str]:
 
 
 def _answer(problem: InverseProblem, values: ValuesByOwner) -> str:
-    """RMS, V, that is left of what fits see, to the digits that round-off does not reach."""
+    """RMS residual on the fitted rows, V, to the digits that round-off does not reach."""
     begins = {str(i): record.soc0 for i, record in enumerate(problem.records)}
     predicted = problem.predict({STATE_OF_CHARGE: begins, **values})
     return "cannot be simulated" if predicted is None else f"{rms(problem.measured - predicted):.8g}"
@@ -147,8 +146,8 @@ def _parameters(parameters: Mapping[str, object]) -> str:
 
 
 def _told(value: object) -> str:
-    """A value, the same in every process: a dataclass by all of its fields, whatever its repr leaves out, a function by
-    its code and what it is bound to."""
+    """A value as a text that is the same in every process: a dataclass by all of its fields, even those that its repr
+    leaves out; a function by its code and the values it is bound to."""
     if is_dataclass(value) and not isinstance(value, type):
         text = (
             f"{type(value).__name__} {[(one.name, _told(getattr(value, one.name))) for one in fields(value)]}"
@@ -167,7 +166,7 @@ def _told(value: object) -> str:
 
 
 def _code(function: Callable[..., object]) -> str:
-    """Text of the file that defines a function; of one that no file holds, what it was compiled to."""
+    """Text of the file that defines a function; without a file, its compiled code."""
     cells = [repr(cell.cell_contents) for cell in getattr(function, "__closure__", None) or ()]
     try:
         module = inspect.getmodule(function)

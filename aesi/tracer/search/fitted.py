@@ -1,4 +1,4 @@
-"""Hypotheses fitted with the whole model, or as the archive has them."""
+"""Hypotheses fitted with the whole model, or read from the archive."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from aesi.tracer.likelihood.model_error import PRIORS, SizePrior, replace_fast
 from aesi.tracer.search.archive import Archive, fit_name
 
 FIT_ROUNDS = 8
-"""Most times that a fit takes slopes anew; one that gains nothing more ends before. Measured on a blind case
-(asymmetric kinetics, seed 12): after three steps a parameter was on its bound, after six it was where the truth is."""
+"""Most evaluations of the sensitivities in a fit; it ends sooner where a step gains nothing. Measured on a blind case
+(asymmetric kinetics, seed 12): after three steps a parameter was on its bound, after six at its true value."""
 MOVED_SDS = 1.0
-"""Spreads from its declared value beyond which a parameter counts as moved: effects grown to first order about it
-may then be far off, and are grown about the declared value as well. Measured on a blind case (leakage and a contact,
-seed 0): growth of the contact said 1 nat more, its fit 52."""
+"""Distance of a parameter from its declared value, in spreads, beyond which it counts as moved. Growth to first order
+may then be far off, and effects are grown about the declared value as well. Measured on a blind case (leakage and a
+contact, seed 0): growth of the contact gained 1 nat, its fit 52."""
 
 
 def base_of(problem: InverseProblem, blocks: Blocks, archive: Archive) -> FittedHypothesis | None:
@@ -37,10 +37,11 @@ def fitted_hypothesis(
     near: Explanation | None,
     archive: Archive,
 ) -> FittedHypothesis | None:
-    """A hypothesis fitted with the whole model; as the archive has it where it was fitted before.  None where the model
-    fails.
+    """A hypothesis fitted with the whole model, or read from the archive where it was fitted before; None where the
+    model fails.
 
-    near : where a like one ended, at whose size of the model error it is fitted; None: from the middle of every prior.
+    near : a similar hypothesis, whose values and size of the model error the fit starts from; None starts from the
+    middle of every prior.
     """
     name = fit_name(problem, "fit", hypothesis)
     if name in archive.fits:
@@ -64,8 +65,8 @@ def fitted_hypothesis(
 def from_within(
     problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis, archive: Archive
 ) -> FittedHypothesis:
-    """The fit, or a better one that was begun away from the bounds on which it ended: two parameters of an effect
-    can hold each other where neither alone would end."""
+    """The fit, or a better one that starts away from the bounds on which it ended: two parameters of an effect can hold
+    each other on their bounds."""
     fitter = HypothesisFitter(problem, blocks, fit.hypothesis)
     name = fit_name(problem, "fit from within", fit.hypothesis)
     x = archive.get(name, len(fitter.free))
@@ -78,9 +79,10 @@ def from_within(
 
 
 def _from_the_middle(fitter: HypothesisFitter, prior: SizePrior) -> Array:
-    """Coordinates after a descent from the middle of every prior at the median size of the model error, and after one
-    more where so much is left within seconds that what the file may be off by would go beyond its bounds to make up for
-    it. A lag of 2 s in a Panasonic's drive ended at 0.5 s with 3 mV and at 2.1 s with the 24 mV that were left."""
+    """Coordinates after a descent from the middle of every prior at the median size of the model error. A second
+    descent, with a larger `fast_v`, follows where so much error is left within seconds that the file's errors would
+    have to exceed their bounds. A lag of 2 s in a Panasonic's drive ended at 0.5 s with 3 mV and at 2.1 s with the
+    24 mV that were left."""
     x = fitter.descend(np.zeros(len(fitter.free)), prior.nearest(prior.median), FIT_ROUNDS)
     there = fitter.finished(x) if prior.fast is not None else None
     if there is None or there.score.size.fast_v <= prior.median.fast_v:
@@ -91,15 +93,15 @@ def _from_the_middle(fitter: HypothesisFitter, prior: SizePrior) -> Array:
 def values_without(
     problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis, fold: Sequence[int]
 ) -> dict[str, dict[str, float]]:
-    """owner -> name -> value where the data without some blocks put a hypothesis: with the whole model, by steps from
-    where all data put it and updates of the slopes that it has there."""
+    """owner -> name -> value of a hypothesis fitted to the data without the blocks of `fold`: with the whole model, by
+    steps from the fit to all data, with updates of the sensitivities that it had there."""
     fitter = HypothesisFitter(problem, blocks, fit.hypothesis)
     x = fitter.descend(fit.point.x, fit.score.size, 0, fit.point.jacobian_v, fold)
     return values_of(fit.free, x, fit.hypothesis)
 
 
 def _slopes_v(near: Explanation, free: Sequence[FreeParameter]) -> Array | None:
-    """(n, k) V of these parameters as they were at another hypothesis, None where it lacks one of them."""
+    """(n, k) V, sensitivities of these parameters at another hypothesis; None where it lacks one of them."""
     place = {one: j for j, one in enumerate(near.free)}
     if not all(one in place for one in free):
         return None
@@ -107,8 +109,9 @@ def _slopes_v(near: Explanation, free: Sequence[FreeParameter]) -> Array | None:
 
 
 def as_declared(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis) -> FittedHypothesis | None:
-    """The hypothesis about the declared values of its own parameters, as a place to grow from: one that lacks an
-    effect moves them to make up for it. None where none of them moved far, or where it cannot be simulated there."""
+    """The hypothesis linearised at the declared values of its own parameters, to grow effects from: a fit without the
+    right effect moves own parameters to make up for it. None where no parameter moved far, or where it cannot be
+    simulated there."""
     own = np.array([f.own and f.record is None for f in fit.free])
     if not np.any(own & (np.abs(fit.point.x) > MOVED_SDS)):
         return None

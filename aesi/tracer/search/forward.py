@@ -1,7 +1,7 @@
-"""Forward search: the effect that says most of unseen data is added while that is admitted.
+"""Forward search: step by step, the effect with the largest gain on unseen data is added, as long as it is admitted.
 
-A step grows every effect on the hypotheses kept so far, the rest to first order, and fits the best of them with the
-whole model. What is kept of it is frozen evidence, from which a verdict follows without another simulation.
+A step grows every effect on the hypotheses kept so far, their parameters to first order, and fits the best results with
+the whole model. Its record is frozen, and the verdict needs no further simulation.
 """
 
 from __future__ import annotations
@@ -25,18 +25,19 @@ from aesi.tracer.search.plausible import most_plausible, plausibility
 from aesi.tracer.search.reach import REACH, within_reach
 
 FINALISTS = 6
-"""Most effects that are fitted with the whole model in a step, the best ones. Growth is to first order in all that
-was there before, so that a right effect can gain too little in it. On a blind development case (leakage and a
+"""Most effects that are fitted with the whole model in a step, the best ones. Growth is to first order in the parent's
+parameters, so that a right effect can gain too little in it. On a blind development case (leakage and a
 resistance on the LG M50) the right second effect stood fifth to first order, with 10 nats, and first with 61 when
 fitted: three fits left 1.36 mV with a wrong name, six 1.006 of a noise of 1.01, in 30 instead of 22 s of processor."""
 FINALIST_SHARE = 0.5
 """Least share of the best gain to first order that an effect needs in order to be fitted. On six blind cases of
 seeds 0 and 12 those below ended at 2 to 27 % of the best one's full fit."""
 HOPELESS_SHARE = 0.7
-"""Share of the mean square beyond noise on unseen data without any effect: where two effects leave more than this,
-no third is tried and none is exchanged. A convention that saves time: on a measured cell, which no two effects
-explain, each further round takes minutes. One effect may leave all of it: on a blind case (a contact, hysteresis and
-heat, seed 13) the first of three said 256 nats and did not lower the error, and the three were found."""
+"""Share of the mean square error beyond noise, on unseen data, of the model without effects. Where two effects leave
+more than this, no third is tried and none is exchanged. A convention that saves time: on a measured cell, which no two
+effects explain, each further round takes minutes. One effect may leave all of it: on a blind case (a contact,
+hysteresis and heat, seed 13) the first of three gained 256 nats and did not lower the error, and the three were
+found."""
 
 
 def searched(
@@ -47,10 +48,10 @@ def searched(
     allowed_v: float = np.inf,
     shallower: Path | None = None,
 ) -> Path:
-    """Grow from the bare model until nothing more is admitted, at most `max_effects` effects.
+    """The search from the bare model until no effect is admitted, with at most `max_effects` effects.
 
-    allowed_v : V beyond noise that a right one may leave; where all effects together leave far more, none is fitted.
-    shallower : the same search with fewer effects, whose first step is taken over.
+    allowed_v : error beyond noise that a right hypothesis may leave, V. No effect is fitted where all effects together
+    leave far more.  shallower : the same search with fewer effects, whose first step is reused.
     Raises DataError where the bare model cannot be simulated on the records.
     """
     blocks = blocks_of(problem)
@@ -65,7 +66,7 @@ def searched(
     first = (
         growths_on([Parent(problem, blocks, base)], {}, archive) if max_effects and taken_over is None else []
     )
-    # Fewer effects than that are fitted in the time that looking would spare.
+    # With fewer effects, fitting them takes no longer than the check would save.
     if len(first) > FINALISTS and np.isfinite(allowed_v):
         reach_v = REACH * allowed_v + problem.reduced_v
         least_v, first = within_reach(problem, base, first, reach_v, archive)
@@ -83,10 +84,10 @@ def searched(
 
 
 class _ForwardSearch:
-    """A search on its way.
+    """A search in progress.
 
-    base : the hypothesis without effects.  slopes : effect -> (n, k) V, as it grew on the base.
-    steps, notes : those made so far.
+    base : the hypothesis without effects.  slopes : effect -> (n, k) V, sensitivities of its growth on the base.
+    steps, notes : so far.
     """
 
     def __init__(
@@ -107,9 +108,10 @@ class _ForwardSearch:
     def add(
         self, max_effects: int, first: Sequence[EffectGrowth], taken_over: Step | None
     ) -> FittedHypothesis:
-        """The hypothesis after a step for each effect, until none is admitted or more will not do.
+        """The hypothesis after steps of one effect each, until none is admitted or the case is `hopeless`.
 
-        first : what the first step grows; all effects where it is empty.  taken_over : the first step, if it is known.
+        first : growths of the first step; all effects where it is empty.  taken_over : the first step, where another
+        search made it already.
         """
         parents, chosen = [self.base], self.base
         for number in range(max_effects):
@@ -130,8 +132,8 @@ class _ForwardSearch:
         return chosen
 
     def exchange(self, chosen: FittedHypothesis) -> FittedHypothesis:
-        """The hypothesis with one of its effects exchanged for another, while that says more: what was added first
-        stood in for all that was missing then. The steps that this takes are added to `steps`."""
+        """The hypothesis with one effect at a time exchanged for another, while that gains: the effect added first may
+        only stand in for several missing ones. The steps that this takes are added to `steps`."""
         grown_from = {frozenset(parent.hypothesis) for step in self.steps for parent in step.parents}
         while True:
             rests = [
@@ -153,16 +155,17 @@ class _ForwardSearch:
             chosen = best
 
     def hopeless(self, chosen: FittedHypothesis) -> bool:
-        """Whether the hypothesis leaves so much that one more effect will not do."""
+        """Whether the hypothesis leaves so large an error that one more effect cannot explain it."""
         left, without = (excess_mean_square_v2(self.problem, self.blocks, fit) for fit in (chosen, self.base))
         return left > HOPELESS_SHARE * without
 
     def _step(
         self, parents: Sequence[FittedHypothesis], begun: Sequence[EffectGrowth] = ()
     ) -> tuple[Step, list[str]]:
-        """One step, and why some effects were not tried at it.
+        """(one step, sentences on effects that could not be tried).
 
-        parents : the hypothesis that was chosen so far, then others to grow from.  begun : what grows on these.
+        parents : the hypothesis chosen so far, then others to grow from.  begun : growths on these; empty takes all
+        that are worth it.
         """
         best = parents[0]
         places = [Parent(self.problem, self.blocks, fit) for fit in parents]
@@ -183,7 +186,7 @@ class _ForwardSearch:
         return Step(tuple(parents), tuple(ranked), tuple(fitted), admitted, least_nats), refused
 
     def _finalists_fitted(self, ranked: Sequence[Grown], best: FittedHypothesis) -> list[FittedHypothesis]:
-        """The most promising of what was grown, fitted with the whole model; the best first."""
+        """The best growths, fitted with the whole model; best first."""
         fitted = []
         for one in _finalists(ranked, best):
             fit = self._fitted(one.hypothesis, one)
@@ -209,10 +212,10 @@ def without_needless(
     report: Report = lambda problem, one, gain: None,
     may_be: Callable[[FittedHypothesis], bool] = lambda fit: True,
 ) -> FittedHypothesis:
-    """The hypothesis without effects that it does not need once the others are in, one at a time.
+    """The hypothesis, with effects dropped one at a time that it does not need beside the others.
 
-    least_nats : that an effect has to say.  base : the one without effects; None where one has to stay.
-    may_be : whether a smaller hypothesis is admissible by itself.
+    least_nats : gain on unseen data below which an effect is dropped.  base : the hypothesis without effects; None
+    where one effect has to stay.  may_be : whether a smaller hypothesis is admissible by itself.
     """
     while chosen.hypothesis:
         best: FittedHypothesis | None = None
@@ -235,7 +238,8 @@ def without_needless(
 
 
 def refitted(problem: InverseProblem, path: Path, archive: Archive) -> Path | None:
-    """The chosen hypothesis of a path at another trust in the declared parameters, with nothing else tried."""
+    """The chosen hypothesis of a path, refitted at the trust of `problem`, with nothing else tried; None where it
+    cannot be simulated."""
     blocks = blocks_of(problem)
     base = base_of(problem, blocks, archive)
     if base is None:
@@ -245,7 +249,7 @@ def refitted(problem: InverseProblem, path: Path, archive: Archive) -> Path | No
 
 
 def _grown(growths: Sequence[EffectGrowth], archive: Archive) -> tuple[list[Grown], list[str]]:
-    """Where the growths end, and why some of them could not be simulated."""
+    """(growths at their ends, sentences on those that could not be simulated)."""
     grown, refused = [], []
     for growth, one in zip(growths, ended(growths, archive), strict=True):
         if one is None:
@@ -257,7 +261,7 @@ def _grown(growths: Sequence[EffectGrowth], archive: Archive) -> tuple[list[Grow
 
 
 def _ranked(grown: Sequence[Grown]) -> list[Grown]:
-    """Each hypothesis once, where it gains most; the best first."""
+    """The growths, best first; of several with the same effects only the best."""
     best: dict[frozenset[str], Grown] = {}
     for one in sorted(grown, key=lambda g: -g.score.total):
         best.setdefault(frozenset(one.hypothesis), one)
@@ -278,9 +282,9 @@ def admissible(
     fit: FittedHypothesis,
     least_nats: float,
 ) -> bool:
-    """Whether an effect is admitted: it gains enough on unseen data, makes the hypothesis more plausible, moves the
-    voltage by more than approximations of the model do, and ends on no bound. By how much it lowers the error is not
-    asked: the first of several effects may not lower it at all."""
+    """Whether an effect is admitted: it gains at least `least_nats` on unseen data, makes the hypothesis more
+    plausible, moves the voltage by more than approximations of the model do, and ends on no bound. It need not lower
+    the error: the first of several effects may not lower it at all."""
     competing = len(problem.competing())
     moved_v = held_out_residual(blocks, without) - held_out_residual(blocks, fit)
     return (

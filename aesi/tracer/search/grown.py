@@ -1,4 +1,4 @@
-"""Effects grown on the hypotheses kept so far: which are worth it, side by side in threads."""
+"""Growth of effects on the hypotheses kept so far: the choice of effects, and their descents in parallel threads."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from aesi.tracer.likelihood.model_error import PRIORS, Size, replace_fast
 from aesi.tracer.search.archive import Archive, fit_name
 
 PROMISING = 12
-"""Hypotheses that are grown in a step from those that were fitted in the one before: those that say most to first
-order. A convention that saves time: of these, `FINALISTS` are fitted. On a blind development case (lost lithium beside
-a growing film) the right second effect, which says most of all when fitted, is among 12 and not among 9; on it and on
-another one 18 end as 12 do."""
+"""Most hypotheses that are grown in a later step: those with the largest gains to first order. A convention that saves
+time: of these, `FINALISTS` are fitted. On a blind development case (lost lithium beside a growing film) the right
+second effect, which gains most when fitted, is among 12 and not among 9; with 18, this case and another one end as with
+12."""
 
 
 def growths_on(
     parents: Sequence[Parent], slopes: Mapping[str, Array], archive: Archive
 ) -> list[EffectGrowth]:
-    """The growths that are worth a descent: every effect on the bare model, later the hypotheses that promise most to
-    first order, whichever parent they come from.
+    """The growths that are worth a descent: every effect on the bare model; in later steps the `PROMISING` hypotheses
+    with the largest expected scores, from any parent.
 
-    slopes : of each effect on a parent before, (n, k) V; none for the bare model.
+    slopes : effect -> (n, k) V, its sensitivities on an earlier parent; empty for the bare model.
     """
     best = parents[0]
     growths = {name: _growth(best, name, archive) for name in addable(best)}
@@ -50,8 +50,8 @@ def growths_on(
 
 
 def _put_promises(pairs: Sequence[tuple[Parent, str]], slopes: Mapping[str, Array], archive: Archive) -> None:
-    """Put into the archive the nats that each effect promises to say more than its parent: as many as with the other
-    model of the cell, or else to first order by its slopes; -inf without these."""
+    """Put into the archive the expected gain of each effect over its parent, nats: that with the other model of the
+    cell, else that to first order by its sensitivities; -inf without these."""
     for parent, name in pairs:
         gain = archive.near(_promise_key(parent, name), 1)
         if gain is None:
@@ -63,9 +63,11 @@ def _put_promises(pairs: Sequence[tuple[Parent, str]], slopes: Mapping[str, Arra
 def promising_first(
     growths: Sequence[EffectGrowth], archive: Archive
 ) -> tuple[list[EffectGrowth], dict[str, Array]]:
-    """Of the growths on the bare model, those that gain most with the other model of the cell, or promise most to
-    first order with this one, and the slopes (n, k) V of the others. Where the other model did not grow the same,
-    all of them, and no slopes."""
+    """(growths to carry out, effect -> sensitivities (n, k) V of the others), from the growths on the bare model.
+
+    The first are the `PROMISING` growths with the largest gain with the other model of the cell, or expected gain with
+    this one. They are all growths, with no sensitivities, where the other model did not grow every effect.
+    """
     near = [archive.near(_key(growth.parent, growth.effect, "said"), 1) for growth in growths]
     if any(gain is None for gain in near):
         return list(growths), {}
@@ -90,15 +92,15 @@ def promising_first(
 
 
 def _first_slopes(growths: Mapping[str, EffectGrowth]) -> dict[str, Array]:
-    """Slopes of each effect where its descent begins: these show far better what it will gain beside what was found
-    than its slopes where it ended, as a stand-in for all that was missing. Only for the model that is searched
-    first; the other one goes by what was promised there."""
+    """Effect -> sensitivities (n, k) V at the start of its descent. They predict its gain beside the effects found so
+    far much better than those at its end on the bare model, where it stood in for all that was missing. Only for the
+    model that is searched first; the other one uses the gains from there."""
     found = side_by_side(EffectGrowth.first_slopes, growths.values())
     return {name: slopes for name, slopes in zip(growths, found, strict=True) if slopes is not None}
 
 
 def most_promising(promised: Sequence[tuple[Parent, str, float]]) -> list[tuple[Parent, str]]:
-    """Parents and effects whose hypotheses promise most (nats), each hypothesis once."""
+    """The `PROMISING` pairs of parent and effect with the largest expected score (nats), each hypothesis once."""
     best: dict[frozenset[str], tuple[Parent, str]] = {}
     for parent, name, _ in sorted(promised, key=lambda one: -one[2]):
         best.setdefault(frozenset((*parent.fit.hypothesis, name)), (parent, name))
@@ -115,16 +117,16 @@ def addable(parent: Parent) -> list[str]:
 
 
 def grown_with(parent: Parent, names: Sequence[str], archive: Archive) -> list[Grown]:
-    """The ends of the growth of these effects on a hypothesis, whether or not they compete in a search, without
-    those that fail."""
+    """The growths of these effects on a hypothesis, also of effects that do not compete; those that fail are left
+    out."""
     growths = [_growth(parent, name, archive) for name in names]
     return [one for one in ended(growths, archive) if one is not None]
 
 
 def _has_something_to_say(problem: InverseProblem, name: str) -> bool:
-    """Whether an effect may compete: not one that infers a quantity that every record holds, nor one that restates
-    what a file that was fitted to this very cell has right, nor, beside good records, one that all records of a cell
-    share."""
+    """Whether an effect may compete. It may not where it infers a quantity that every record holds, where it restates
+    parameters of a file that was fitted to this very cell, or where, beside good records, all records of a cell share
+    it."""
     effect = problem.effects[name]
     if effect.infers is not None and all(r.data.temperature_degc is not None for r in problem.records):
         return False
@@ -163,13 +165,12 @@ def _key(parent: Parent, name: str, what: str = "grown") -> str:
 
 
 def _growth_size(parent: Parent) -> Size:
-    """Size of the model error at which the parameters of an effect are fitted: what a right hypothesis leaves. With all
-    own parameters open that is less than files leave, and unknown: half of what the parent leaves, since at the size
-    that the parent needs no effect has to move. Of what is gone within seconds it is all that the parent leaves: a lag
-    of 2 s grew to 0.8 s with 3 mV and to 2.2 s with 24.
+    """Size of the model error at which the parameters of an effect are fitted: that of a right hypothesis. With all own
+    parameters open this size is unknown. It is then half of the parent's, since at the parent's own size no effect has
+    to move. The part within seconds keeps the parent's size: a lag of 2 s grew to 0.8 s with 3 mV and to 2.2 s with 24.
 
     On the NMC cell (C/20, C/2, 1C and 4,000 s of its drive fitted) particles of several sizes ended as particles of
-    one with 9 mV, and say 10 nats with 4.5.
+    one with 9 mV, and gain 10 nats with 4.5.
     """
     prior = PRIORS[parent.problem.trust]
     open_wide = parent.problem.trust == "loose"

@@ -1,4 +1,4 @@
-"""What a search leaves: its steps, all that was tried at each, and the hypothesis that was chosen."""
+"""The record of a search: its steps, the hypotheses tried at each, and the hypothesis that was chosen."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from aesi.tracer.likelihood.growth import Explanation, Grown
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One step.
+    """One step of a search.
 
-    parents : fitted hypotheses that were grown from, the chosen one first.  grown : what they grew, best first.
-    fitted : those of it that were fitted with the whole model, best first.  admitted : one of these, or None.
-    admission_nats : what it had to say more of unseen data.
+    parents : hypotheses that effects were grown on, the one chosen so far first.  grown : the growths, best first.
+    fitted : hypotheses among them that were fitted with the whole model, best first.  admitted : one of these, or None.
+    admission_nats : gain on unseen data that was needed for admission.
     """
 
     parents: tuple[FittedHypothesis, ...]
@@ -29,15 +29,17 @@ class Step:
 
     @property
     def best_gain(self) -> float:
-        """Nats that the best of what was grown (at least one effect) says more than its parent, admitted or not."""
+        """Largest gain of a growth (there is at least one) over the best parent, nats, admitted or not."""
         return max(g.score.total for g in self.grown) - max(p.score.total for p in self.parents)
 
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """A search that is over: the base without effects, the steps, and the hypothesis that was chosen.
+    """A finished search.
 
-    beyond_reach_v : V beyond noise that all effects together leave, where that is so much that none was fitted.
+    base : the hypothesis without effects.  chosen : the hypothesis that was chosen.
+    beyond_reach_v : error beyond noise that all effects together leave, V, where that was too large to fit any; else
+    None.
     """
 
     problem: InverseProblem
@@ -49,23 +51,23 @@ class Path:
     beyond_reach_v: float | None = None
 
     def explanations(self) -> list[Explanation]:
-        """All that was tried, each at its best: fits with the whole model before first-order ones."""
+        """Every hypothesis that was tried, once: its best fit with the whole model, else its best growth."""
         linear = _best([one for step in self.steps for one in step.grown])
         fits = [one for step in self.steps for one in (*step.parents, *step.fitted) if not one.as_declared]
         return list({**linear, **_best([*fits, self.base])}.values())
 
     @property
     def admission_nats(self) -> float:
-        """Nats that an effect had to gain at the strictest step."""
+        """Gain that an effect needed for admission, nats, the largest over the steps."""
         return max((step.admission_nats for step in self.steps), default=0.0)
 
     def gain(self, one: Explanation) -> float:
-        """Nats that a hypothesis says more than the base."""
+        """Gain of a hypothesis over the base on unseen data, nats."""
         return one.score.total - self.base.score.total
 
 
 def _best(tried: Sequence[Explanation]) -> dict[frozenset[str], Explanation]:
-    """The hypothesis of each set of effects, in whatever order, that gains most on unseen data."""
+    """Set of effects, in whatever order -> the hypothesis with these that gains most on unseen data."""
     best: dict[frozenset[str], Explanation] = {}
     for one in tried:
         known = best.setdefault(frozenset(one.hypothesis), one)
@@ -75,14 +77,14 @@ def _best(tried: Sequence[Explanation]) -> dict[frozenset[str], Explanation]:
 
 
 Report = Callable[[InverseProblem, Explanation, float], None]
-"""Called with the problem, each hypothesis and the nats that it gains over its parent."""
+"""Called for each hypothesis tried, with the problem, the hypothesis, and its gain over its parent in nats."""
 
 
 def unseen_rmse_v(blocks: Blocks, one: Explanation) -> float:
-    """Root mean square of the residual on blocks that were left out, V."""
+    """RMS residual on left-out blocks, V."""
     return rms(held_out_residual(blocks, one)[blocks.compared])
 
 
 def excess_mean_square_v2(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis) -> float:
-    """V**2, mean square of the residual on blocks that were left out less the noise's, at least nought."""
+    """Mean square of the residual on left-out blocks minus that of the noise, V**2, at least 0."""
     return max(unseen_rmse_v(blocks, fit) ** 2 - problem.noise_v**2, 0.0)

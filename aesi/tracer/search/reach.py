@@ -15,14 +15,14 @@ from aesi.tracer.search.archive import Archive, fit_name
 from aesi.tracer.search.grown import ended
 
 REACH = 2.0
-"""Factor on what a right hypothesis may leave. Where the marks of all effects together (the changes of voltage that
-each can make) leave more, in whatever sizes, no few of them leave little enough, as far as they are linear. With
-marks where the effects end, they left at most 0.47 times that on ten blind cases of seed 13, and 3.5 (M50T), 5.4
-(NMC) and 11 times (HG2) on measured records. With marks where their fits begin, which cost a fifth, 0.29 instead of
-0.44 times on the hardest of five blind cases, and 2.5 instead of 2.9 and 2.6 times on one drive of the HG2 and of
-the Panasonic. The marks of few effects prove nothing: four effects tried on a check-up of a cell that lost a tenth
-of its lithium, two of which explain it, left 4.4 times that (0.5 with marks where they end, with which five measured
-cases took 1.4 times as long)."""
+"""Factor on the error that a right hypothesis may leave. The marks of an effect are the changes of voltage that it can
+make. Where a least-squares fit of the marks of all effects leaves more, no few effects can explain the data either, as
+far as they act linearly. With marks where the effects end, they left at most 0.47 times that on ten blind cases of seed
+13, and 3.5 (M50T), 5.4 (NMC) and 11 times (HG2) on measured records. With marks where their fits begin, which cost a
+fifth, 0.29 instead of 0.44 times on the hardest of five blind cases, and 2.5 instead of 2.9 and 2.6 times on one drive
+of the HG2 and of the Panasonic. The marks of few effects prove nothing: four effects tried on a check-up of a cell that
+lost a tenth of its lithium, two of which explain it, left 4.4 times that (0.5 with marks where they end, with which
+five measured cases took 1.4 times as long)."""
 
 
 def within_reach(
@@ -32,14 +32,14 @@ def within_reach(
     reach_v: float,
     archive: Archive,
 ) -> tuple[float, list[EffectGrowth]]:
-    """What all effects together leave beyond noise, V, and how they are to be grown.
+    """(error beyond noise that all effects together leave, V; the growths to use from here on).
 
-    reach_v : where they leave more by the marks with which they begin, those that would take a declared parameter
-    further than cell files are off descend, from their own starts, and have marks where they end, too: what moves the
-    voltage far is not linear. A lag of 2.6 s in rows of 10 Hz (blind set, seed 31, case 78) leaves 3.4 times what a
-    right hypothesis may by the first, and 0.4 times by both. Five measured development records, on which nothing is in
-    reach, take 3 % more processor time with them, and 42 % with the six effects that by themselves leave least.
-    archive : holds the answer, so that a search with more names does not ask by where the one before had ended.
+    reach_v : error, V, above which the check is repeated with more marks, since large changes of voltage are not
+    linear: the effects on whose declared parameter the base ended at a limit descend from their own starts, and have
+    marks at their ends, too. A lag of 2.6 s in rows of 10 Hz (blind set, seed 31, case 78) leaves 3.4 times what a
+    right hypothesis may by the first check, and 0.4 times by both. Five measured development records, on which nothing
+    is in reach, take 3 % more processor time with it, and 42 % with the six effects that by themselves leave least.
+    archive : keeps the first result, so that a later search with more effects gets the same one.
     """
     key = fit_name(problem, "least left", ())
     known = archive.get(key, 1)
@@ -59,10 +59,10 @@ def within_reach(
 
 
 def least_left_v(base: FittedHypothesis, marks_v: Sequence[Array], white_v: Array) -> float:
-    """Root mean square beyond noise that the own parameters and all effects together leave of what was fitted, each in
-    whatever size serves best, V.
+    """RMS error beyond noise on the fitted rows, V, after a linear least-squares fit of the sensitivities of the own
+    parameters and the marks of all effects.
 
-    marks_v : of each effect, (n, c) V.  white_v : (n,) V, standard deviation of the noise in each row.
+    marks_v : (n, c) V of each effect.  white_v : (n,) V, standard deviation of the noise in each row.
     """
     error = base.point.residual_v
     table = np.hstack([base.point.jacobian_v, *marks_v]) / white_v[:, None]

@@ -1,4 +1,4 @@
-"""Declared parameters that the data put beyond what cell files are off by, named as effects."""
+"""Declared parameters whose fitted values are further off than cell files usually are; they are named as effects."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from aesi.tracer.search.path import Path, Step
 from aesi.tracer.search.plausible import ALIKE_NATS, most_plausible
 
 NINETY = 1.645
-"""Standard deviations either side of a 90 % interval."""
+"""Half width of a 90 % interval, in standard deviations."""
 
 
 def with_wrong_parameters(path: Path, most: int, archive: Archive) -> Path:
-    """The path with those declared parameters as effects that the data put beyond what cell files are off by, or with
-    the effects that such parameters made up for.
+    """The path, with further effects in its choice where declared parameters are further off than cell files are.
 
-    No cell is so far off, so that something has to be named, whether it says enough to be admitted or not; of what
-    takes a parameter back, the most plausible, one at a time, `most` names in all. An effect that is not needed beside
-    them is none: a contact and a wrong electrolyte say no more than the electrolyte.
+    No cell is so far off, so that an effect has to be named even if its gain is too small for admission: either the
+    parameter itself as an effect, or another effect with which fewer parameters are off. The most plausible one is
+    added, one at a time, up to `most` effects. Effects that are not needed beside them are dropped: a contact and a
+    wrong electrolyte say no more than the electrolyte.
     """
     chosen, competing = path.chosen, len(path.problem.competing())
     while len(chosen.hypothesis) < most and (beyond := beyond_spread(path.problem, chosen)):
@@ -77,7 +77,7 @@ def beyond_spread(problem: InverseProblem, fit: FittedHypothesis) -> list[str]:
 
 
 def wrong_sds(parameters: int) -> float:
-    """Deviations that one of so many normal deviates exceeds as rarely as an effect is admitted where nothing is
-    missing (Sidak, J. Am. Stat. Assoc. 62 (1967) 626)."""
+    """Number of standard deviations that any of so many normal deviates exceeds with probability `FAMILY_WISE` (Sidak,
+    J. Am. Stat. Assoc. 62 (1967) 626)."""
     each = 1.0 - (1.0 - FAMILY_WISE) ** (1.0 / max(parameters, 1))
     return float(norm.isf(0.5 * each))

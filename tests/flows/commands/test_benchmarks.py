@@ -1,20 +1,27 @@
 """The benchmarks of the platform, small: they measure what they say, and leave nothing behind."""
 
 import json
+import os
+import signal
 import time
 from pathlib import Path
 
 import pytest
 
-from aesi.errors import ConfigError, InputError
+from aesi.bench import blind as bench_blind
+from aesi.bench import left_out, real
+from aesi.bench.hybrid import split_figures
+from aesi.bench.limit import LOST
+from aesi.errors import ConfigError, DataAway, InputError
 from flows import benchmarks
 from flows.benchmarks import splits
-from flows.benchmarks.cases import Cases
+from flows.benchmarks.cases import Cases, judged_once
 from flows.benchmarks.cases import tracked as of_cases
 from flows.benchmarks.history import (
     WATCHED,
     Entry,
     latest,
+    not_compared,
     read_history,
     regressions,
     worth_keeping,
@@ -44,6 +51,7 @@ def test_tracking_costs_something_and_leaves_the_workspace_alone(workspace):
 @pytest.mark.parametrize(
     ("name", "options", "said"),
     [
+        ("ensemble", {"peer_models": 0}, "peer_models=0: it has to be greater than 0"),
         ("real", {"every": 0}, "every=0: it has to be greater than 0"),
         ("blind", {"workers": "many"}, "workers=many: it has to be a valid integer"),
         ("splits", {"cells": "nmc"}, r"cells=nmc: it has to be a list, in \[ \]"),
@@ -92,7 +100,9 @@ def test_a_benchmark_that_was_killed_was_tracked_as_running_for_ever(tracked):
     store = Store()
     killed = store.create_run(store.experiment("small"), "small, seed 0", {KIND: "run"})
     RunRecord(killed, "small", "0", store.uri, time.time()).write()
-    cases = Cases("small", 0, ["a", "b"], lambda spec: {"case": spec, "ours_s": 0.0}, lambda rows: {}, ())
+    cases = Cases(
+        "small", 0, ["a", "b"], lambda spec: {"case": spec, "ours_s": 0.0}, lambda rows: {}, dict, ()
+    )
     lines = of_cases(cases)
     next(lines)
     (now,) = [record for record in records("small") if record.status == "running"]
@@ -113,7 +123,9 @@ def test_counts_in_the_rows_of_cases_were_not_tracked(tracked):
     def judge(spec):
         return {"case": spec, "ours_s": 0.5, "verdict": "found", "simulations": 120, "silent": True}
 
-    cases = Cases("small", 0, ["a"], judge, lambda rows: {"summary": True, "no_worse": 17}, ("verdict",))
+    cases = Cases(
+        "small", 0, ["a"], judge, lambda rows: {"summary": True, "no_worse": 17}, dict, ("verdict",)
+    )
     list(of_cases(cases))
     store = Store()
     runs = store.runs(store.find_experiment("small"), "")
@@ -122,6 +134,44 @@ def test_counts_in_the_rows_of_cases_were_not_tracked(tracked):
         "run": {"no_worse": 17.0},
         "case": {"ours_s": 0.5, "simulations": 120.0, "silent": 1.0},
     }
+
+
+def judged_or_ended(spec):
+    if spec == "ended":
+        os.kill(os.getpid(), signal.SIGKILL)
+    return {"case": spec, "ours_s": 0.0}
+
+
+def test_a_case_whose_process_the_system_ended_took_all_with_it(tracked):
+    names = ["a", "ended", "b", "c"]
+
+    def summed(rows):
+        return {"summary": True, "cases": len(rows)}
+
+    def lost(spec):
+        return {"case": spec, "ours_s": 0.0} | LOST.row
+
+    cases = Cases("small", 0, names, judged_or_ended, summed, lost, ())
+    *rows, last = of_cases(cases, workers=2)
+    assert {row["case"]: row.get("verdict") for row in rows} == dict.fromkeys(names) | {"ended": "error"}
+    assert last["cases"] == 4
+
+
+def test_a_case_that_was_lost_with_its_process_is_a_miss(monkeypatch):
+    (blind_case,), (left_out_case,) = bench_blind.chosen(cases=1, only="pair"), left_out.plan("nmc/C20")
+    row = bench_blind.lost(blind_case)
+    last = bench_blind.summary([row])
+    assert (last["no_answer"], last["exact_pct"], last["effect_exact_cases"]) == (1, 0.0, 1)
+    assert any("| error | no | no |" in line for line in bench_blind.table([row]))
+    fault = next(case for case in real.plan() if case.group == "fault")
+    measured = real.summary([real.lost(fault)])
+    assert (measured["no_answer"], measured["fault_named_pct"]) == (1, 0.0)
+    assert any("| error | no |" in line for line in real.table([real.lost(fault)]))
+    one = left_out.lost(left_out_case)
+    assert left_out.summary([one])["failed"] == 1
+    assert "memory" in left_out.table([one])[-1]
+    (run,) = asked_splits(monkeypatch, cells=["hg2"], a_cell=1)
+    assert split_figures.summary([splits._lost(run)])["failed"] == 1
 
 
 @pytest.mark.slow
@@ -285,6 +335,23 @@ def test_a_benchmark_that_nobody_watches_is_recorded_again():
     assert regressions([Entry("2026-01-01", "abcdef0", "a machine", 0.5, [line])], [line]) == []
 
 
+def test_other_blind_cases_were_called_worse():
+    line = {"bench": "blind", "summary": True, "seed": 24, "cases": 20, "effect_exact_pct": 50.0}
+    recorded = [Entry("2026-01-01", "abcdef0", "a machine", 0.5, (line,))]
+    worse = line | {"effect_exact_pct": 33.0}
+    assert len(regressions(recorded, [worse])) == 1
+    assert regressions(recorded, [worse | {"seed": 25}]) == []
+    assert not_compared(recorded, [worse]) == []
+    assert not_compared(recorded, [worse | {"seed": 25}]) == ["blind"]
+
+
+def test_measured_cases_none_of_which_was_run_were_no_worse():
+    line = {"bench": "real", "summary": True, "cases": 76, "ran": 76, "withheld_named_pct": 83.3}
+    recorded = [Entry("2026-01-01", "abcdef0", "a machine", 0.5, (line,))]
+    assert not_compared(recorded, [line | {"ran": 0, "withheld_named_pct": None}]) == ["real"]
+    assert not_compared(recorded, [line | {"withheld_named_pct": None}]) == ["real"]
+
+
 def test_the_newest_of_each_case_counts():
     entries = [entry(), entry(case="pulse"), entry("2026-03-01")]
     assert {key: each.date for key, (each, _) in latest(entries).items()} == {
@@ -326,6 +393,9 @@ def test_the_command_compares_and_ends_with_1(call, monkeypatch, tmp_path):
     assert err == ("aesi: worse than recorded: espm (drive): ratio was 200 and is 3 (2026-01-01, abcdef0).\n")
     monkeypatch.setattr("flows.benchmarks.run", lambda name, **_: iter([SPEED]))
     assert call("bench", "espm", "--compare", path)[0] == 0
+    monkeypatch.setattr("flows.benchmarks.run", lambda name, **_: iter([{**SPEED, "case": "pulse"}]))
+    code, _, err = call("bench", "espm", "--compare", path)
+    assert (code, err) == (0, f"{path} holds no figure of the same cases of espm: not compared.\n")
     assert call("bench", "espm", "--compare", tmp_path / "none.json")[0] == 2
 
 
@@ -341,6 +411,57 @@ def test_a_benchmark_without_its_peer_said_so_after_half_a_minute(monkeypatch, c
     )
 
 
+def asked_splits(monkeypatch, **asked):
+    """What `aesi bench splits` would run."""
+    folder = str(Path(__file__).resolve().parents[3] / "experiments")
+    monkeypatch.setattr(splits, "tracked", lambda cases, workers, address: iter(cases.specs))
+    return list(benchmarks.run("splits", experiments=folder, **asked))
+
+
+@pytest.mark.parametrize("cell", ["nmc", "hg2"])
+def test_a_split_without_its_data_was_one_of_the_virtual_cell_and_stayed_so(tmp_path, monkeypatch, cell):
+    def away(name):
+        raise DataAway(f"{name} is not here, and there is no network.")
+
+    (run,) = asked_splits(monkeypatch, cells=[cell], a_cell=1)
+    monkeypatch.setattr("aesi.data.catalogue.get", away)
+    keep = tmp_path / "kept"
+    row = judged_once(run, splits._row, str(keep), splits._files)
+    assert row["verdict"] == "not run"
+    assert "models" not in row
+    assert not keep.exists()
+    with pytest.raises(DataAway):
+        splits.search_and_fit(run.config)
+
+
+def test_a_table_of_kept_splits_mixed_settings(tmp_path, monkeypatch, capsys):
+    """A quick look into the folder of whole runs gave a split with one seed of one and two of the other."""
+
+    def of(candidates):
+        def row(run):
+            head = {"case": run.name, "split": run.split.name, "cell": "hg2", "development": False}
+            return head | {"settings": run.settings, "error": f"{candidates} candidates"}
+
+        return row
+
+    page, keep = tmp_path / "page.md", str(tmp_path / "kept")
+    page.write_text(f"{splits.BEGIN}\n{splits.END}\n")
+    folder = str(Path(__file__).resolve().parents[3] / "experiments")
+    monkeypatch.setattr(splits, "tracked", lambda cases, *_: [*map(cases.judge, cases.specs), {}])
+    for candidates, cells, seeds in ((60, ["hg2"], 2), (8, ["hg2"], 1), (8, ["nmc"], 1)):
+        monkeypatch.setattr(splits, "_row", of(candidates))
+        asked = {"cells": cells, "a_cell": 1, "seeds": seeds, "candidates": candidates}
+        list(benchmarks.run("splits", experiments=folder, keep=keep, write=str(page), **asked))
+    assert [line for line in page.read_text().splitlines() if "failed" in line] == [
+        "hg2 without 25degC_us06, seed 0 failed: 8 candidates",
+        "nmc 1+2+3, seed 0 failed: 8 candidates",
+    ]
+    assert (
+        "of other settings, and left out of the table: hg2 without 25degC_us06, seed 1."
+        in capsys.readouterr().err
+    )
+
+
 @pytest.mark.parametrize(
     ("override", "section", "key", "value"),
     [
@@ -353,13 +474,11 @@ def test_what_a_split_lays_over_its_file_could_not_be_asked_for_otherwise(
     monkeypatch, override, section, key, value
 ):
     """It was refused as overridden twice."""
-    monkeypatch.setattr(splits, "tracked", lambda cases, workers, address: iter(cases.specs))
-    folder = str(Path(__file__).resolve().parents[3] / "experiments")
-    asked = {"experiments": folder, "cells": ["hg2"], "a_cell": 1}
-    (plain,) = benchmarks.run("splits", **asked)
-    (run,) = benchmarks.run("splits", **asked, overrides=[override])
+    asked = {"cells": ["hg2"], "a_cell": 1}
+    (plain,) = asked_splits(monkeypatch, **asked)
+    (run,) = asked_splits(monkeypatch, **asked, overrides=[override])
     assert getattr(getattr(run.config, section), key) == value
     assert getattr(getattr(plain.config, section), key) != value
-    (twice,) = benchmarks.run("splits", **asked, overrides=[override, override])
+    (twice,) = asked_splits(monkeypatch, **asked, overrides=[override, override])
     with pytest.raises(ConfigError, match="overridden twice"):
         _ = twice.config

@@ -3,10 +3,12 @@
 import json
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 
 import pytest
 
-from flows.benchmarks import cases
+from aesi.bench.hybrid.splits import chosen_splits
+from flows.benchmarks import cases, left_out, real, splits
 from flows.benchmarks.cases import judged_once, kept
 
 
@@ -73,3 +75,33 @@ def test_a_row_without_its_program_is_judged_again(judge, judged, tmp_path):
     (tmp_path / "kept").mkdir()
     (tmp_path / "kept" / "a.json").write_text(json.dumps({"case": "a", "verdict": "none"}))
     assert judge(Asked("a"))["verdict"] == "found"
+
+
+@pytest.mark.parametrize(
+    ("files", "one"),
+    [
+        (partial(real._files, real.chosen(only="witness")[0]), "panasonic_ncr18650pf/25degC_eis.csv"),
+        (partial(real._files, real.chosen(only="beside-nothing-about")[0]), "about_energy_nmc/C2.csv"),
+        (partial(left_out._files, left_out.plan("lg_m50t")[0]), "lg_m50t_w8/n0_udds.csv"),
+    ],
+)
+def test_a_row_of_other_measured_data_stood_for_these(tmp_path, monkeypatch, files, one):
+    """Two folders, named by AESI_DATA, were judged as one."""
+    found = []
+    for folder in ("first", "second"):
+        monkeypatch.setattr("aesi.data.catalogue.get", lambda name, folder=folder: tmp_path / folder / name)
+        place = tmp_path / folder / one
+        place.parent.mkdir(parents=True)
+        place.write_text(folder)
+        found.append([path for path in files(cells="experiments/cells") if path == place])
+    assert found == [[tmp_path / "first" / one], [tmp_path / "second" / one]]
+
+
+def test_a_split_rests_on_the_records_of_its_set(tmp_path, monkeypatch):
+    monkeypatch.setattr("aesi.data.catalogue.get", lambda name: tmp_path)
+    for name in ("drive_cycle.csv", "cell.bpx.json"):
+        (tmp_path / name).write_text("{}")
+    split = chosen_splits(["nmc"], 1)[0]
+    folder = Path(__file__).resolve().parents[3] / "experiments"
+    run = splits.SplitRun(split, 0, str(folder), split.overrides)
+    assert {tmp_path / "drive_cycle.csv", tmp_path / "cell.bpx.json"} <= set(splits._files(run))

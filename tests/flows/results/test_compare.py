@@ -11,6 +11,7 @@ from aesi.pipeline.report.compare import ComparedRun, differing_settings, write_
 from flows.jobs.experiment import _uri_option
 from flows.results.compare import _judged_on, compare
 from flows.tracking.store import KIND, Store
+from flows.tracking.tracker import _texts
 from flows.tracking.whole_run import insert_run
 
 
@@ -100,6 +101,20 @@ def test_what_a_run_was_judged_on_is_its_test_records_whatever_it_was_trained_on
     assert _judged_on(given | {"data.dt_s": "2.0"}) != _judged_on(given | {"data.dt_s": "6.0"})
     cut = {"data_digest": "a", "data.test": "[]", "data.repeats.test": "[3]"}
     assert _judged_on(cut) != _judged_on(cut | {"data.repeats.test": "[4]"})
+
+
+def test_runs_with_more_test_records_than_a_parameter_can_name_are_compared():
+    names = [
+        f"../measured/campaign_2026/cell_07/drives/udds_{i:03d}_25degC_2026-03-11.csv" for i in range(400)
+    ]
+    digests = [f"{i:016x}" for i in range(403)]
+
+    def tracked_of(names, digests):
+        return _judged_on(_texts({"data.test": names, "data_digest": ", ".join(digests)}))
+
+    assert tracked_of(names, digests) == tracked_of(names, digests)
+    assert tracked_of(names, digests) != tracked_of(names, [*digests[:-1], "another"])
+    assert tracked_of(names, digests) != tracked_of([*names[:-1], "another.csv"], digests)
 
 
 def test_the_model_that_a_search_ended_with_is_no_setting(tracked):

@@ -16,6 +16,11 @@ def test_a_run_says_what_is_the_recalibrations_and_what_the_corrections():
     )
 
 
+def test_a_nominal_level_of_97_5_is_not_98():
+    line = result_line(ROW | {"intervals": {"coverage_pct": 97.31, "nominal_pct": 97.5}})
+    assert line.endswith("97.3 % covered one step ahead at 97.5 %.")
+
+
 def test_what_was_not_judged_is_not_told():
     alone = {"test_mser_pct": 0.0, "test_rmse_mv": 27.16, "test_mser_recalibrated_pct": None}
     assert result_line({"name": "ESPM", "free_run": alone, "intervals": None}) == (

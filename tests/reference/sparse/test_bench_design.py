@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from aesi.bench.hybrid.design import SETTINGS, run
+from aesi.bench.hybrid.design import SETTINGS, _summary, run
 
 CELL = Path(__file__).parents[3] / "experiments" / "cells" / "nmc_30ah.bpx.json"
 
@@ -27,3 +27,11 @@ def test_a_setting_gives_the_same_figures_again():
         next(run(cell=str(CELL), cells=1, candidates=4, settings=["fold 200"], sindy=False)) for _ in "ab"
     )
     assert {**once, "cpu_s": 0} == pytest.approx({**again, "cpu_s": 0})
+
+
+def test_a_cell_on_which_nothing_survives_was_in_no_mean():
+    line = _summary([{"AESI I": 80.0}, {"AESI I": 60.0}, {}, {}])
+    assert line["failed"] == 2
+    assert line["aesi_i_mean_pct"] == pytest.approx(35.0)
+    assert line["aesi_i_median_pct"] == pytest.approx(30.0)
+    assert line["aesi_i_below_45"] == 2

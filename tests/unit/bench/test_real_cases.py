@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from aesi.bench.detectable import seen_on_measured
 from aesi.bench.real import chosen, judged, plan, summary, table, write_report
 from aesi.bench.real.answers import initial_state_row, scored
 from aesi.bench.real.beside import of_model, of_spectrum
@@ -215,6 +216,26 @@ def test_the_table_counts_by_kind_and_shows_each_case(gain_rows):
         "| 5.0 | 5.0 | 5.0 |"
     )
     assert len(each) == 3
+
+
+def test_a_case_without_an_answer_left_the_rates_and_the_table(shared_data, monkeypatch):
+    """It was not among the faults that stand out, and of fewer cases more were named."""
+    case = next(case for case in plan() if case.name == "voltage_lag-2-about_energy_nmc")
+    case = replace(case, take=replace(case.take, stop_s=900.0))
+    monkeypatch.setattr("aesi.bench.real.judge.seen_on_measured", lambda *_: 7.1)
+    row = judged(case, CELLS, limit_s=1e-3)
+    assert (row["verdict"], row["named"], row["seen_nats"]) == ("out of time", False, 7.1)
+    last = summary([row])
+    assert (last["fault_seen_named_pct"], last["fault_seen_named_cases"]) == (0.0, 1)
+    lines = table([row])
+    assert "| voltage lag |  | 1 | 0 | 1 | 0 |  |  |" in lines
+    assert any("| voltage lag 2 | out of time | no | 7.1 |" in line for line in lines)
+
+
+def test_what_the_tracer_refuses_says_nothing():
+    cell = Cell.from_bpx(f"{CELLS}/lg_m50_chen2020.bpx.json")
+    short = Measurement(np.arange(20.0), np.zeros(20), np.full(20, 3.7), name="short")
+    assert seen_on_measured(cell, short, 0.5, ("series_resistance",)) is None
 
 
 @pytest.fixture

@@ -3,12 +3,15 @@
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from aesi.bench import blind
 from aesi.bench.limit import NoAnswer, OutOfTime, answer_of, processor_limit
 from aesi.bench.scoring import calibration, judge, proportion, rate
+from aesi.data.blind import BlindCase
 from aesi.errors import SimulationError
+from aesi.records import Measurement
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
 
@@ -132,6 +135,18 @@ def test_a_case_that_the_laboratory_cannot_make_is_counted_and_stops_nothing(mon
     assert "maximum voltage" in row["error"]
     summary = blind.summary([row])
     assert (summary["cases"], summary["not_made"], summary["exact_cases"]) == (0, 1, 0)
+
+
+def test_a_case_that_the_tracer_refused_ended_all(monkeypatch):
+    """What its label says of unseen data was asked of the tracer again, which refused again."""
+    short = Measurement(np.arange(20.0), np.zeros(20), np.full(20, 3.7), name="short")
+    spec = blind.chosen(cases=1)[0]
+    case = BlindCase(
+        spec, (short,), "series_resistance", (), (), 0.5, CELLS / "lg_m50_chen2020.bpx.json", {"rms_mv": 1.0}
+    )
+    monkeypatch.setattr(blind, "generate", lambda spec, cells: case)
+    row = blind.judged(spec, str(CELLS))
+    assert (row["verdict"], row["exact"], row["seen_nats"]) == ("error", False, None)
 
 
 def test_cases_that_somebody_has_seen_are_left_out():

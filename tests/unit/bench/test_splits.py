@@ -77,7 +77,7 @@ def test_both_reductions_are_of_the_squared_error():
     assert against(figures["ESPM recalibrated"], figures["ESPM"]) == pytest.approx(99.0)
     assert against(figures["ESPM"], figures["ESPM recalibrated"]) == pytest.approx(-9900.0)
     assert figures["ESPM"]["drives"]["other"]["rmse_mv"] == pytest.approx(10.0)
-    row = {"cell": "nmc", "development": True, "models": figures}
+    row = {"split": "nmc 1+2", "cell": "nmc", "development": True, "models": figures}
     best = summary([row])["all"]["nmc"]["best_in_hindsight"]
     assert best == {"mser_recalibrated_pct_mean": 0.0, "mser_recalibrated_pct_worst": 0.0}
 
@@ -128,3 +128,60 @@ def test_the_table_has_each_split_by_its_mean_over_the_seeds_and_the_worst_split
     )
     assert "m50t 1, seed 0 failed: no data" in lines
     assert summary(rows)["failed"] == 1
+
+
+def failed(split: str, cell: str, seed: int, verdict: dict[str, str] | None = None) -> dict:
+    return {
+        key: value
+        for key, value in row(split, cell, seed, 0.0).items()
+        if key not in ("models", "abroad", "validation_mser_pct")
+    } | {"error": "no charge left", **(verdict or {})}
+
+
+def test_a_split_that_failed_left_the_mean_to_the_others():
+    rows = [row("hg2 without a", "hg2", seed, 80.0) for seed in range(2)]
+    rows += [failed("hg2 without b", "hg2", seed) for seed in range(2)]
+    rows += [row("nmc 1+2", "nmc", 0, 80.0), failed("nmc 1+2", "nmc", 1)]
+    last = summary(rows)
+    assert (last["splits"], last["runs"], last["failed"]) == (3, 6, 3)
+    for cell in ("hg2", "nmc"):
+        assert last["all"][cell]["AESI I"]["mser_pct_mean"] == pytest.approx(40.0)
+        assert last["all"][cell]["AESI I"]["mser_recalibrated_pct_mean"] == pytest.approx(10.0)
+        assert last["all"][cell]["best_in_hindsight"]["mser_recalibrated_pct_mean"] == pytest.approx(10.0)
+    lines = table(rows)
+    assert any(
+        line.startswith("| LG HG2, 25 °C | 2 | 2 | 37.5 / 0.0 | 40.0 / 0.0 | 10.0 / 0.0 |") for line in lines
+    )
+    assert any(line.startswith("| LG HG2, 10degC_us06 | 2 | 2 | 37.5 / 0.0 |") for line in lines)
+    assert any(
+        line.startswith("| NMC pouch, parts of a drive | 1 | 2 | 37.5 / 37.5 | 40.0 / 40.0 |")
+        for line in lines
+    )
+
+
+def test_a_split_whose_data_cannot_be_had_is_in_no_mean():
+    away = failed("hg2 without b", "hg2", 0, {"verdict": "not run"})
+    rows = [row("hg2 without a", "hg2", 0, 80.0), away]
+    last = summary(rows)
+    assert (last["splits"], last["failed"], last["not_run"]) == (1, 0, ["hg2 without b, seed 0"])
+    assert last["all"]["hg2"]["AESI I"]["mser_pct_mean"] == pytest.approx(80.0)
+    assert "hg2 without b, seed 0 not run: no charge left" in table(rows)
+
+
+def test_a_table_with_development_splits_ended_at_the_first_other_temperature():
+    here = row("hg2 without a", "hg2", 0, 80.0)
+    development = row("hg2 without b", "hg2", 0, 60.0) | {"development": True}
+    del development["abroad"]
+    lines = table([here, development])
+    assert any(line.startswith("| LG HG2, 25 °C | 2 | 1 | 75.0 / 75.0 | 70.0 / 60.0 |") for line in lines)
+    assert any(
+        line.startswith("| LG HG2, 10degC_us06 | 1 | 1 | 75.0 / 75.0 | 80.0 / 80.0 |") for line in lines
+    )
+
+
+def test_other_temperatures_were_in_the_mean_of_what_the_correction_takes_off():
+    there = row("hg2 without a", "hg2", 0, 80.0)
+    there["abroad"] = {"10degC_us06": there["models"] | {"AESI I": there["models"]["ESPM recalibrated"]}}
+    figures = summary([there])["all"]["hg2"]["AESI I"]
+    assert figures["mser_recalibrated_pct_mean"] == pytest.approx(20.0)
+    assert figures["abroad_mser_recalibrated_pct_mean"] == pytest.approx(0.0)

@@ -278,6 +278,28 @@ def test_a_binary_whose_time_begins_anew_with_each_step_is_put_together(tmp_path
     assert len(read(path, Reading(cycle="2", duplicates="first"))) == 43  # steps 4 to 6, less one stamp each
 
 
+def test_the_ends_of_steps_in_a_binary_of_newares_were_refused_as_no_other_exports_are(tmp_path, monkeypatch):
+    frame = pd.DataFrame({"Test Time / s": TIME, "Current / A": -CURRENT, "Voltage / V": VOLTAGE})
+    frame.loc[15, "Test Time / s"] = TIME[14]
+    monkeypatch.setitem(sys.modules, "bdf", SimpleNamespace(read=lambda path, validate: frame))
+    path = tmp_path / "test.nda"
+    path.write_bytes(b"NEWARE")
+    data = read_measurement(path)
+    np.testing.assert_allclose(data.current_a, np.delete(CURRENT, 15))
+    assert any("1 row was dropped whose stamp is there twice, the first kept" in note for note in data.notes)
+
+
+def test_an_arbin_export_without_its_points_was_not_known(tmp_path):
+    """As MITS Pro writes its workbooks of late, and batteryarchive.org its time series, without steps either."""
+    head = "Date_Time,Test_Time (s),Cycle_Index,Current (A),Voltage (V),Charge_Capacity (Ah),"
+    head += "Environment_Temperature (C),Cell_Temperature (C)"
+    body = rows(["2010-09-02"] * N, TIME, STEP, -CURRENT, VOLTAGE, TIME * 0, TEMPERATURE - 1.0, TEMPERATURE)
+    (tmp_path / "archive.csv").write_text("\n".join([head, *body, ""]))
+    data = read_measurement(tmp_path / "archive.csv")
+    np.testing.assert_allclose(data.current_a, CURRENT)
+    np.testing.assert_allclose(data.temperature_degc, TEMPERATURE)
+
+
 def test_a_digatron_export_was_held_for_binary_by_the_line_above_its_names(tmp_path):
     name, content = digatron(start_s=26.0 * 3600.0)
     path = tmp_path / name
@@ -352,6 +374,16 @@ def test_a_first_column_without_a_name_made_layers_of_an_export(tmp_path, above,
     np.testing.assert_allclose(record.time_s, TIME)
     np.testing.assert_allclose(record.current_a, CURRENT)
     assert not any("cycles and steps" in note for note in record.notes)
+
+
+def test_a_first_step_in_the_line_of_its_cycle_hid_the_layers_of_a_report(tmp_path):
+    name, content = neware_layers()
+    lines = content.decode("latin-1").split("\r\n")
+    joined = [*lines[:3], lines[3] + lines[4], *lines[5:]]
+    (tmp_path / name).write_text("\r\n".join(joined), encoding="latin-1", newline="")
+    record = read_measurement(tmp_path / name)
+    np.testing.assert_allclose(record.time_s, TIME)
+    np.testing.assert_allclose(record.voltage_v, VOLTAGE)
 
 
 @pytest.mark.parametrize("export", EXPORTS, ids=lambda export: export.__name__)
@@ -455,10 +487,18 @@ def test_times_are_read_as_they_are_declared(tmp_path, cells, unit):
 def test_a_time_that_is_no_clock_time_is_named(tmp_path):
     path = tmp_path / "logger.csv"
     path.write_text("time_s,current_a,voltage_v\n00:00:01,1.0,3.7\n00:00:xx,1.0,3.7\n00:00:03,1,3.7\n")
-    with pytest.raises(DataError, match=r"row 2 \(line 3\).*'00:00:xx'"):
+    with pytest.raises(DataError, match=r"row 2 \(line 3\).*'00:00:xx'.*time_s=s \(or min, h, "):
         read_measurement(path, units={"time_s": "h:m:s"})
     with pytest.raises(DataError, match="--unit time_s=h:m:s"):
         read_measurement(path)
+
+
+def test_a_time_in_milliseconds_spelt_out_was_proposed_in_seconds(tmp_path):
+    (tmp_path / "bdf.csv").write_text(
+        "test_time_millisecond,current_ampere,voltage_volt\n0,1,3.7\n1000,1,3.6\n"
+    )
+    with pytest.raises(DataError, match=r'--column time_s="test_time_millisecond" --unit time_s=ms\. It has'):
+        read_measurement(tmp_path / "bdf.csv")
 
 
 def test_an_unknown_unit_names_those_that_there_are(tmp_path):
@@ -519,6 +559,19 @@ def test_the_names_of_a_sheet_were_not_proposed(tmp_path):
     book.active.append(["Bench 7"])
     sheet = book.create_sheet("Record")
     for row in (["Elapsed (s)", "Current (A)", "U (V)"], [0, 1.0, 3.7], [1, 1.0, 3.69]):
+        sheet.append(row)
+    book.save(tmp_path / "logger.xlsx")
+    with pytest.raises(DataError, match=r'--column time_s="Elapsed .s." --column current_a="Current .A."'):
+        read_measurement(tmp_path / "logger.xlsx")
+
+
+def test_the_names_of_a_sheet_of_sums_were_proposed_before_those_of_the_records(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for row in (["Cycle", "PlatTimeD/Sec", "MedVoltD/V"], [1, 0, 3.7], [2, 0, 3.6]):
+        book.active.append(row)
+    sheet = book.create_sheet("Record")
+    for row in (["Elapsed (s)", "Current (A)", "U (V)"], *([k, 1.0, 3.7] for k in range(9))):
         sheet.append(row)
     book.save(tmp_path / "logger.xlsx")
     with pytest.raises(DataError, match=r'--column time_s="Elapsed .s." --column current_a="Current .A."'):

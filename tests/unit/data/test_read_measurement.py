@@ -5,6 +5,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from aesi.data import read_measurement
@@ -80,8 +81,6 @@ def test_every_way_of_writing_gives_the_same_numbers(tmp_path, content):
 
 
 def test_parquet_is_read_like_csv(tmp_path):
-    import pandas as pd
-
     frame = pd.DataFrame({"time_s": TIME, "current_a": CURRENT, "voltage_v": VOLTAGE})
     frame.to_parquet(tmp_path / "drive.parquet")
     assert_same(read_measurement(tmp_path / "drive.parquet"))
@@ -756,3 +755,20 @@ def test_looking_for_gaps_in_a_slowly_sampled_record_took_longer_than_reading_it
     assert time.process_time() - began < 0.5  # it was 2.8 s, row by row
     assert found == [0, 5000, 5003, 299_999]
     assert find_gaps({"time_s": np.array([0.0, 1e6])}) == []
+
+
+def test_a_charge_that_the_rows_do_not_tell_was_read_without_a_word(tmp_path):
+    """Pulses of 10 s every minute, a row at the end of each pulse and of each pause: a sixth flows of what they say."""
+    ends = np.cumsum(np.tile([50.0, 10.0], 30))
+    pulse = np.tile([0.0, 3.0], 30)
+    voltage = 3.9 - 1e-5 * ends - 0.03 * pulse
+    path = tmp_path / "pulses.csv"
+    pd.DataFrame({"time_s": ends, "current_a": pulse, "voltage_v": voltage}).to_csv(path, index=False)
+    (told,) = [note for note in read_measurement(path).notes if "do not tell the charge" in note]
+    assert "0.729 Ah either way" in told
+    assert "0.25 with that of the row after each, 1.21 with that of the row before" in told
+    both = (ends[1::2, None] + [-59.0, -10.0, -9.0, 0.0]).ravel()  # rows before and after each change
+    pulse = np.tile([0.0, 0.0, 3.0, 3.0], 30)
+    voltage = 3.9 - 1e-5 * both - 0.03 * pulse
+    pd.DataFrame({"time_s": both, "current_a": pulse, "voltage_v": voltage}).to_csv(path, index=False)
+    assert not any("do not tell the charge" in note for note in read_measurement(path).notes)

@@ -44,6 +44,24 @@ def test_a_drop_that_only_a_cold_cell_has_is_no_other_cells_in_the_cold(m50, rec
             check_belongs(m50, [replace(dropping, temperature_degc=degc)])
 
 
+def test_the_record_of_a_cell_with_its_leads_was_refused_by_its_own_file(m50, record):
+    leads = replace(m50, contact_resistance_ohm=0.09)
+    run = aesi.simulate(leads, record.time_s, record.current_a, soc0=0.95)
+    through = replace(record, voltage_v=run.voltage_v)
+    check_belongs(leads, [through])
+    with pytest.raises(DataError, match="Ah leave the cell"):
+        check_belongs(m50, [through])
+
+
+def test_a_voltage_a_row_behind_its_current_was_that_of_another_cell(m50):
+    time_s = np.arange(0.0, 3000.0, 10.0)
+    current_a = np.where(time_s % 600.0 < 300.0, 9.0, 0.0)
+    voltage_v = aesi.simulate(m50, time_s, current_a, soc0=0.95).voltage_v - 0.015 * current_a
+    check_belongs(m50, [Measurement(time_s, current_a, voltage_v, name="pulses")])
+    behind = np.append(voltage_v[0], voltage_v[:-1])
+    check_belongs(m50, [Measurement(time_s, current_a, behind, name="pulses")])
+
+
 def test_a_cold_record_without_its_temperature_was_called_another_cells_and_nothing_else(m50, record):
     dropping = replace(record, voltage_v=record.voltage_v - 0.09 * record.current_a)
     with pytest.raises(DataError, match=r"another's\. Or it was far colder than the 25 degC") as caught:

@@ -303,6 +303,19 @@ def test_a_given_state_of_charge_is_believed_for_one_record_and_checked_for_seve
     assert initial_state(LG_M50, data, 0.41, shared=True).basis == "given"
 
 
+def test_a_given_state_of_several_records_was_not_believed_where_the_charge_leaves_no_other():
+    """A full discharge behind the drop of leads, which the first voltages take for a cell that is half empty."""
+    time = np.arange(0.0, 3240.0, 10.0)
+    current = np.full(len(time), 5.0)
+    voltage = simulate(LG_M50, time, current, soc0=1.0).voltage_v - 0.08 * current
+    data = record(time, current, voltage)
+    assert initial_state(LG_M50, data).soc < 0.7
+    found = initial_state(LG_M50, data, 1.0, shared=True)
+    assert (found.basis, found.soc, found.contradicted) == ("given", 1.0, True)
+    assert "rather says" in found.sentence
+    assert initial_state(LG_M50, data.take(slice(0, 60)), 1.0, shared=True).basis == "load"
+
+
 def test_a_given_state_that_the_first_seconds_under_load_speak_against_was_taken_without_a_word():
     data, _ = cut_from_a_drive(1000)
     read = initial_state(LG_M50, data)

@@ -160,6 +160,13 @@ def test_overrides_reach_into_sections(tmp_path):
     assert config.tracking.uri == "http://a"
 
 
+def test_an_override_reaches_into_a_section_that_is_given_in_short(tmp_path):
+    path = tmp_path / "x.yaml"
+    path.write_text("name: x\ndata: {kind: files, train: [a.csv], test: [b.csv]}\ncell: my_cell.bpx.json\n")
+    cell = read_experiment(path, ["cell.soc0=0.8", "cell.start=declared"]).cell
+    assert (cell.bpx, cell.soc0, cell.start) == ("my_cell.bpx.json", 0.8, "declared")
+
+
 def test_of_two_overrides_of_one_key_the_last_counted_and_nobody_was_told(tmp_path):
     path = tmp_path / "x.yaml"
     path.write_text("name: x\ndata: {kind: files, train: [a.csv], test: [b.csv]}\n")

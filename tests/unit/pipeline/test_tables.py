@@ -54,6 +54,13 @@ def test_every_caption_states_its_regime(build):
     assert "Regime: " in build(MODELS).caption
 
 
+def test_a_nominal_level_between_whole_percents_is_not_rounded():
+    level = 100.0 * (1.0 - 0.001)
+    assert row_of(tables.interval_table([HYBRID]), HYBRID["name"])["nominal, %"] == "90"
+    row = {**HYBRID, "intervals": HYBRID["intervals"] | {"nominal_pct": level}}
+    assert row_of(tables.interval_table([row]), HYBRID["name"])["nominal, %"] == "99.9"
+
+
 def test_one_step_stands_beside_persistence():
     row = row_of(tables.one_step_table(MODELS), "ESPM + AESI I")
     assert (row["RMSE test, mV"], row["persistence test, mV"]) == ("3.900", "4.030")

@@ -248,7 +248,7 @@ def interval_finding(model: Row) -> str:
     if nominal is None or coverage is None or width is None:
         return ""
     text = (
-        f"{nominal:.0f} % intervals one step ahead cover {coverage:.1f} % of the test samples with "
+        f"{nominal:g} % intervals one step ahead cover {coverage:.1f} % of the test samples with "
         f"{1e3 * width:.2f} mV average width"
     )
     text += "." if worst is None else f"; {worst:.1f} % in the worst (current, SOC) bin."
