@@ -1,4 +1,4 @@
-"""Fit a cell's own parameters to records of any temperatures together."""
+"""Fit the parameters of a cell's file to records, of one or several temperatures."""
 
 from aesi.calibration.fit import calibrate
 from aesi.calibration.records.conditions import Conditions

@@ -1,20 +1,20 @@
-"""What share of its active material a cell has left in each record, before anything is fitted.
+"""Prior of the share of active material that a cell has left in each record.
 
-A cell only loses. Records with a date are of one course: between a record of day t and its neighbour of day t', on the
-way to the day of the file's state, lies one loss,
+A cell only loses material. Records with a date form one course of ageing: between a record of day t and its neighbour
+of day t', towards the day of the file's state, there is one loss,
 
     ln share(t) - ln share(t') = +-l,      l = s |e|,      s = LOSS_SD |t - t'|^(1/2)                           (1)
 
-e a standard normal deviate, plus for a record before the file's day and minus for one after it, so that records of one
-day are in one state. Its working coordinate z is a normal deviate of the same probability, |e| = P^-1((1 + P(z))/2)
-with P the normal distribution. Of a record without a date ln share is s z, with s from the file. The file is in the
-state of the last day on which a dated record has a load, as the cell was last seen, or of another that is given.
+with e a standard normal deviate, plus for a record before the file's day and minus for one after it. Records of one day
+have the same state. The working coordinate z of a loss is a normal deviate of the same probability,
+|e| = P^-1((1 + P(z))/2) with P the normal distribution. For a record without a date ln share is s z, relative to the
+file. The file has the state of the last day on which a dated record has a load, or of another day that is given.
 
-Slow records tell what silicon has lost (`aesi.calibration.silicon`), each by a coordinate of its own, relative to the
-file. It is what the cell had on that day: between two such days, the file's among them, the logarithm of the share runs
-evenly with the days, before the first and after the last it stays, and so it is in records with a load.
+Slow records determine the loss of silicon (`aesi.calibration.silicon`), each by a coordinate of its own relative to the
+file, valid on its day. Between two such days, the file's included, the logarithm of the share is interpolated linearly
+over time; before the first and after the last it is constant. Records with a load take this share.
 
-Leaves out that cells age by use more than by days, what a rest gives back, and that their resistance grows.
+Left out: ageing by use and not by days, recovery at rest, and growing resistance.
 """
 
 from __future__ import annotations
@@ -32,27 +32,27 @@ from aesi.numerics.typing import Array, BoolArray
 from aesi.physics.cell.health import day_of
 
 SLOW_SD, LOADED_SD = 0.03, 0.002
-"""Standard deviations, for records without dates, of the logarithm of the capacity of a record's cell over the file's.
-Slow records are there for the potentials, and a cell ages between its tests: a convention, of the size that is found, 3
-% of the LG 18650HG2 within a week. Records with a load are what a file is simulated for, in the one state that it has.
-Their deviation is the accuracy to which charge is measured, by the zero of a cycler that whole cycles tell to 0.2 %; a
-record that says more loudly is believed further.
+"""Standard deviations, for records without dates, of ln(capacity of the cell in a record / capacity in the file).
+SLOW_SD, for slow records, is a convention: they are fitted for the potentials, and a cell ages between its tests, by 3
+% for the LG 18650HG2 within a week. LOADED_SD, for records with a load, is the accuracy of the measured charge (whole
+cycles determine the zero of a cycler to 0.2 %): such records are what a file is simulated for, in a single state. A
+record with stronger evidence may still end further away.
 With 3 % for all, a calibrated LG 18650HG2, as it is simulated, misses its fitted 1C discharge and drive by 119 and 4.9
 mV, and the 1C discharge of two days later, fitted to nothing, by 10.3; with these by 17.6, 8.7 and 14.1."""
 MOST_AGE = 0.3
-"""Largest size of the same logarithm for a record without a date. A convention that no fit ends on; but descents
-scale their steps by bounds, so that with and without it they end in different places along what data at one
-temperature leave open."""
+"""Bound of the same logarithm for a record without a date. A convention that no fit reaches; but descents scale their
+steps by bounds, so that without it they end elsewhere along directions that data at one temperature do not
+determine."""
 LOSS_SD = 0.0075
 """s of (1) for one day: 4 % in a month, 7 % in three. The eight losses between the fitted records of an LG 18650HG2 and
 a Panasonic NCR18650PF, 1 to 42 days apart, are 0 to 1.5 % times the root of their days, 0.8 % root mean square (fitted
 with 0.5 %).
-With steps of either sign the HG2 had gained 5 % in a 1C discharge at -8 degC, six weeks after its drives: the age took
-up what the cold does. As the file is simulated, it missed the discharge by 264 mV, and by 9.3 with losses alone. A fit
-without that discharge, whose two C/20 at other temperatures then bend the energies less, misses it by 92 mV instead of
-1.6 V."""
+With steps of either sign the HG2 had gained 5 % in a 1C discharge at -8 degC, six weeks after its drives: the age
+compensated an effect of the cold. The file as simulated missed the discharge by 264 mV, and by 9.3 with losses alone. A
+fit without that discharge, whose two C/20 at other temperatures then bend the energies less, misses it by 92 mV instead
+of 1.6 V."""
 MOST_DEVIATIONS = 4.0
-"""The working coordinate of a loss lies within this many deviations."""
+"""Bound of the working coordinate of a loss, standard deviations."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,10 +61,10 @@ class Ageing:
 
         share_i = exp(chain_i . (sd a)),      a_j = |e_j| of a loss (1), z_j of a record without a date
 
-    chain : (records, records) the identity for records without a date; else chain[i, j] is 1 where loss j lies between
-    record i and the file's day behind it, -1 where between the file's day and record i behind that.  sd : (records,).
-    silicon : (records, records) weights of the records' own logarithms of their silicon in that which a record has.
-    losses : (records,) is it a loss, (1)?  day : of the file's state; None where no record has a date.
+    chain : (records, records) identity for records without a date; else chain[i, j] is 1 where loss j lies between
+    record i and a later day of the file, -1 where it lies between the file's day and a later record i.
+    sd : (records,) s of (1).  silicon : (records, records) weights of the records' own silicon logarithms in the one of
+    each record.  losses : (records,) True for a loss (1).  day : of the file's state; None where no record has a date.
     """
 
     chain: Array
@@ -75,10 +75,11 @@ class Ageing:
 
     @classmethod
     def of(cls, records: Sequence[Prepared], dates: Mapping[str, date], as_of: date | None = None) -> Ageing:
-        """dates : by record name.  as_of : day of the file's state; None takes the last with a load.
+        """The prior for some records.
 
-        Raises DataError for a date of a record that is not there, for a day without any date, and for one outside
-        those of the records: what a cell lost until then, none of them shows.
+        dates : record name -> day of its test.  as_of : day of the file's state; None takes the last with a load.
+        Raises DataError for a date of an unknown record, for `as_of` without any date, and for an `as_of` outside the
+        dates, where no record shows the state of the cell.
         """
         check_dates([r.name for r in records], dates)
         if as_of is not None and not dates:
@@ -98,12 +99,12 @@ class Ageing:
 
     @property
     def bounds(self) -> Array:
-        """(records,) no working coordinate is larger than this, or less than its negative."""
+        """(records,) largest magnitude of each working coordinate."""
         return np.where(self.losses, MOST_DEVIATIONS, MOST_AGE / np.where(self.sd > 0.0, self.sd, 1.0))
 
     @property
     def z_of_file_state(self) -> Array:
-        """(records,) working coordinates of records in the file's state; -inf of a loss, whose |e| is nought there."""
+        """(records,) working coordinates of records in the file's state; -inf for a loss, whose |e| is 0 there."""
         return np.where(self.losses, -np.inf, 0.0)
 
     def share(self, index: int, z: Array) -> float:
@@ -112,7 +113,7 @@ class Ageing:
 
     def slopes(self, index: int, z: Array) -> Array:
         """(records,) slopes of the logarithm of a record's share over the working coordinates z."""
-        # of |e| = P^-1((1 + P(z))/2), by the densities on both sides
+        # derivative of |e| = P^-1((1 + P(z))/2) from the densities on both sides
         bend = 0.5 * np.exp(0.5 * (_size(z) ** 2 - z**2))
         return self.chain[index] * self.sd * np.where(self.losses, bend, 1.0)
 
@@ -140,11 +141,11 @@ def _file_day(records: Sequence[Prepared], days: Sequence[date | None], as_of: d
 
 
 def _chain_and_sd(since: Array, dated: BoolArray) -> tuple[Array, Array]:
-    """`Ageing.chain`, and (records,) deviations of the losses of dated records, nought of the others.
+    """(`Ageing.chain`, (records,) standard deviations of the losses of dated records, 0 for others).
 
-    The losses before the file's day are strung together away from it, and so are those after it: record i has all of
-    those from the file's day to its own, the last of which is number i.
-    since : (records,) days from the file's state.  dated : (records,).
+    Losses accumulate away from the file's day, before and after it: record i has all losses between the file's day and
+    its own, and the last of these has number i.
+    since : (records,) days from the file's state.  dated : (records,) True for records with a date.
     """
     chain, sd = np.eye(len(since)), np.zeros(len(since))
     before = sorted(np.flatnonzero(dated & (since <= 0)), key=lambda i: abs(since[i]))

@@ -1,4 +1,4 @@
-"""State of health that a calibrated cell shows: resistance, cyclable lithium, active material, capacity; intervals."""
+"""State of health of a calibrated cell: resistance, cyclable lithium, active material and capacity, with intervals."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ HEALTH_WORDS = {
 class Health:
     """State of one check-up, from the calibrated cell.
 
-    resistance_mohm : of contacts and of films at half charge, beyond the electrolyte and the electrodes.
-    inventory_ah : cyclable lithium, in both electrodes.  negative_ah, positive_ah : charge that the active material of
-    each can hold.
+    resistance_mohm : of contacts and films at half charge, mohm, without electrolyte and electrodes.
+    inventory_ah : cyclable lithium in both electrodes, Ah.  negative_ah, positive_ah : capacity of the active material
+    of each electrode, Ah.
     """
 
     resistance_mohm: float
@@ -40,7 +40,7 @@ class Health:
 
 
 def health_of(cell: Cell) -> Health:
-    """What a calibrated cell says of resistance, inventory and active material."""
+    """The state of health from the parameters of a calibrated cell."""
     negative, positive = (cell.electrode_capacity_ah(e) for e in (cell.negative, cell.positive))
     theta_n, theta_p = cell.stoichiometries(1.0)
     return Health(
@@ -53,8 +53,8 @@ def health_of(cell: Cell) -> Health:
 
 
 def health_intervals(found: Calibration) -> Mapping[str, tuple[float, float]]:
-    """95 % interval of each quantity: the covariance of the fit, carried through to first order; from an upper bound,
-    beyond which no value moves, by slopes towards the inside."""
+    """Quantity -> its 95 % interval, by linear propagation of the fit's covariance. A parameter on an upper bound has
+    its slope taken towards the inside."""
     at = np.array(astuple(health_of(rewound(found.model, found.x))))
     slopes = np.zeros((len(at), len(found.x)))
     for j in range(len(found.x)):

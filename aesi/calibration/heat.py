@@ -3,9 +3,9 @@
     C dT/dt = Q - (T - T_case)/R,   (T - T_case)/R = G (T_case - T_amb)
     Q = I (U - V) - I T dU/dT        I > 0 on discharge; V as measured, U of the calibrated cell
 
-Leaves out what the case itself stores. R is the calibrated cell's (`Cell.winding_resistance_k_w`). The surroundings are
-those of each record, within `AMBIENT_SD_K` of where the cell starts. A temperature tells of heat where the losses
-explain it: one that a chamber or a noisy sensor moves is followed as well without them.
+The heat capacity of the case is left out. R is that of the calibrated cell (`Cell.winding_resistance_k_w`). Each record
+has surroundings of its own, within `AMBIENT_SD_K` of the cell's first temperature. A temperature is used only where the
+losses explain it: one that a chamber or a noisy sensor changes is followed as well without them.
 
 Source: Bernardi, Pawlikowski & Newman, J. Electrochem. Soc. 132 (1985) 5, doi:10.1149/1.2113792.
 """
@@ -27,18 +27,18 @@ from aesi.physics.effects.self_heating import PARAMETERS
 from aesi.physics.simulation import simulate
 
 LEAST_RISE_K = 2.0
-"""A record that warms by less tells nothing of heat."""
+"""Least warming of a record that is used, K."""
 LOSSES_LEAVE = 0.5**0.5
-"""Of what the surroundings leave by themselves, the most that is left with losses: they explain half of its variance. A
-convention. The Panasonic's and the HG2's records with their files: 0.49 to 0.67 of five and 0.15 to 0.29 of two, 0.47
-of the five together. Own records of the Panasonic's file in a chamber that goes 15 to 25 K up or down at C/10, at rest
-after C/3 or before C/2.5, or swings by 4 K at C/20, or with 1 K of noise: 0.77 to 1.08."""
+"""Largest ratio of the RMS error with losses to that with the surroundings alone: the losses then explain half of the
+variance. A convention. The Panasonic's and the HG2's records with their files: 0.49 to 0.67 of five and 0.15 to 0.29 of
+two, 0.47 of the five together. Own records of the Panasonic's file in a chamber that goes 15 to 25 K up or down at
+C/10, at rest after C/3 or before C/2.5, or swings by 4 K at C/20, or with 1 K of noise: 0.77 to 1.08."""
 AMBIENT_SD_K = 5.0
-"""Standard deviation of the surroundings' temperature about the one that a cell starts at; each record counts as one
-reading. Loose: with a tenth of it 0.15 and 0.32 K are left of the measured temperatures (LG HG2, Panasonic) instead
-of 0.12 and 0.31."""
+"""Standard deviation of the surroundings' temperature about the first temperature of the cell, K; each record counts as
+one reading. It is wide: with a tenth of it the measured temperatures (LG HG2, Panasonic) are missed by 0.15 and 0.32 K
+instead of 0.12 and 0.31."""
 SURROUNDINGS_UNIT = 0.1
-"""Unit of the surroundings in the descent, as a share of their deviation: half a kelvin."""
+"""Unit of the surroundings in the descent, as a share of their standard deviation: half a kelvin."""
 READING_K = 0.3
 """Standard deviation of a thermocouple, K."""
 TYPICAL_W_K = 0.1
@@ -47,7 +47,8 @@ TYPICAL_W_K = 0.1
 
 @dataclass(frozen=True)
 class HeatFit:
-    """Heat capacity (J/K), conductance from case to surroundings (W/K), and what is left of the temperatures (K)."""
+    """Fitted heat capacity (J/K), conductance from case to surroundings (W/K), and RMS error of the temperatures
+    (K)."""
 
     heat_capacity_j_k: float
     conductance_w_k: float
@@ -64,8 +65,8 @@ class HeatFit:
 
 
 def with_heat(cell: Cell, records: Sequence[Prepared]) -> tuple[Cell, tuple[str, ...]]:
-    """The cell with its thermal data fitted, and sentences; the same object where no record tells of heat or it has no
-    volume."""
+    """(cell with its thermal data fitted, sentences). The same cell object is returned where no record determines the
+    heat, or where the file declares no volume."""
     warming = [r for r in records if r.kelvin is not None and float(np.ptp(r.kelvin)) > LEAST_RISE_K]
     declared = cell.heat_capacity_j_k
     if not warming or declared is None or cell.surface_area_m2 is None or cell.specific_heat_j_kg_k is None:
@@ -88,7 +89,7 @@ def with_heat(cell: Cell, records: Sequence[Prepared]) -> tuple[Cell, tuple[str,
 
 
 def _losses_explain(cell: Cell, records: Sequence[Prepared]) -> bool:
-    """Do a cell's losses explain temperatures that its surroundings alone do not, with the thermal data of a cell?"""
+    """True where the losses explain the temperatures and the surroundings alone do not, with plausible thermal data."""
     declared = cell.heat_capacity_j_k
     assert declared is not None
     fit, by_surroundings = (fitted(cell, records, declared, losses=losses) for losses in (True, False))
@@ -102,10 +103,10 @@ def _losses_explain(cell: Cell, records: Sequence[Prepared]) -> bool:
 
 
 def fitted(cell: Cell, records: Sequence[Prepared], start_j_k: float, *, losses: bool = True) -> HeatFit:
-    """Least squares over all records, each of which counts as one reading: its errors are of one kind.
+    """Least-squares fit to all records. Each record counts as one reading, since its errors are correlated.
 
-    start_j_k : J/K, where the descent begins.  losses : False for a cell that releases no heat, and
-    follows its surroundings.
+    start_j_k : heat capacity at the start, J/K.  losses : False for a cell that releases no heat and only follows its
+    surroundings.
     """
     driven = [(r, heat_w(cell, r) if losses else np.zeros(len(r.rows))) for r in records]
 
@@ -150,7 +151,7 @@ def heat_w(cell: Cell, record: Prepared) -> Array:
         cell, rows.time_s, rows.current_a, record.start.soc, (), record.kelvin - ZERO_CELSIUS_K, record.hold,
         on_depletion="clip",
     )  # fmt: skip
-    # A charge beyond full or empty, by what the start and the capacity are off by, has the potential of the end.
+    # Errors of start and capacity may take the charge beyond full or empty, where the potential of the limit is used.
     soc = np.clip(run.series["soc"], 0.0, 1.0)
     theta_n, theta_p = cell.balance.stoichiometries(soc)
     entropic = cell.positive.entropic(np.asarray(theta_p)) - cell.negative.entropic(np.asarray(theta_n))

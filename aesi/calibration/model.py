@@ -1,4 +1,4 @@
-"""The model that a calibration fits: a working vector in, residuals and their slopes out."""
+"""The model that a calibration fits: residuals and their slopes as functions of a working vector."""
 
 from __future__ import annotations
 
@@ -24,40 +24,41 @@ from aesi.records import Spectrum
 ELECTRODE_POINTS = 4
 """Points across a porous electrode: four err by 0.14 mV at most on discharges of the shipped cells to 1C."""
 FitState = Literal["declared", "simulated", "fitted"]
-"""State of a calibrated cell: as the start file declares it, by the new file alone, or with what each record has of
-its own."""
+"""State of a calibrated cell: the start file; the new file, without parameters of single records; or the fit, with the
+parameters of each record."""
 MOST_STEPS = 16
-"""Steps of the model between two rows, each of a second where fewer do. A file is simulated in steps of a second, and a
-fit in longer ones makes use of what they err by: a 1C discharge of an LG 18650HG2, rows 10 s apart, that was fitted in
-steps of 10 s to 4.4 mV was missed by 48 mV in steps of half a second. Of the pulses of a Panasonic NCR18650PF at 25
-degC 4 steps of 2 s err by 5.0 mV, 16 of a second by 3.0, any number of them by 3.0, in five times the time."""
+"""Most steps of the model between two rows; they last a second where fewer suffice. A file is simulated in steps of a
+second, and a fit in longer steps would compensate their errors: a 1C discharge of an LG 18650HG2, rows 10 s apart, that
+was fitted in steps of 10 s to 4.4 mV was missed by 48 mV in steps of half a second. On the pulses of a Panasonic
+NCR18650PF at 25 degC 4 steps of 2 s err by 5.0 mV, 16 of a second by 3.0, any number of them by 3.0, in five times the
+time."""
 ERROR_V = 5e-3
-"""What a calibrated single-particle model is expected to miss: the calibrated files leave 4 to 13 mV of the pulses, the
-drive and the 1C discharge at 25 degC that they were fitted to. In `aesi bench calibrate --set
+"""Expected error of a calibrated single-particle model, V: the calibrated files leave 4 to 13 mV on the pulses, the
+drive and the 1C discharge at 25 degC of their fits. In `aesi bench calibrate --set
 evaluations=8` the fitted drive is left with 1.10 mV and the unseen one with 11.1, with half of it 1.09 and 12.5, with
 twice 1.15 and 7.6: this is one virtual cell, on which data that weigh less against the priors carry over better."""
 REPEATS = 10
-"""Rows over which what a model misses stays the same: that many say one thing. A convention. It counts with ERROR_V
-alone, as what one row may be off against the priors: 5 mV times its root, 16 mV. A half or a double of it is 0.7 or 1.4
-times ERROR_V."""
+"""Number of rows over which a model's error is correlated, so that they count as one. A convention. Only its product
+with ERROR_V**2 matters, as the variance of a row against the priors: 5 mV times its root, 16 mV. A half or a double of
+it is 0.7 or 1.4 times ERROR_V."""
 OUTLIER_V = 0.015
-"""Beyond this an error counts by its size and no longer by its square (pseudo-Huber). A convention: three times
-ERROR_V, so that what a model usually misses counts by its square, and the end of a discharge, where potentials fall by
-hundreds of millivolts, does not decide the rest. With half of it the same command leaves 1.10 mV of the fitted and 10.8
-of the unseen drive, with twice 1.10 and 11.5."""
+"""Error beyond which the loss is linear and no longer quadratic (pseudo-Huber), V. A convention: three times ERROR_V,
+so that usual errors count quadratically, and the end of a discharge, where potentials fall by hundreds of millivolts,
+does not dominate. With half of it the same command leaves 1.10 mV on the fitted and 10.8 on the unseen drive, with
+twice 1.10 and 11.5."""
 TELL_SILICON = 2
-"""Least number of slow discharges that tell lost silicon from lost material: with one, the potentials can take up
+"""Fewest slow discharges that distinguish lost silicon from lost material: with one, the potentials can compensate
 either."""
 STEP = 1e-3
-"""Step of finite differences, in deviations of the prior. At the end of a discharge the voltage bends within less
-than larger steps: with 0.02 for global parameters and 0.2 for those of a record, slopes erred by up to 16 and 34 %
+"""Step of finite differences, in standard deviations of the prior. At the end of a discharge the voltage is nonlinear
+over larger steps: with 0.02 for global parameters and 0.2 for those of a record, slopes erred by up to 16 and 34 %
 there, descents to an LG 18650HG2 stopped at a cost of 353.5 and 354.7 instead of 340.1, and a change of the heat
 that moves a voltage by 0.05 mV moved its file by 5 mV at 0 degC."""
 
 
 @dataclass(frozen=True)
 class WorkingVector:
-    """Places of the parts of a working vector.  silicon : whether each record has a silicon of its own."""
+    """Indices of the parts of a working vector.  silicon : whether each record has a silicon coordinate."""
 
     globals: int
     knots: int
@@ -80,7 +81,7 @@ class WorkingVector:
         return self.shapes.stop + len(self.own(0)) * self.records
 
     def own(self, record: int) -> range:
-        """Places of all that a record has of its own."""
+        """Indices of all coordinates of one record."""
         each = 3 if self.silicon else 2
         return range(self.shapes.stop + each * record, self.shapes.stop + each * (record + 1))
 
@@ -132,7 +133,7 @@ class Model:
         self.simulations = 0
 
     def take_heat_of(self, found: Cell) -> None:
-        """Give the start cell the heat capacity and the conductance to the surroundings of this cell, from here on."""
+        """Set the heat capacity and the conductance to the surroundings of the start cell to those of `found`."""
         self.cell = replace(
             self.cell,
             specific_heat_j_kg_k=found.specific_heat_j_kg_k,
@@ -140,23 +141,23 @@ class Model:
         )
 
     def cell_at(self, x: Array) -> Cell:
-        """The cell with all that is global moved."""
+        """The cell with the global parameters of a working vector."""
         values = {f.name: f.value(float(z)) for f, z in zip(self.free, x, strict=False)}
         changed = moved(self.cell, values, self.ageing.dated)
         return self.shapes.on(changed, x[self.layout.shapes])
 
     def material(self, index: int, x: Array) -> float:
-        """Share of its active material that the cell of a record has."""
+        """Share of active material that the cell has left in a record."""
         return self.ageing.share(index, x[self.layout.ages])
 
     def silicon(self, index: int, x: Array) -> float:
-        """Share of its silicon that the cell of a record has, over the file's: slow ones tell it, see `Ageing`."""
+        """Silicon of the cell in a record, as a share of the file's; slow records determine it, see `Ageing`."""
         if not self.layout.silicon:
             return 1.0
         return float(np.exp(SILICON_SD * (self.ageing.silicon[index] @ x[self.layout.silicons])))
 
     def aged(self, cell: Cell, material: float, silicon: float) -> Cell:
-        """The cell with shares of its active material and of its silicon left."""
+        """The cell with these shares of its active material and of its silicon."""
         return replace(cell, negative=with_silicon(cell.negative, self.edge, silicon)).with_material(material)
 
     def run(self, index: int, cell: Cell, x: Array, more: float = 1.0) -> Array:
@@ -167,12 +168,12 @@ class Model:
         return self._solved(index, cell, x, more)[0]
 
     def ran_out_s(self, index: int, cell: Cell, x: Array) -> float | None:
-        """When a record's simulation runs out of charge or salt, s; None where it does not."""
+        """Time at which a record's simulation runs out of lithium or salt, s; None where it does not."""
         at = self._solved(index, cell, x, 1.0)[1]
         return None if at < 0 else float(self.records[index].rows.time_s[at])
 
     def _solved(self, index: int, cell: Cell, x: Array, more: float) -> tuple[Array, int]:
-        """Rows of a record's simulation, and the first that has no charge or no salt left; -1 where all have."""
+        """(rows of a record's simulation, number of the first row without lithium or salt, -1 for none)."""
         self.simulations += 1
         record = self.records[index]
         model = EspmModel(
@@ -189,9 +190,10 @@ class Model:
         return rows, at
 
     def as_simulated(self, x: Array) -> Array:
-        """The working vector with nothing that a record has of its own: the file's state, currents as measured.
+        """The working vector without the parameters of single records: the file's state, currents as measured.
 
-        A start that no full charge tells stays: a simulation reads it from the voltage.
+        A fitted initial state is kept unless the record begins with a full charge, since a simulation reads the state
+        from the voltage.
         """
         out = x.copy()
         out[self.layout.zero] = self.zero.nought
@@ -202,10 +204,9 @@ class Model:
         return out
 
     def states(self, declared: Cell, x: Array) -> dict[FitState, tuple[Cell, Array]]:
-        """The states of a fit that ended at `x`, by name: the cell, and the working vector that its records are
-        simulated with.
+        """State -> (cell, working vector for the simulation of its records), for a fit that ended at `x`.
 
-        The declared cell has lost nothing, and takes currents as measured, as the file does when it is simulated.
+        The declared cell has lost nothing, and takes currents as measured, like a file in a simulation.
         """
         nothing, simulated = self.as_simulated(np.zeros(self.layout.size)), self.as_simulated(x)
         return {
@@ -215,23 +216,23 @@ class Model:
         }
 
     def errors(self, x: Array) -> list[Array]:
-        """(rows,) V of each record, measured less model."""
+        """(rows,) V of each record, measured - model."""
         return self.errors_of(self.cell_at(x), x)
 
     def errors_of(self, cell: Cell, x: Array) -> list[Array]:
-        """(rows,) V of each record, measured less this cell's, with what the working vector says of the record."""
+        """(rows,) V of each record, measured - simulated with `cell` and the record's part of the working vector."""
         return [r.rows.voltage_v - self.run(i, cell, x)[0] for i, r in enumerate(self.records)]
 
     def residual(self, x: Array) -> Array:
-        """Errors of all rows over what they are expected to be, large ones by their size, the misfits of spectra, and
-        the priors."""
+        """The least-squares residual: errors of all rows over their expected size, with a linear loss for large ones;
+        misfits of the spectra; the priors."""
         cell = self.cell_at(x)
         misfits = [w * saturated(e) for w, e in zip(self.weights, self.errors_of(cell, x), strict=True)]
         return np.concatenate([*misfits, self.spectra.misfits(cell), x])
 
     def jacobian(self, x: Array) -> Array:
-        """(rows + 2 frequencies + n, n) slopes of `residual`: one-sided differences, and for records in closed form
-        those over the knots of potentials."""
+        """(rows + 2 frequencies + n, n) slopes of `residual`: one-sided differences, except the slopes of records over
+        the knots of potentials, which have a closed form."""
         cell = self.cell_at(x)
         runs = [self.run(i, cell, x) for i in range(len(self.records))]
         blocks, of_spectra = self._differences(cell, x, [run[0] for run in runs])
@@ -252,8 +253,8 @@ class Model:
         return slice(first, first + self.shapes.closed)
 
     def _differences(self, cell: Cell, x: Array, voltages_v: Sequence[Array]) -> tuple[list[Array], Array]:
-        """One-sided differences over what the records share: of each record's voltage, (rows, n), except over the knots
-        of potentials, and of the misfits of the spectra, (2 frequencies, n).
+        """One-sided differences over the parameters that records share: (of each record's voltage (rows, n), without
+        the knots of potentials; of the misfits of the spectra (2 frequencies, n)).
 
         voltages_v : (rows,) of each record at x.
         """
@@ -276,8 +277,8 @@ class Model:
         return blocks, of_spectra
 
     def _set_own_slopes(self, index: int, cell: Cell, x: Array, voltage_v: Array, block: Array) -> None:
-        """Set the slopes of a record's voltage over what records have of their own: records of one course of ageing
-        are moved by one another's coordinates, too.
+        """Set the slopes of a record's voltage over the coordinates of single records. In one course of ageing a record
+        depends on the coordinates of others, too.
 
         voltage_v : (rows,) at x.  block : (rows, n).
         """
@@ -299,7 +300,7 @@ class Model:
 
 
 def saturated(error_v: Array) -> Array:
-    """V whose square is twice the pseudo-Huber loss of the errors."""
+    """(n,) V, errors whose square is twice the pseudo-Huber loss of `error_v`."""
     scale = error_v / OUTLIER_V
     return np.sign(error_v) * OUTLIER_V * np.sqrt(2.0 * (np.sqrt(1.0 + scale**2) - 1.0))
 

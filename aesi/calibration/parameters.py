@@ -1,4 +1,4 @@
-"""What a calibration may move: parameters of the cell with priors from the literature, and how a cell takes them.
+"""The free parameters of a calibration, with priors from the literature, and their application to a cell.
 
 Every parameter moves in the coordinate z = (value - start)/sd, of the logarithm where it is a factor, so that its prior
 is a standard normal deviate.
@@ -21,20 +21,20 @@ from aesi.physics.cell.parts import NO_FILM
 from aesi.physics.cell.relations import Constant, LookupTable, Product, Relation, scaled
 
 LIMIT_SD = 4.0
-"""No parameter goes further than this many of its prior's deviations."""
+"""Bound of every parameter, in standard deviations of its prior."""
 OF_LOGARITHM = " of its natural logarithm"
 PLACES = tuple(0.5 - 0.5 * np.cos(np.pi * np.linspace(0.0, 1.0, 7)))
-"""Knots of a diffusivity's and of a rate's course, shares of an electrode's window: dense at both ends, where either
-falls off. Pulse tests come at ten states of charge or more."""
+"""Knots of a course (a diffusivity or a rate over stoichiometry), as shares of an electrode's window: dense at both
+ends, where both decrease. Pulse tests have ten states of charge or more."""
 COURSE_POINTS = 65
-"""Points of the table that a course becomes, one every 1.6 % of the window."""
+"""Points of the table of a course, one every 1.6 % of the window."""
 
 
 @dataclass(frozen=True)
 class Free:
-    """One free scalar: start (what is times the start file's starts at 1), prior deviation, unit, source.
+    """One free scalar: start value (1 for a factor on the start file's value), prior standard deviation, unit, source.
 
-    factor : the deviation is of the natural logarithm.  given : the prior is what a user knows of it from elsewhere.
+    factor : True where the standard deviation is that of the natural logarithm.  given : True for a user's prior.
     """
 
     name: str
@@ -48,7 +48,7 @@ class Free:
     given: bool = False
 
     def value(self, z: float) -> float:
-        """The value at a working coordinate; that of the bound beyond it."""
+        """The value at a working coordinate, clipped to the bounds."""
         if self.factor:
             return self.start * float(np.exp(self.sd * z))
         return min(max(self.start + self.sd * z, self.low), self.high)
@@ -58,7 +58,7 @@ class Free:
         """(lower, upper) of the working coordinate."""
         low = -LIMIT_SD if self.factor else max(-LIMIT_SD, (self.low - self.start) / self.sd)
         high = LIMIT_SD if self.factor else min(LIMIT_SD, (self.high - self.start) / self.sd)
-        # Where the start is on a bound, as at nought of a resistance: `least_squares` wants it strictly inside.
+        # The start may be on a bound (a resistance of zero), but `least_squares` needs it strictly inside.
         return min(low, -1e-9), max(high, 1e-9)
 
 
@@ -66,23 +66,25 @@ RATE_SD, SALT_SD = 0.8, 0.35
 """Deviations of logarithms. Wider ones let a drive at one temperature trade kinetics for a slow electrolyte, and an LG
 18650HG2 then runs out of salt under its US06."""
 CONTACT_V = 0.03
-"""V at 1C: what contacts (tabs, collectors, can) are taken to drop, and the prior's deviation: a convention. It was
-chosen after the 12 mohm that pulses at four temperatures gave of a Panasonic NCR18650PF (35 mV at its 2.9 Ah); the file
-that they calibrate has 15.4 mohm now, where 0.03 V are 10.7. From nought, which no cell has, a fit at one temperature
-takes films for contacts, and films grow in the cold: of that cell's pulses at 0 and -10 degC a file of its C/20, 1C
-discharge and a drive at 25 degC then misses 70 and 137 mV, from here 55 and 112, both with films of 60 kJ/mol.
+"""Voltage drop of the contacts (tabs, collectors, can) at 1C, V, as prior mean and standard deviation: a convention. It
+was chosen after the 12 mohm that pulses at four temperatures gave for a Panasonic NCR18650PF (35 mV at its 2.9 Ah); the
+file that they calibrate has 15.4 mohm now, where 0.03 V are 10.7. From a start at zero, which no cell has, a fit at one
+temperature attributes contacts to films, which grow in the cold: on that cell's pulses at 0 and -10 degC a file
+of its C/20, 1C discharge and a drive at 25 degC then errs by 70 and 137 mV, from here by 55 and 112, both with films of
+60 kJ/mol.
 In `aesi bench calibrate --set evaluations=8`, whose truth has contacts of 8 mohm, it finds 5.6 [0.5, 10.7] mohm, with
 half of it 3.7 [0, 8.4], with twice 8.1 [4.2, 12.0], at 11.1, 11.3 and 9.0 mV on the unseen drive. With 0.06 V, and
 kinetics and electrolyte left as much wider, the calibration of an LG 18650HG2 ended at kinetics a hundred times quicker
 and an electrolyte a third slower, 80 mV off at 0 degC."""
 CONTACTS = "convention: 0.03 V at 1C; of a cell of 2.8 Ah pulses at four temperatures tell 15.4 mohm"
 FULLEST = 0.95
-"""Stoichiometry of an electrode that is as full as a charged cell's may be: beyond, its kinetics stand still."""
+"""Largest stoichiometry of an electrode in a charged cell: beyond it, the kinetics stop."""
 RATES = "convention: rates of cells of one chemistry scatter by a factor of three either way; no source"
 TORTUOSITY = "convention: tortuosities scatter by a third; no source"
 FILM_OHM_M2, FILM_SD = 3e-3, 1.2
 """A convention: three times the source, whose area is that of smooth spheres under a thin film. The 10 mohm m2 that are
-told of Ramadass et al. 2004 were not found; PyBaMM's notes on that paper speak of faults in its units and values."""
+attributed to Ramadass et al. 2004 were not found; PyBaMM's notes on that paper mention faults in its units and
+values."""
 FILMS = (
     "1 mohm m2 (5 nm of 2e5 ohm m) in PyBaMM's parameter sets, after Ramadass et al. 2004 as corrected by Safari et "
     "al. 2009"
@@ -220,10 +222,11 @@ def _with_prior(one: Free, prior: Prior) -> Free:
 
 
 def moved(cell: Cell, values: Mapping[str, float], ages: bool = False) -> Cell:
-    """The cell with global parameters replaced; windows as wide as its capacity in the new electrodes.
+    """The cell with global parameters replaced; the stoichiometry windows follow from its capacity in the new
+    electrodes.
 
-    ages : its records are of a course of ageing. The capacity goes with the size of both electrodes then, so that a
-    larger file and smaller shares of its records are one model.
+    ages : True where its records are a course of ageing. The capacity then scales with the size of both electrodes, so
+    that a larger file with smaller shares of its records is the same model.
     """
     n1 = values.get("negative.full_stoichiometry", cell.negative.theta_max)
     p1 = values.get("positive.full_stoichiometry", cell.positive.theta_min)
@@ -256,7 +259,7 @@ def moved(cell: Cell, values: Mapping[str, float], ages: bool = False) -> Cell:
 
 
 def course(side: str, what: str, place: int) -> str:
-    """Name of a knot: `place` nought at the least stoichiometry of the window."""
+    """Name of a knot; `place` 0 is at the lowest stoichiometry of the window."""
     return f"{side}.{what}_at_{round(100 * PLACES[place])}_percent"
 
 

@@ -1,14 +1,14 @@
 """Posterior samples of a calibration, drawn by emcee, to check the intervals of the linearised fit.
 
-The potentials' knots, the cycler's zero, and the states of charge, the active material and the silicon of each record
-enter the voltage all but linearly; they are integrated out in closed form about each sample, so that the walkers move
-in the global parameters alone:
+The voltage is nearly linear in the potentials' knots, the cycler's zero, and the states of charge, the active material
+and the silicon of each record. These are integrated out in closed form about each sample, so that the walkers move in
+the global parameters alone:
 
     log p(z) = -1/2 (r' r - b' H^-1 b) - 1/2 log det H,      H = J_l' J_l + 1,   b = J_l' r
 
-r the weighted residuals at z with the linear ones where the fit put them, J_l their slopes.
-What a cell lost between dated records is not linear: it is |e|, whose slope over its coordinate is 0.07, 0.63 and 0.91
-at -2, 0 and 2 (`Ageing.slopes`). Its interval is that of the slope at the fit.
+r are the weighted residuals at z with the linear parameters at their fitted values, J_l their slopes.
+Losses between dated records are not linear: they are |e|, whose slope over its coordinate is 0.07, 0.63 and 0.91 at -2,
+0 and 2 (`Ageing.slopes`). Their intervals use the slope at the fit.
 Foreman-Mackey et al., PASP 125 (2013) 306, doi:10.1086/670067.
 """
 
@@ -25,11 +25,11 @@ from aesi.errors import InputError
 from aesi.numerics.typing import Array
 
 BURNT = 0.5
-"""Share of the steps, at the start, that is thrown away."""
+"""Share of the first steps that is discarded (burn-in)."""
 FEWEST_STEPS = 4
 """Fewest steps of each walker; half of them are burnt."""
 SPREAD = 0.5
-"""Walkers start this many deviations of the linearised fit about it."""
+"""Standard deviation of the walkers' starts about the fit, in those of the linearised posterior."""
 
 
 @dataclass(frozen=True, eq=False)

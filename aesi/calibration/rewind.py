@@ -1,8 +1,8 @@
-"""The cell that a calibration writes: one state of health, with full and empty where the records show them.
+"""The cell that a calibration writes: in one state of health, with full and empty as the records show them.
 
-Whoever simulates a file mostly gives no state of health. So the fit is of a cell in one state, from which each record
-may differ in active material and silicon, within a prior: the file is the state that serves all records. How much of
-the file's capacity the cell had in each record is in `capacities`.
+A file is mostly simulated without a state of health. The fit is therefore of a cell in one state, from which each
+record may differ in active material and silicon within a prior. `capacities` has the capacity of the cell in each
+record, relative to the file's.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from aesi.physics.cell import Cell
 
 
 def rewound(model: Model, x: Array) -> Cell:
-    """The cell with full where its charged records started, and empty where it rests at its lower voltage."""
+    """The cell with full at the fitted start of its charged records, and empty at a rest voltage of its lower limit."""
     return _as_aged(model, x, 1.0, 1.0)
 
 
 def capacities(model: Model, x: Array) -> dict[str, float]:
-    """Record -> share of the written cell's capacity that the cell had then."""
+    """Record -> capacity of the cell then over that of the written cell."""
     written_ah = rewound(model, x).capacity_ah
     return {
         r.name: _as_aged(model, x, model.material(i, x), model.silicon(i, x)).capacity_ah / written_ah
@@ -32,9 +32,10 @@ def capacities(model: Model, x: Array) -> dict[str, float]:
 
 
 def start_soc(model: Model, x: Array, index: int) -> float:
-    """State of charge at which a record starts, in the windows of the written cell, aged as it was in that record.
+    """State of charge at the start of a record, in the windows of the written cell aged as in that record.
 
-    Both cells rest at the same voltage there; in the windows of the fit, empty need not be at the lower voltage.
+    It has the same rest voltage as the fitted start. The windows differ, since in those of the fit empty need not be at
+    the lower voltage limit.
     """
     record = model.records[index]
     material, silicon = model.material(index, x), model.silicon(index, x)

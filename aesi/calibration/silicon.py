@@ -1,13 +1,13 @@
-"""What a composite negative electrode's silicon has lost by the time of a record.
+"""Loss of silicon in a composite negative electrode up to the time of a record.
 
-Silicon gives up its lithium after the graphite, above `SILICON_V`, and loses capacity first. A cell that lost some of
-it keeps every feature of its graphite at the same charge from full and is empty sooner: the end of the negative
-potential draws together towards the stoichiometry x_s at which silicon begins,
+Silicon is delithiated after the graphite, above `SILICON_V`, and loses capacity first. In a cell that lost silicon
+every feature of the graphite stays at the same charge from full, and empty comes earlier: the end of the negative
+potential is compressed towards the stoichiometry x_s at which silicon begins,
 
     U_then(x) = U(x_s - (x_s - x)/share)        x < x_s                                                       (1)
 
-A negative electrode whose potential in the file is that of graphite has none (`may_have_silicon`). Of the others
-nobody knows whether they have: what (1) tells is the capacity of the electrode above `SILICON_V`.
+A negative electrode whose potential in the file is that of graphite has no silicon (`may_have_silicon`). The others may
+or may not have it: (1) only changes the capacity of the electrode above `SILICON_V`.
 
 Seen on the C/20 discharges of an LG 18650HG2 at 25, 40 and 0 degC, the cycler's zero taken out: 2.87, 2.77 and 2.68 Ah
 to 2.8 V, with the peaks of dV/dQ at the same 1.1 and 2.1 Ah and the same edge at 2.35 Ah; what follows the edge takes
@@ -41,7 +41,7 @@ SILICON_SD = 0.3
 
 
 def silicon_edge(electrode: Electrode) -> float:
-    """Stoichiometry below which the electrode gives up its lithium above `SILICON_V`."""
+    """x_s of (1): stoichiometry below which the potential of the electrode is above `SILICON_V`."""
     x = np.linspace(1e-6, 1.0 - 1e-6, GRID)
     return float(x[int(np.argmax(electrode.ocp(x) < SILICON_V))])
 
@@ -53,12 +53,12 @@ def may_have_silicon(electrode: Electrode) -> bool:
 
 
 def stretched(x: Array, edge: float, share: float) -> Array:
-    """(n,) stoichiometries of the electrode as new that have the potential of x (n,) now, (1); may be below nought."""
+    """(n,) stoichiometries of the new electrode with the potential of x (n,) in the aged one, (1); may be negative."""
     return np.where(x < edge, edge - (edge - x) / share, x)
 
 
 def with_silicon(electrode: Electrode, edge: float, share: float) -> Electrode:
-    """The electrode with a share of its silicon's capacity, (1)."""
+    """The electrode with this share of its silicon's capacity left, (1)."""
     if share == 1.0:
         return electrode
     x = np.linspace(0.0, 1.0, GRID)

@@ -1,4 +1,4 @@
-"""What a calibration starts from: the cell scaled to the data, and the part of each record that it can follow."""
+"""The start of a calibration: the cell scaled to the data, and the part of each record that the model can follow."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from aesi.records import Hold, Measurement
 TYPICAL_SOLID_EA_J_MOL = 30e3
 TYPICAL_RATE_EA_J_MOL = 35e3
 TYPICAL_ELECTROLYTE_EA_J_MOL = 17.1e3
-"""Activation energies that stand in where the file declares none: a cell answers to temperature, and data at one
-temperature cannot say how much. Records of several temperatures move them from there, see
+"""Activation energies for a file that declares none: every cell depends on temperature, and data at one temperature
+cannot determine how much. Records of several temperatures move them from these values, see
 `aesi.calibration.parameters`.
 Diffusion in graphite and the conductivity as in Ecker et al., J. Electrochem. Soc. 162 (2015) A1836 (30.3, 17.1), rates
 as of graphite in O'Kane et al., Phys. Chem. Chem. Phys. 24 (2022) 7909 (35), all as PyBaMM's parameter sets have
@@ -29,17 +29,17 @@ reads. More would take the end of a charge at constant voltage for a rest: that 
 largest current. The noise that hides in the small current of a slow record is another matter, see
 `aesi.calibration.records.zero.steadily_flowing`."""
 FULL_WINDOW_V = 0.15
-"""A discharge is a full one if it starts within this of the upper limit and ends within twice this of the lower."""
+"""A full discharge starts within this voltage of the upper limit, V, and ends within twice this of the lower."""
 ALL_OF_IT = 0.95
-"""Least share of the most charge that a record takes out of a cell for which its lowest voltage counts as empty.
-Where less has left, a pulse reached the limit, which happens at any state of charge in the cold; and where as much of
-what was taken was given back, the cell was charged. A convention."""
+"""Least charge taken out at the lowest voltage, as a share of the most that a record takes out, for this voltage to
+count as empty. With less, a pulse reached the limit, which happens at any state of charge in the cold. Likewise the
+cell counts as charged again where this share of the charge taken was returned. A convention."""
 NEAR_THE_SIZE = 0.5
-"""Least share of the largest full discharge that another one has to have: a smaller one is of another cell, or in
-another unit, and tells no size. A convention."""
+"""Least ratio of a full discharge to the largest one: a smaller one is of another cell, or in another unit, and does
+not determine the size. A convention."""
 LONG_CHARGE = 0.3
-"""Share of the capacity, or of the most that was taken: a longer charge changes the branch of the hysteresis, where
-there is one."""
+"""Charge, as a share of the capacity or of the most that was taken out, beyond which a charging phase changes the
+branch of a hysteresis."""
 
 
 def sized(cell: Cell, measurements: Sequence[Measurement]) -> tuple[Cell, tuple[str, ...]]:
@@ -55,10 +55,9 @@ def sized(cell: Cell, measurements: Sequence[Measurement]) -> tuple[Cell, tuple[
 
 
 def of_area(cell: Cell, factor: float, nominal_ah: float) -> Cell:
-    """The cell with this factor on its area: twice as large a cell drops as much over its contacts at twice the
-    current.
+    """The cell with its area multiplied by a factor, and its contact resistance divided by it.
 
-    nominal_ah : Ah, its new nominal capacity.
+    nominal_ah : its new nominal capacity, Ah.
     """
     return replace(
         cell,
@@ -80,8 +79,8 @@ def _full_discharges_ah(cell: Cell, measurements: Sequence[Measurement]) -> list
 
 
 def size_assumed(cell: Cell, measurements: Sequence[Measurement]) -> str:
-    """A sentence that the size of the cell is the file's; '' where a full discharge among the measurements tells it.
-    A fit then speaks of capacity within its windows of stoichiometry only: the size is no parameter of it."""
+    """A sentence that the size of the cell is the file's; '' where a full discharge among the measurements determines
+    it. Without one a fit only moves the stoichiometry windows, since the size is no parameter of it."""
     if any(q is not None for q in _full_discharges_ah(cell, measurements)):
         return ""
     return (
@@ -93,8 +92,8 @@ def size_assumed(cell: Cell, measurements: Sequence[Measurement]) -> str:
 
 
 def declared_energies(cell: Cell) -> dict[str, float]:
-    """Activation energies of the cell, J/mol, by the name of the parameter that moves them in a fit; 0 for one that it
-    does not declare. Those of films are there where it has films that answer to temperature."""
+    """Name of the parameter in a fit -> activation energy of the cell, J/mol; 0 where the cell declares none. Films are
+    included where the cell has films that depend on temperature."""
     n, p, e = cell.negative, cell.positive, cell.electrolyte
     films = {"negative.film_energy": n.film_ea_j_mol, "positive.film_energy": p.film_ea_j_mol}
     return {
@@ -156,7 +155,7 @@ def of_activation(
 
 
 def one_branch(cell: Cell, data: Measurement) -> tuple[Measurement, tuple[str, ...]]:
-    """The record without long charges before or after its discharge, and a sentence that says so.
+    """(record without long charges before or after its discharge, a sentence where something was cut).
 
     A model without hysteresis has one open-circuit potential: that of the discharge, where the data show both.
     """
@@ -189,13 +188,13 @@ def flowing(current_a: Array) -> BoolArray:
 
 
 def _numbered(flags: BoolArray) -> Array:
-    """(n,) the number of the run of equal flags that each element is in."""
+    """(n,) number of the run of equal flags of each element."""
     return np.cumsum(np.diff(flags.astype(int), prepend=int(flags[0])) != 0)
 
 
 def _full_discharge_ah(cell: Cell, data: Measurement) -> float | None:
-    """Charge from full to empty: the most that a stretch of the record takes from one to the other, None where none
-    does. A stretch begins where the cell is full, and ends where it has been charged to there again."""
+    """The largest charge from full to empty in a stretch of the record, Ah; None where there is none. A stretch begins
+    where the cell is full, and ends where it has been charged to full again."""
     full = data.voltage_v >= cell.upper_voltage_v - FULL_WINDOW_V
     # A full cell of a flat potential falls by more at rest; where it is being charged, any state may be as high.
     charged = data.current_a < -OPEN_SHARE * np.abs(data.current_a).max()
@@ -218,9 +217,10 @@ def _full_discharge_ah(cell: Cell, data: Measurement) -> float | None:
 
 
 def _recharged(taken_ah: Array, full: BoolArray) -> int:
-    """The row of a stretch at which the cell has been charged to full again, or their number where it has not.
+    """Number of the row of a stretch at which the cell has been charged to full again, or the number of rows.
 
-    taken_ah : (n,) since it was full.  A cell that rests near full, or that a pulse left there, is still discharged.
+    taken_ah : (n,) Ah taken out since it was full.  full : (n,) True for rows near full. A cell that is near full at
+    rest, or after a pulse, has not been charged again.
     """
     if not len(taken_ah):
         return 0
@@ -231,7 +231,7 @@ def _recharged(taken_ah: Array, full: BoolArray) -> int:
 
 
 def _emptied_ah(cell: Cell, data: Measurement, taken_ah: Array, start: int, stop: int) -> float | None:
-    """Charge from a full row to the lowest voltage before another, or None where that is not empty."""
+    """Charge from a full row to the lowest voltage before the next full row, Ah; None where that is not empty."""
     end = start + int(np.argmin(data.voltage_v[start:stop]))
     if data.voltage_v[end] > cell.lower_voltage_v + 2 * FULL_WINDOW_V:
         return None
@@ -242,6 +242,6 @@ def _emptied_ah(cell: Cell, data: Measurement, taken_ah: Array, start: int, stop
 
 
 def hold_counted(data: Measurement) -> Hold:
-    """How the charge of a record is counted, and its thinned rows run: as declared; undeclared rows are a logger's, or
-    so close that either will do."""
+    """The hold for the charge of a record and for its thinned rows: the declared one; else that of a logger, which
+    makes no difference for dense rows."""
     return data.hold or "backward"

@@ -1,7 +1,7 @@
 """Prediction intervals of the voltage error: one step ahead, online; and free run, by horizon."""
 
 from aesi.conformal.free_run import FreeRunBands
-from aesi.conformal.horizon_band import WHOLE_DRIVE
+from aesi.conformal.horizon_band import WHOLE_DRIVE, TooFewPieces
 from aesi.conformal.intervals import Intervals
 from aesi.conformal.online.calibrated import Calibrated, Stream
 from aesi.conformal.online.method import Method
@@ -21,5 +21,6 @@ __all__ = [
     "RefittedForest",
     "RefittedIntervals",
     "Stream",
+    "TooFewPieces",
     "calibrated_from_dict",
 ]

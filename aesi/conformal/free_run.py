@@ -1,8 +1,8 @@
 """Prediction bands of a free run by horizon, the time since the last measured voltage: CV+ over pieces of drives.
 
 Errors of a free run are autocorrelated over minutes, so the exchangeable unit is a piece of a drive and not a sample.
-The errors of piece i are normalised, |error| / s_i, by a scale that follows what the fitted rows leave open of the
-physics and of the correction (`local_scale`) and is fitted to the pieces that share no row with it. The half-width
+The errors of piece i are normalised, |error| / s_i, by a scale that follows the uncertainty of physics and correction
+given the fitted rows (`local_scale`). s_i is fitted to the pieces that share no row with piece i. The half-width
 k h at a sample solves
 
     sum_i n_i [share of the normalised errors r of piece i with s_i r <= h]   =   (1 - alpha) sum_i n_i        (1)
@@ -13,10 +13,10 @@ piece counts with the scale that the other pieces predict for it, so it cannot w
 Barber, Candès, Ramdas & Tibshirani, Ann. Statist. 49 (2021) 486, doi:10.1214/20-AOS1965.
 
 A quantile estimated from few pieces is exceeded too often by the next one. (2) widens the band as Student's t does for
-a normal error of unknown variance. Pieces that were cut from one left-out stretch of a drive err alike over a whole
-drive, so where it is said how many stretches there are, m is their number. Halves of a repeat that are left out by
-themselves count as two. Were the error of a drive one level throughout, the bands of three drives would cover 85 % so
-instead of 90. On measured drives it is not: over the development splits of `aesi bench splits` that train on three
+a normal error of unknown variance. Pieces that were cut from one left-out stretch of a drive have similar errors over a
+whole drive, so where the number of stretches is given, m is that. Halves of a repeat that are left out separately count
+as two. If the error of a drive were constant, the bands of three drives would then cover 85 % instead of 90. On
+measured drives it is not: over the development splits of `aesi bench splits` that train on three
 parts of the NMC drive the bands of the declared model cover 92.7 % and score 93.7 mV, and 97.1 % and 112.3 mV with the
 number of drives for m. At short horizons the errors within a piece
 are independent over much shorter times: every FORGOTTEN horizons of a piece count as one.
@@ -25,13 +25,13 @@ Only rows inside the range that their model was trained on are counted: a model 
 drive extrapolates there, the final model does not. Outside the trained range the inputs are held at its edge, and the
 band is wider by as much as the prediction would move if the model were extrapolated (`SparseModel.reach`).
 
-No piece tells of temperatures that no fitted row had, so rows at such calibrate nothing, of any model, unless too few
-pieces are left without them. What is open of the activation energies there stands beside the calibrated width as an
-independent error (parameter_spread.py). So does what is open of the state of charge that a record starts from, where it
-was read from a voltage: the pieces of a drive start where the rows before them end.
+Pieces have no information on temperatures that no fitted row had. Rows at such temperatures are left out of the
+calibration of every model, unless too few pieces remain. The uncertainty of the activation energies there is added to
+the calibrated width as an independent error (parameter_spread.py). So is the uncertainty of the initial state of charge
+of a record, where it was read from a voltage: the pieces of a drive start where the rows before them end.
 
-Parts of a drive lie closer to what their models were fitted to than a drive that comes next, and whole drives may lie
-further away; both are left out, and calibrate together, since the scale tells how far each was.
+Parts of a drive are closer to the training data of their models than the next drive is, and whole drives may be further
+away. Both are left out and used together, since the scale accounts for the distance.
 
 Coverage is about 1 - alpha on average over pieces exchangeable with those of the calibration. With few pieces the
 coverage of a single drive scatters by many points about that; `HorizonBand.by_piece`, the coverage of each left-out
@@ -63,9 +63,9 @@ SCHEMA = "aesi.free_run_bands/8"
 class FreeRunBands:
     """Bands at miss rate `alpha` for each calibrated horizon, shortest first.
 
-    seen : what the model was fitted to.  root : what that leaves open of the first parameters that a record has slopes
-    of, energies_j_mol : what is open of the change of parameters with temperature (parameter_spread.py). Each is None
-    where nothing is known of it.
+    seen : states of charge and temperatures of the fitted rows.  root : (k, k) root of the posterior covariance of the
+    first k parameters of which a record has slopes.  energies_j_mol : standard deviation of the activation energy of
+    each parameter, J/mol (parameter_spread.py). Each is None where it is not known.
     """
 
     alpha: float
@@ -75,7 +75,7 @@ class FreeRunBands:
     energies_j_mol: Array | None = None
 
     def __repr__(self) -> str:
-        return f"FreeRunBands({100 * (1 - self.alpha):.0f} %, {len(self.horizons)} horizons)"
+        return f"FreeRunBands({100 * (1 - self.alpha):g} %, {len(self.horizons)} horizons)"
 
     @classmethod
     def fit(
@@ -92,22 +92,22 @@ class FreeRunBands:
         stretches: int | None = None,
         records: Sequence[str] | None = None,
     ) -> FreeRunBands:
-        """Calibrate on out-of-sample prediction errors: of records, or pieces, that the model was not fitted to.
+        """The bands calibrated on out-of-sample prediction errors: of records, or pieces, not in the model's fit.
 
-        errors_by_horizon : horizon in s (WHOLE_DRIVE: from the start of the record) -> one (n_i,) array a
-        continuous record, V, measured minus predicted at that sample from a measurement `horizon` earlier;
-        NaN where there is no such prediction.  dt_s : s.
-        spread_v : one (n_i,) array a record, V, what the fit without it leaves open of the physics there.
-        inside : one (n_i,) array a record, True inside the trained range of the model that predicted; None for
+        errors_by_horizon : horizon in s (WHOLE_DRIVE: from the start of the record) -> one (n_i,) array per continuous
+        record, V, measured minus predicted at each sample from a measurement `horizon` earlier; NaN where there is no
+        such prediction.  dt_s : sampling interval, s.  alpha : miss rate, 0 to 1.
+        spread_v : one (n_i,) array per record, V, spread of the physics of a fit without that record.
+        inside : one (n_i,) array per record, True inside the trained range of the model that predicted; None for
         everywhere.
-        excess : one (n_i,) array a record, `FreeRun.excess` of that model; None where it keeps no leverage.
+        excess : one (n_i,) array per record, `FreeRun.excess` of that model; None where it has no leverage.
         seen, root, energies_j_mol : of the model that the bands are for.
-        stretches : how many stretches of the records err independently over a whole drive; by default their pieces.
-        records : the name of the record that each array is of, where several are of one (its rows numbered alike): no
-        piece is scored by a scale that is fitted to its own rows under another model. By default each is of its own.
+        stretches : number of stretches with independent errors over a whole drive; None takes the number of pieces.
+        records : name of the record of each array, where several arrays are of one record (with the same row numbers):
+        no piece is scored by a scale that was fitted to its own rows. None where each array is a record of its own.
 
-        Raises InputError for arrays that do not match, FitError for too few pieces, or none that shares no row with
-        one, and for errors all zero.
+        Raises InputError for arrays that do not match; FitError for too few pieces, for a piece that shares rows with
+        all others, and for errors that are all zero.
         """
         if not errors_by_horizon:
             raise InputError("no horizon to calibrate; give errors for at least one.")
@@ -136,12 +136,12 @@ class FreeRunBands:
         reach_v: Array | float = 0.0,
         open_v: Array | float = 0.0,
     ) -> tuple[Array, Array]:
-        """(low, high), (n,) V relative to predictions made `horizon_s` ahead; between two calibrated horizons
+        """(low, high), (n,) V relative to predictions made `horizon_s` (s) ahead; between two calibrated horizons
         the half-width is interpolated in the logarithm of time.
 
-        spread_v : (n,) of `spread`.  reach_v : (n,) what to add to the half-width, how far the prediction would move if
-        the model went on beyond its trained range.  open_v : (n,) V, standard deviation of what no piece tells of, such
-        as `thermal`.
+        spread_v : (n,) V, from `spread`.  reach_v : (n,) V, added to the half-width: change of the prediction if the
+        model were extrapolated beyond its trained range.  open_v : (n,) V, standard deviation of errors that the pieces
+        do not contain, such as `thermal`.
         """
         elapsed = np.full(len(spread_v), horizon_s)
         return self._around(elapsed, spread_v, excess, reach_v, open_v)
@@ -154,27 +154,27 @@ class FreeRunBands:
         reach_v: Array | float = 0.0,
         open_v: Array | float = 0.0,
     ) -> tuple[Array, Array]:
-        """(low, high), (n,) V relative to a free run of n samples from a measurement at its first sample.
+        """(low, high), (n,) V relative to a free run of n samples, every `dt_s` (s), from a measurement at its first.
 
-        Below the shortest horizon its band holds; from ten times the longest finite one on, that of the
-        whole drive.  spread_v, reach_v, open_v : as for `at`.
+        Times below the shortest horizon have its band; times from ten times the longest finite horizon on have that of
+        the whole drive.  spread_v, reach_v, open_v : as for `at`.
         """
         elapsed = dt_s * np.arange(len(spread_v), dtype=np.float64)
         return self._around(elapsed, spread_v, excess, reach_v, open_v)
 
     def spread(self, series: ErrorSeries) -> Array:
-        """(n,) V, what the fitted rows leave open of the physics along a record; nought where that is not known.
+        """(n,) V, standard deviation of the physics along a record given the fitted rows; 0 where that is not known.
 
-        Raises InputError for a record without the slopes that it takes."""
+        Raises InputError for a record without the necessary slopes."""
         if self.root is None:
             return np.zeros(len(series))
         return spread(_slopes(series, len(self.root)), self.root)
 
     def thermal(self, series: ErrorSeries) -> Array:
-        """(n,) V, what the fitted temperatures leave open of the physics along a record; nought where that is not
-        known, or the temperature was not measured.
+        """(n,) V, standard deviation of the physics along a record by its distance from the fitted temperatures; 0
+        where that is not known, or the temperature was not measured.
 
-        Raises InputError for a record without the slopes that it takes."""
+        Raises InputError for a record without the necessary slopes."""
         if self.energies_j_mol is None or self.seen is None:
             return np.zeros(len(series))
         slopes = _slopes(series, len(self.energies_j_mol))
@@ -229,7 +229,7 @@ class FreeRunBands:
     ) -> tuple[Array, Array]:
         columns = covariates(spread_v, excess)
         halves = np.array([band.half_width(columns) for band in self.horizons])
-        # What an earlier measurement takes off the calibrated width, it takes off what is open beside it too.
+        # A recent measurement reduces the independent error in the same ratio as the calibrated width.
         beside_v, whole = ndtri(1 - self.alpha / 2) * open_v, halves[-1]
         share = np.hypot(1.0, beside_v / np.where(whole > 0.0, whole, 1.0))
         halves = np.where(whole > 0.0, halves * share, np.hypot(halves, beside_v))

@@ -17,16 +17,16 @@ from aesi.numerics.typing import Array, BoolArray, IntArray, SavedState
 WHOLE_DRIVE = math.inf
 """The horizon of a prediction from the start of a record to its end."""
 N_PIECES = 8
-"""Records that hold an eighth of the usable rows one and a half times or more are cut into pieces of about that length,
-so that each piece can be scored by a scale fitted to the others. Over the development splits in `aesi bench splits` the
-bands of AESI I score 46.1 mV on the NMC drive with 8 and 16, 47.7 mV with 4, and cover 96.3 % of the LG M50T's with 4
-and 8, 66.9 % with 16."""
+"""Number of pieces in all: a record with at least 1.5 times an eighth of the usable rows is cut into pieces of about an
+eighth, so that each piece can be scored by a scale fitted to the others. Over the development splits in `aesi bench
+splits` the bands of AESI I score 46.1 mV on the NMC drive with 8 and 16, 47.7 mV with 4, and cover 96.3 % of the LG
+M50T's with 4 and 8, 66.9 % with 16."""
 MIN_PIECES = 3
-"""Least pieces of a band, since fewer cannot say how much one differs from the next. Where the rows inside the trained
-range give fewer, all rows are used and the band is marked `extrapolated`; where these do too, there is none. With 6 no
+"""Fewest pieces of a band: fewer do not show how much pieces differ. Where the rows inside the trained range give
+fewer, all rows are used and the band is marked `extrapolated`; where all rows give fewer, there is no band. With 6 no
 figure of `aesi bench bands --set layouts='["one"]' --set cells=2` changes, since none of its bands comes near it."""
 MIN_ROWS = 30
-"""Rows from which a piece counts. With 10 or 100 no figure of those splits changes."""
+"""Fewest rows of a piece. With 10 or 100 no figure of those splits changes."""
 FORGOTTEN = 100
 """Errors this many horizons apart count as independent. A convention."""
 N_LEVELS = 101
@@ -37,12 +37,12 @@ HALVINGS = 14
 
 @dataclass(frozen=True, eq=False)
 class HorizonBand:
-    """One horizon, by (1) and (2).
+    """The band at one horizon, by (1) and (2).
 
-    scales : one a piece, fitted to the others.  scores : (n_pieces, n_levels) |error| / scale of each piece,
-    its quantiles at even levels from 0 to 1.  counts : (n_pieces,) rows of each piece.  widening : k.
-    by_piece : share of each piece whose score lies within the 1 - alpha quantile of all scores.
-    extrapolated : whether rows outside the trained range had to be counted, for want of others.
+    horizon_s : s.  scales : one per piece, fitted to the others.  scores : (n_pieces, n_levels) quantiles of |error| /
+    scale of each piece, at even levels from 0 to 1.  counts : (n_pieces,) rows of each piece.  widening : k.
+    by_piece : share of each piece's rows whose score lies within the 1 - alpha quantile of all scores.
+    extrapolated : whether rows outside the trained range were used, for lack of others.
     """
 
     horizon_s: float
@@ -59,7 +59,7 @@ class HorizonBand:
         scales = np.array([scale(columns) for scale in self.scales])
         levels = np.linspace(0, 1, self.scores.shape[1])
         own = np.array([np.interp(1 - self.alpha, levels, scores) for scores in self.scores])
-        # The quantile of the mixture lies between those of its parts.
+        # The quantile of a mixture lies between the quantiles of its parts.
         low, high = (own[:, None] * scales).min(axis=0), (own[:, None] * scales).max(axis=0)
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
@@ -108,7 +108,7 @@ class _Piece:
     rows: IntArray
 
     def shares_rows_with(self, other: _Piece) -> bool:
-        """Whether a row is in both, be it by another model: as in itself."""
+        """Whether a row is in both pieces, even if predicted by different models; True for the piece itself."""
         return self.record == other.record and np.intersect1d(self.rows, other.rows).size > 0
 
 
@@ -122,15 +122,15 @@ def calibrated_band(
     stretches: int | None = None,
     records: Sequence[str] | None = None,
 ) -> HorizonBand:
-    """One horizon (s) calibrated at miss rate `alpha`, records sampled every dt_s (s).
+    """The band at one horizon (s), calibrated at miss rate `alpha` on records sampled every dt_s (s).
 
-    errors : one (n_i,) array a record, V, NaN where there is no prediction.  columns : one (n_i, p), see
-    `local_scale.covariates`.  inside : one (n_i,), True inside the trained range of the model that predicted.
-    stretches : how many stretches of the rows err independently over a whole drive; by default, and where they are too
-    few to be told apart, the pieces that they are cut into.
-    records : of which record each is, where several are of one: a part of a drive and the whole of it.
-    Raises InputError where lengths differ, FitError for too few pieces, or none that shares no row with one, and for
-    errors all zero.
+    errors : one (n_i,) array per record, V, NaN where there is no prediction.  columns : one (n_i, p) per record, see
+    `local_scale.covariates`.  inside : one (n_i,) per record, True inside the trained range of the model that
+    predicted.  stretches : number of stretches with independent errors over a whole drive; None, or too small a number,
+    takes the number of pieces.
+    records : name of the record of each array, where several are of one record (a part of a drive and the whole).
+    Raises InputError where lengths differ; FitError for too few pieces, for a piece that shares rows with all others,
+    and for errors that are all zero.
     """
     if not [len(e) for e in errors] == [len(c) for c in columns] == [len(i) for i in inside]:
         raise InputError(
@@ -161,13 +161,23 @@ def calibrated_band(
     )
 
 
-def _check_pieces(pieces: Sequence[_Piece], horizon: float) -> None:
-    """Raises FitError where these are too few, or their errors are all zero."""
-    if len(pieces) < MIN_PIECES:
-        raise FitError(
-            f"{len(pieces)} pieces of {MIN_ROWS} or more predictions {horizon:g} s ahead cannot calibrate a band: "
-            f"at least {MIN_PIECES} are needed; give longer records."
+class TooFewPieces(FitError):
+    """Records are too few or too short for the band of a horizon (horizon_s), which says nothing of the others."""
+
+    def __init__(self, pieces: int, horizon_s: float) -> None:
+        ahead = "over a whole drive" if horizon_s == WHOLE_DRIVE else f"{horizon_s:g} s ahead"
+        advice = "longer records" if horizon_s == WHOLE_DRIVE else "longer records, or a shorter horizon"
+        super().__init__(
+            f"{pieces} pieces of {MIN_ROWS} or more predictions {ahead} cannot calibrate a band: at least {MIN_PIECES} "
+            f"are needed; give {advice}."
         )
+        self.horizon_s = horizon_s
+
+
+def _check_pieces(pieces: Sequence[_Piece], horizon: float) -> None:
+    """Raises TooFewPieces, or FitError where their errors are all zero."""
+    if len(pieces) < MIN_PIECES:
+        raise TooFewPieces(len(pieces), horizon)
     if not any(piece.sizes.any() for piece in pieces):
         raise FitError(f"the errors at {horizon:g} s are zero; calibrate on predictions of measured voltage.")
 
@@ -202,7 +212,7 @@ def _pieces(
     inside: Sequence[BoolArray],
     records: Sequence[str | int],
 ) -> list[_Piece]:
-    """The usable rows of each record, long records cut; what is too short to count is left out."""
+    """The usable rows of each record, long records cut into pieces; pieces of too few rows are left out."""
     usable = [np.flatnonzero(np.isfinite(e) & i) for e, i in zip(errors, inside, strict=True)]
     longest = max(MIN_ROWS, -(-sum(rows.size for rows in usable) // N_PIECES))
     return [

@@ -1,4 +1,4 @@
-"""Prediction intervals along a record: a lower and an upper bound a sample."""
+"""Prediction intervals along a record: a lower and an upper bound per sample."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from aesi.numerics.typing import Array, BoolArray
 class Intervals:
     """Prediction intervals of the residual, each made before its residual was seen.
 
-    lower_v, upper_v : (n,) V, relative to the prediction (add the prediction to get the measured voltage's).
-    warm : (n,) False where the interval is no calibrated one: of one step ahead, where the history was too short and
-    the marginal interval of the calibration stands in; of a free run, outside the trained range.
+    lower_v, upper_v : (n,) V, relative to the prediction (add the prediction for bounds of the measured voltage).
+    warm : (n,) False where the interval is not calibrated. One step ahead that is where the history was too short, and
+    the marginal interval of the calibration is used; in a free run, outside the trained range.
     """
 
     lower_v: Array

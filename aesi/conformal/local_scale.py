@@ -1,13 +1,13 @@
-"""How the size of a free-run error depends on what the fitted rows leave open, of the physics and of the correction.
+"""The size of a free-run error as a function of the uncertainty of physics and correction given the fitted rows.
 
     s = a + u p + w ln(1 + x),     all weights >= 0                                                        (1)
 
-p is the spread of the physics model's voltage by what the rows leave open of its parameters (parameter_spread.py): it
-follows the current, the depletion and the distance from the fitted states of charge as the model's voltage does. x is
-by how much the leverage of a sample exceeds that of the fitted rows (`aesi.sparse.leverage`), for the correction; in
-its logarithm, since polynomials go on where the error does not.
-s is the 1 - alpha quantile of |error|, by linear quantile regression; a term whose weight would be negative is left
-out, so that s stays positive where it extrapolates, and a floor keeps it away from zero.
+p is the standard deviation of the physics model's voltage by the posterior of its parameters (parameter_spread.py). It
+follows the current, the depletion and the distance from the fitted states of charge as the model's voltage does. x, for
+the correction, is the excess of a sample's leverage over that of the fitted rows (`aesi.sparse.leverage`). Its
+logarithm is used, since polynomials grow without limit where the error does not.
+s is the 1 - alpha quantile of |error|, by linear quantile regression. A term with a negative weight is left out, so
+that s stays positive where it extrapolates; a floor keeps it away from zero.
 
 Over the development splits of `aesi bench splits` (16 candidates) the bands of AESI I cover 95.5 % of the rows of the
 NMC drive, 78.1 % of the worst test drive, at a Winkler score of 46.1 mV, those of the recalibrated model 95.7 and
@@ -31,28 +31,28 @@ from aesi.numerics.quantile_regression import fit_quantiles
 from aesi.numerics.typing import Array, SavedState
 
 RELATIVE_FLOOR = 0.1
-"""Least s, as a share of the mean |error|: it keeps s away from zero. With a tenth or three times of it the score moves
-by 0.1 mV at most."""
+"""Least s, as a share of the mean |error|. With a tenth or three times of it the score changes by 0.1 mV at most."""
 MOST_ROWS = 6000
-"""Rows the regression looks at, evenly spread: neighbouring errors of a free run say nearly the same."""
+"""Most rows in the regression, evenly spread: neighbouring errors of a free run have nearly the same information."""
 
 
 @dataclass(frozen=True, eq=False)
 class LocalScale:
-    """weights : (3,) a in V, u, and w in V.  floor : V, the least s."""
+    """The fitted scale (1).  weights : (3,) a in V, u, and w in V.  floor : least s, V."""
 
     weights: Array
     floor: float
 
     @classmethod
     def fit(cls, covariates: Array, sizes: Array, alpha: float) -> Self:
-        """covariates : (n, p) of `covariates`.  sizes : (n,) V, |error|.  alpha : share of sizes above s."""
+        """The scale fitted to errors.  covariates : (n, p) from `covariates`.  sizes : (n,) V, |error|.  alpha : share
+        of sizes above s."""
         step = -(-len(sizes) // MOST_ROWS)
         weights = _nonnegative_quantile(covariates[::step], sizes[::step], 1 - alpha)
         return cls(weights, max(RELATIVE_FLOOR * float(np.mean(sizes)), float(np.finfo(float).tiny)))
 
     def __call__(self, covariates: Array) -> Array:
-        """(n,) V, > 0."""
+        """(n,) V, > 0: s at each row.  covariates : (n, p)."""
         return np.asarray(np.maximum(covariates @ self.weights, self.floor))
 
     def to_state(self) -> SavedState:
@@ -66,14 +66,14 @@ class LocalScale:
 
 
 def covariates(spread_v: Array, excess: Array | None = None) -> Array:
-    """(n, p) columns of (1): spread_v (n,) V, excess (n,), nought where the model cannot tell."""
+    """(n, p) columns of (1), from spread_v (n,) V and excess (n,), which is 0 where the model has no leverage."""
     n = len(spread_v)
     beyond = np.zeros(n) if excess is None else np.log1p(excess)
     return np.column_stack([np.ones(n), spread_v, beyond])
 
 
 def _nonnegative_quantile(columns: Array, sizes: Array, level: float) -> Array:
-    """(p,) weights >= 0: the regression without the columns whose weight came out negative, worst first."""
+    """(p,) weights >= 0 of a quantile regression; columns with a negative weight are dropped, most negative first."""
     spread = columns.std(axis=0)
     spread[0] = 1.0  # the constant
     kept = np.flatnonzero(spread > 0)

@@ -1,15 +1,16 @@
-"""What the fitted rows leave open of a physics model's parameters, as a voltage at another row.
+"""The uncertainty of a physics model's parameters after a fit, as a voltage at another row.
 
     s(x)**2 = j(x)' C j(x),     C = (1 + sum_k j_k j_k' dt / (T sigma**2))**-1                             (1)
 
-j is by how much one prior deviation of each parameter moves the model's voltage, C the covariance, in such deviations,
-that is left after the fitted rows k, whose errors of size sigma are independent over times T: the Laplace approximation
-of the posterior. sigma is what the fit allowed for, since a model that misses more learns less from the same rows. s
-grows where a parameter matters that no fitted row told of: at a current, a state of charge or a depletion that they did
-not reach. MacKay, Neural Computation 4 (1992) 448, doi:10.1162/neco.1992.4.3.448.
+j is the change of the model's voltage by one prior standard deviation of each parameter. C is the posterior covariance,
+in these units, after the fitted rows k, whose errors of size sigma are independent over times T (Laplace
+approximation). sigma is the error that the fit allowed for, since a model with larger errors learns less from the same
+rows. s is large where a parameter matters that no fitted row determined: at a current, a state of charge or a depletion
+that they did not reach. MacKay, Neural Computation 4 (1992) 448, doi:10.1162/neco.1992.4.3.448.
 
-Bands take (1) for the shape of their width and left-out pieces for its size (local_scale.py), so an error of s is no
-error of coverage. Rows of one temperature tell nothing of another, nor do pieces of them, so there the prior stands:
+Bands take the shape of their width from (1) and its size from left-out pieces (local_scale.py), so that an error of s
+does not bias the coverage. Rows of one temperature, and pieces of them, have no information on another temperature.
+There the prior remains:
 
     q(x)**2 = sum_p (j_p(x) E_p |1 / T - 1 / T_near| / R)**2                                               (2)
 
@@ -39,8 +40,8 @@ from aesi.numerics.typing import Array
 
 
 def covariance_root(slopes_v: Sequence[Array], weight: float) -> Array:
-    """(k, k) L with L L' = C of (1).  slopes_v : (n_i, k) V a deviation along fitted rows.  weight : dt / (T sigma**2),
-    1/V**2."""
+    """(k, k) L with L L' = C of (1).  slopes_v : (n_i, k) V per prior standard deviation, along fitted rows.
+    weight : dt / (T sigma**2), 1/V**2."""
     k = slopes_v[0].shape[1]
     information = np.eye(k) + weight * sum((each.T @ each for each in slopes_v), np.zeros((k, k)))
     return np.asarray(np.linalg.cholesky(np.linalg.inv(information)))

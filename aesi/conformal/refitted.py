@@ -1,11 +1,11 @@
-"""SPCI with the paper's regressor, as the paper runs it: a quantile forest on raw lags, refitted as its data move.
+"""SPCI with the regressor of its paper: a quantile forest on raw lags, refitted along the record.
 
     [Q_t(alpha / 2), Q_t(1 - alpha / 2)],    Q_t a quantile regression forest of the residual on the `window` before it
 
-Published, the forest is grown anew at every step, which at 10 Hz takes longer than the drive. Here it is grown anew
-every `REFIT` steps, at most `MOST_FORESTS` times a record, on the `MEMORY` windows of residuals before the step, those
-of the calibration at first. The rows in between are predicted from their own past. There is no factor on the width and
-no adaptive step: this stands beside the project's own methods in the tables of a run, and nothing is served with it.
+In the paper the forest is refitted at every step, which at 10 Hz takes longer than the drive. Here it is refitted every
+`REFIT` steps, at most `MOST_FORESTS` times per record, on the `MEMORY` windows of residuals before the step, at first
+those of the calibration. Rows in between are predicted from their own past. There is no factor on the width and no
+adaptive step. The method is for comparison in the tables of a run only; no saved model uses it.
 
 Xu & Xie, ICML 2023, doi:10.48550/arXiv.2212.03463; Meinshausen, J. Mach. Learn. Res. 7 (2006) 983.
 """
@@ -40,7 +40,7 @@ FEATURES = 1 / 3
 
 @dataclass(frozen=True)
 class RefittedForest:
-    """The method; `refit` : steps between two forests."""
+    """The method.  refit : steps between two forests."""
 
     name: str = NAME
     refit: int = REFIT
@@ -57,7 +57,7 @@ class RefittedForest:
         rng: np.random.Generator | None = None,
         current_a: Sequence[Array] | None = None,
     ) -> RefittedIntervals:
-        """Take up the end of the calibration residuals, one (n_i,) array a record, V; the current is not used.
+        """The method with the end of the calibration residuals, one (n_i,) array per record, V. No current is used.
 
         Raises InputError as `Method.fit`, FitError where no record holds two windows without a gap.
         """
@@ -78,7 +78,8 @@ class RefittedForest:
 
 @dataclass(frozen=True, eq=False)
 class RefittedIntervals:
-    """before_v : calibration residuals that the first forest is grown on, V.  marginal_v : stands in after a gap."""
+    """A calibrated method, for replay only.  before_v : calibration residuals for the first forest, V.
+    marginal_v : (low, high) V, the interval after a gap."""
 
     alpha: float
     window: int
@@ -88,7 +89,8 @@ class RefittedIntervals:
     seed: int
 
     def intervals(self, residuals: Array, current_a: Array | None = None) -> Intervals:
-        """Replay one continuous record, (n,) V; NaN where the voltage is missing. See `Calibrated.intervals`."""
+        """The intervals along one continuous record (n,) V; NaN where the voltage is missing. See
+        `Calibrated.intervals`."""
         residuals = checked_record(residuals)
         n, w = len(residuals), self.window
         low, high = np.full(n, self.marginal_v[0]), np.full(n, self.marginal_v[1])
@@ -104,9 +106,9 @@ class RefittedIntervals:
         return Intervals(low, high, ready)
 
     def _forest(self, seen: Array, start: int) -> _Forest:
-        """Grown on the last residuals before a step that have a window without a gap before them.
+        """A forest on the last residuals before a step that follow a window without a gap.
 
-        Where the record is still short, the calibration goes before it as if the record went on from there.
+        Where the record is still short, it is extended to the front by the calibration residuals.
         """
         known = np.concatenate([self.before_v, seen])
         windows = sliding_window_view(known, self.window + 1)

@@ -1,4 +1,4 @@
-"""Calibrated intervals from what was saved of them; what a saved file may hold is listed here."""
+"""Restore calibrated intervals from their saved state; the kinds that a saved file may contain are listed here."""
 
 from __future__ import annotations
 

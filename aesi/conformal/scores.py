@@ -1,4 +1,4 @@
-"""How good intervals are: coverage on average, in bins and in time; width; and the score that weighs both.
+"""Scores of intervals: coverage on average, in bins and in time; width; and the interval score, which weighs both.
 
     S = (u - l) + 2/alpha (l - e)+ + 2/alpha (e - u)+                                              (1)
 
@@ -21,16 +21,17 @@ CURRENT_BINS = 8
 from which a bin stands alone, and windows of a minute."""
 SOC_BIN_WIDTH = 0.1
 MIN_BIN_SAMPLES = 200
-"""Bins are joined to their neighbours until they hold more. At 200 rows a coverage of 90 % scatters by 2 %, were they
-independent. Were smaller bins left out instead, a drive of 3,000 rows counted with one bin of 50, 7 % of its rows."""
+"""Bins are joined to their neighbours until they hold more samples. At 200 independent rows a coverage of 90 % has a
+standard error of 2 %. If smaller bins were left out instead, a drive of 3,000 rows would count with one bin of 50, 7 %
+of its rows."""
 MINUTE_S = 60.0
 LOW_MINUTE_COVERAGE = 0.70
-"""A minute in which fewer than these are inside is one in which the interval failed."""
+"""Share of samples inside below which the interval counts as failed in a minute."""
 
 
 @dataclass(frozen=True)
 class Scores:
-    """Of one replay. Shares in [0, 1], widths and score in V.
+    """Scores of one replay: shares in [0, 1], widths and score in V.
 
     worst_bin_coverage is NaN where no current and state of charge were given or there are no more than 200
     samples; low_minutes (the share of minute-long windows with under 70 % coverage) is NaN where the sampling

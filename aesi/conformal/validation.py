@@ -1,4 +1,4 @@
-"""Intervals of one candidate of a search: calibrated on a part of its residuals, judged on validation."""
+"""Scores of the intervals of one candidate of a search: calibrated on its residuals, judged on validation records."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from aesi.conformal.scores import Scores, scores_of
 from aesi.numerics.typing import Array
 
 MAX_RESIDUALS = 20_000
-"""Calibration residuals that are used: enough for half a per cent of coverage, and a fraction of a second."""
+"""Most calibration residuals: enough for half a per cent of coverage, in a fraction of a second."""
 PIECES = 20
-"""Runs that calibration residuals are thinned to, spread over all records."""
+"""Number of runs, spread over all records, to which calibration residuals are thinned."""
 
 
 def validation_scores(
@@ -28,11 +28,11 @@ def validation_scores(
     valid_current_a: Sequence[Array] | None = None,
     max_residuals: int = MAX_RESIDUALS,
 ) -> Scores:
-    """Coverage, width and interval score on the validation records, all samples together.
+    """Coverage, width and interval score on the validation records, all samples pooled.
 
-    residuals, valid_residuals : one (n_i,) array a continuous record, V, out of sample.  current_a, valid_current_a :
-    one (n_i,) array a record, A, both or neither.  max_residuals : calibration is thinned to evenly spaced
-    pieces of about this many samples in all. Raises as `Method.fit` does.
+    residuals, valid_residuals : one (n_i,) array per continuous record, V, out of sample.  current_a, valid_current_a :
+    one (n_i,) array per record, A, both or neither.  max_residuals : the calibration is thinned to evenly spaced
+    pieces with about this many samples in all. Raises as `Method.fit` does.
     """
     records, currents = spaced_pieces(residuals, current_a, max_residuals)
     calibrated = method.fit(records, alpha, window, rng, currents)

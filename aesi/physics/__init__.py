@@ -1,4 +1,4 @@
-"""Models of a cell, single particle or porous electrode, and the effects they may lack."""
+"""Models of a cell (single particle and porous electrode), and the effects that they may lack."""
 
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Contribution, Effect, Record, Trace

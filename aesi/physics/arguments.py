@@ -1,4 +1,4 @@
-"""Checks of what `simulate` is given, made before anything is computed; an error is one sentence."""
+"""Checks of the arguments of `simulate`, made before anything is computed; an error is one sentence."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from aesi.physics.effect import ActiveEffect, Effect
 from aesi.records.checked import numbers
 
 FARTHEST_SOC = 1.0
-"""A state of charge further than this outside [0, 1] is a percentage or a voltage, not a cell beyond its limits."""
+"""Largest distance of a state of charge from [0, 1]: a value beyond it is a percentage or a voltage."""
 
 
 def check_cell(cell: object) -> None:
-    """Raises InputError where `cell` is not a Cell but, say, the path of its file."""
+    """Raises InputError where `cell` is not a Cell (but the path of its file, for example)."""
     if not isinstance(cell, Cell):
         raise InputError(
             f"cell is {_a(cell)}, not a Cell; read one from its file with aesi.Cell.from_bpx(path)."
@@ -50,9 +50,9 @@ def check_choice(name: str, value: object, choices: Any) -> None:
 
 
 def check_soc(soc: Any, name: str = "soc0") -> None:
-    """Raises InputError for a state of charge that is no share of the capacity.
+    """Raises InputError for a state of charge that is not a share of the capacity.
 
-    name : how the sentence calls it.
+    name : of the argument, for the sentence.
     """
     if soc is None:
         return
@@ -66,9 +66,9 @@ def check_soc(soc: Any, name: str = "soc0") -> None:
 
 
 def check_temperature(temperature_degc: Any, name: str = "temperature_degc") -> None:
-    """Raises InputError for a temperature in degC, or an array of them, that is no cell's, such as one in kelvin.
+    """Raises InputError for a temperature in degC, or an array of them, that no cell can have (one in kelvin).
 
-    name : how the sentence calls it.
+    name : of the argument, for the sentence.
     """
     given = numbers(temperature_degc, name)
     absurd = given[~((given >= COLDEST_DEGC) & (given <= WARMEST_DEGC))]  # this way round, NaN is absurd too

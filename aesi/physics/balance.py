@@ -1,8 +1,8 @@
-"""Electrode balance: stoichiometry windows after lithium or active material was lost.
+"""Electrode balance: stoichiometry windows after a loss of lithium or active material.
 
 Full and empty are defined by the rest voltages of the declared windows, or by an electrode that is full or empty
-before they are reached. In both states the two electrodes together hold the cyclable lithium that is left. Active
-material is lost with the lithium it holds, at a state of charge whose stoichiometries stay.
+before these are reached. In both states the two electrodes together hold the remaining cyclable lithium. Active
+material is lost together with the lithium in it, at a state of charge whose stoichiometries do not change.
 Birkl et al., J. Power Sources 341 (2017) 373, doi:10.1016/j.jpowsour.2016.12.011.
 """
 
@@ -22,17 +22,17 @@ from aesi.physics.cell.parts import Balance, Soc
 from aesi.physics.cell.relations import value_at
 
 EDGE = 1e-6
-"""How near a stoichiometry comes to 0 or 1, where potentials have poles."""
+"""Least distance of a stoichiometry from 0 and 1, where potentials have poles."""
 SOC_BEYOND = 0.05
-"""How far beyond full and empty voltages are looked up; GRID points over that range, between which a root is
-bracketed."""
+"""Range of state of charge beyond full and empty in which roots are searched. GRID : points over that range, between
+which a root is bracketed."""
 GRID = 257
 REMEMBERED = 256
-"""Roots: few of the parameters that a fit moves shift a balance, and every simulation of it asks for one."""
+"""Size of the cache of roots: few parameters of a fit shift a balance, and every simulation needs a root."""
 
 
 def without_lithium(cell: Cell, fraction: float) -> Cell:
-    """The cell without the lithium of `fraction` of its capacity; same electrodes, new windows.
+    """The cell after a loss of lithium of `fraction` of its capacity: same electrodes, new stoichiometry windows.
 
     Raises SimulationError where no window satisfies the voltages.
     """
@@ -46,10 +46,10 @@ def without_lithium(cell: Cell, fraction: float) -> Cell:
 
 
 def with_active_material(cell: Cell, negative: float, positive: float, lost_at_soc: float = 1.0) -> Cell:
-    """The cell with fractions of its active material left (1 = all).
+    """The cell with the remaining shares of active material in its electrodes (1: no loss).
 
-    lost_at_soc : state of charge at which the material went, with the lithium that it held there; the stoichiometries
-    of that state stay.  Full and empty are at the declared rest voltages again.
+    lost_at_soc : state of charge at which the material was lost with the lithium in it; the stoichiometries at that
+    state do not change.  Full and empty are at the declared rest voltages again.
     """
     if negative == 1.0 and positive == 1.0:
         return cell
@@ -66,11 +66,11 @@ def with_active_material(cell: Cell, negative: float, positive: float, lost_at_s
 
 
 def same_rest(declared: Cell, aged: Cell, soc: float) -> float:
-    """State of charge in the windows of `aged` at which it rests where `declared` rests at `soc`.
+    """State of charge in the windows of `aged` with the same rest voltage as `soc` in the windows of `declared`.
 
-    By the potentials of `aged` on both sides: an open-circuit potential that is off does not move a state of charge
-    that is known, and windows that are the same leave it the same. Beyond both ends of the new windows the nearer end;
-    where a potential that turns beyond its window rests there twice, the nearer to `soc`.
+    The potentials of `aged` are used for both: a wrong open-circuit potential does not change a known state of charge,
+    and equal windows leave it unchanged. A voltage beyond the new windows gives the nearer end. Where a potential that
+    turns beyond its window has the voltage twice, the solution nearer to `soc` is taken.
     """
     before, after = declared.balance, aged.balance
     if (before.window_n, before.window_p) == (after.window_n, after.window_p):
@@ -119,10 +119,10 @@ def _sizes_ah(cell: Cell) -> tuple[float, float]:
 def _at_rest(
     declared: Balance, soc: float, sizes_ah: tuple[float, float], lithium_ah: float, name: str
 ) -> tuple[float, float]:
-    """Stoichiometries (negative, positive) of electrodes of these sizes that hold `lithium_ah` together and rest where
-    the declared ones do at `soc`.
+    """Stoichiometries (negative, positive) of electrodes of these sizes (Ah) that hold `lithium_ah` together and have
+    the rest voltage of the declared electrodes at `soc`.
 
-    name : of the cell, for what cannot be.
+    name : of the cell, for the error.
     """
     q_n, q_p = sizes_ah
     voltage_v = declared.rest_voltage_at(soc)
@@ -145,9 +145,9 @@ def _at_rest(
 def _root(
     excess: Callable[[float], float], on_grid: Callable[[Array], Array], low: float, high: float, name: str
 ) -> float:
-    """Where a rising function crosses nought, or the nearer end; a grid narrows the bracket in one evaluation.
+    """Root of an increasing function, or the nearer end of the interval; a grid narrows the bracket in one evaluation.
 
-    on_grid : the function of many numbers at once.
+    on_grid : the function for an array of arguments.
     """
     if not low < high:
         raise SimulationError(

@@ -1,26 +1,27 @@
-"""Whether a record can be of the cell that a file declares, for every command that simulates or fits one.
+"""Check that a record can belong to the cell of a file, for every command that simulates or fits one.
 
-A voltage far beyond the file's limits is another cell's. At every row the voltage bounds the state of charge: the cell
-rests within a drop d of it that no cell exceeds, so that its state of charge lies between z- = z(V - d) and
-z+ = z(V + d), with z(U) the inverse of the open-circuit voltage of the file:
+A voltage far beyond the file's limits belongs to another cell. At every row the voltage bounds the state of charge: the
+rest voltage differs from it by at most a drop d that no cell exceeds. The state of charge therefore lies between
+z- = z(V - d) and z+ = z(V + d), with z(U) the inverse of the open-circuit voltage of the file:
 
     d = (DROP_V + DROP_V_PER_C i + v) (1 + (COLD_FACTOR - 1) c)                    (1)
     i = max(|I|, AFTER_SHARE I') / C_nominal       1/h; I' the largest current of the AFTER_S before          (2)
     c = (COLD_DEGC - T) / COLD_SPAN_K, held within 0 and MOST_SPANS                (3)
 
-v is what the current drops at the contacts and films of the file beyond OHMIC_V_PER_C: of a cell that was calibrated
-with its leads they take most of its drop. |I| is the largest within ROWS_APART. (Where the current is turned, what I'
-left counts less by it, on the side that it left alone.) The charge Q_ij that leaves the cell between two rows bounds
-the capacity C from both sides, and a declared capacity well outside these bounds is another cell's, or the record's
-current or time is in another unit:
+v is the voltage drop over the contacts and films of the file beyond OHMIC_V_PER_C: in a cell that was calibrated with
+its leads they cause most of the drop. |I| is the largest within ROWS_APART. (A current of the opposite sign reduces the
+after-effect of I', on its side only.) The charge Q_ij that leaves the cell between two rows bounds the capacity C from
+both sides. Where the declared capacity is well outside these bounds, the file is of another cell, or current or time of
+the record are in another unit:
 
     Q_ij / max(z+_i - z-_j, FEWEST_SOC) <= C <= Q_ij / (z-_i - z+_j)               (4)
 
 the upper one where z-_i - z+_j > TELLING_SOC, both where Q_ij is more than TELLING_SHARE of the charge moved.
 
-What a limit decides was measured on 36 records of four cells (-10 to 40 degC, from C/20 to drives and pulses), each
-with its own cell's file and with those of the three others, one limit moved at a time. As the limits are, the records
-want 1/1.06 to 1.06 times the capacity of their own file, and 51 of the 108 pairs with another's are refused.
+The effect of each limit was measured on 36 records of four cells (-10 to 40 degC, from C/20 to drives and pulses), each
+with its own cell's file and with those of the three others, with one limit changed at a time. With the present limits
+the bounds of the records require 1/1.06 to 1.06 times the capacity of their own file, and 51 of the 108 pairs with
+another cell's file are refused.
 """
 
 from __future__ import annotations
@@ -40,79 +41,85 @@ from aesi.records import Measurement
 from aesi.records.checked import row_words
 
 VOLTAGE_MARGIN_V = 0.3
-"""Beyond the voltage limits of the file that a record may go: fast pulses and old cells do."""
+"""How far a record may go beyond the voltage limits of the file, V: fast pulses and old cells do."""
 SOC_MARGIN = 0.12
-"""Beyond full and empty, by the declared capacity: new cells hold more than they are sold for."""
+"""How far a record may go beyond full and empty, as a share of the declared capacity: new cells exceed their nominal
+capacity."""
 ROWS = 300
-"""Of a record that are looked at, evenly spread: each pair of them bounds the capacity."""
+"""Rows of a record that are used, evenly spread: each pair of them bounds the capacity."""
 TELLING_SHARE = 0.3
-"""Of the charge moved: less between two rows is within hysteresis and relaxation. With 0.2 a record wants 1.24 times
-the capacity of its own file, with 0.1 two are refused by theirs."""
+"""Least charge between two rows, as a share of the charge moved in the record: less is within hysteresis and
+relaxation. With 0.2 a record requires 1.24 times the capacity of its own file, with 0.1 two are refused by theirs."""
 TELLING_SOC = 0.1
-"""State of charge that two voltages have to be apart for an upper bound: less is of the size of what the file's
-open-circuit voltage is off. Of 6,075 records and pieces of them, 10 min to 5 h long, with their own cell's file it
-bounds 315, and allows at least 0.53 of the capacity; 0.07 allows 0.47, which is refused, and 0.25 bounds 195 and let
-time in minutes pass of a discharge by a quarter between two rests."""
+"""Least difference in state of charge of two voltages for an upper bound: less is within the error of the file's
+open-circuit voltage. Of 6,075 records and pieces of them, 10 min to 5 h long, with their own cell's file it
+bounds 315, and allows at least 0.53 of the capacity; 0.07 allows 0.47, which is refused, and 0.25 bounds 195 and
+accepted time in minutes for a discharge by a quarter between two rests."""
 FEWEST_SOC = 0.02
-"""State of charge that two voltages are at least apart for a lower bound, which equal voltages would otherwise make
-infinite. A convention: from 0.005 to 0.1 no measured record is judged otherwise."""
+"""Least difference in state of charge that is assumed of two voltages for a lower bound, which would otherwise be
+infinite for equal ones. A convention: from 0.005 to 0.1 no measured record is judged otherwise."""
 DROP_V = 0.06
-"""V, of a warm cell without a current: hysteresis, slow diffusion and what the file's open-circuit voltage is off. The
-measured records stay within 0.05 V; with 0.03 a C/20 discharge is refused by its own file."""
+"""Drop of a warm cell without a current, V: hysteresis, slow diffusion and the error of the file's open-circuit
+voltage. The measured records stay within 0.05 V; with 0.03 a C/20 discharge is refused by its own file."""
 DROP_V_PER_C = 0.25
-"""V h, of a warm cell per C-rate. The measured records stay within 0.2 V; with 0.15 the pulses of an LG M50T are
+"""Drop of a warm cell per C-rate, V h. The measured records stay within 0.2 V; with 0.15 the pulses of an LG M50T are
 refused by their own file."""
 OHMIC_V_PER_C = 0.06
-"""V h, per C-rate, of the contacts and films of a file: DROP_V_PER_C holds so much of them, 0.053 at most in the files
-that the measured records were judged by. A cell on two wires of 0.15 ohm has 0.35."""
+"""Drop over a file's contacts and films that DROP_V_PER_C includes, V h per C-rate: 0.053 at most in the files that the
+measured records were judged by. A cell on two wires of 0.15 ohm has 0.35."""
+LEADS_V_PER_C = 0.35
+"""Drop over leads that a record may hold and its file not, V h per C-rate: those of the cell on two wires."""
 COLD_DEGC = 15.0
-"""Above it a cell is warm: with 5 a drive at 0 degC wants 1/1.11 times the capacity of its own file, with 10 or 25 no
-measured record more than now."""
+"""Temperature above which a cell counts as warm: with 5 a drive at 0 degC requires 1/1.11 times the capacity of its own
+file, with 10 or 25 no measured record more than now."""
 COLD_SPAN_K = 25.0
 """K below COLD_DEGC at which the drop is COLD_FACTOR times that of a warm cell: at -10 degC, the coldest of the
 records. From 15 to 50 no measured record is judged otherwise."""
 COLD_FACTOR = 4.0
-"""Times the drop of a warm cell, within which the measured records stay one span below COLD_DEGC. With 1 a discharge of
-an LG 18650HG2 at -10 degC is refused by its own file; with 8 two more pairs with another cell's file pass."""
+"""Ratio of the drop one span below COLD_DEGC to that of a warm cell; the measured records stay within it. With 1 a
+discharge of an LG 18650HG2 at -10 degC is refused by its own file; with 8 two more pairs with another cell's file
+pass."""
 MOST_SPANS = 2.0
-"""Spans below COLD_DEGC that count, down to -35 degC. A convention: the measured records reach one span."""
+"""Most spans below COLD_DEGC that count, down to -35 degC. A convention: the measured records reach one span."""
 AFTER_S = 1800.0
-"""s that a current is felt after it, by slow diffusion. With 0 a drive at 0 degC is refused by its own file, from 300
-to 3600 no measured record is judged otherwise."""
+"""Time for which a current has an after-effect, by slow diffusion, s. With 0 a drive at 0 degC is refused by its own
+file, from 300 to 3600 no measured record is judged otherwise."""
 ROWS_APART = 1
-"""By which loggers write a current beside another row's voltage: the largest current within them is what flowed. With 0
-the pulses of an 18650 are refused by its own file for one row, of 0 A beside the voltage under 4.6 A."""
+"""Rows by which loggers may write a current apart from its voltage; the largest current within them counts. With 0 the
+pulses of an 18650 are refused by its own file for one row, of 0 A beside the voltage under 4.6 A."""
 AFTER_SHARE = 0.3
-"""Of the largest current of that time, which counts as if it flowed still. With 0 a drive at 0 degC is refused by its
-own file, with 0.15 a record wants 1.1 times the capacity of its own; from 0.3 to 1 none is judged otherwise."""
+"""Share of the largest current within that time that counts as if it still flowed. With 0 a drive at 0 degC is refused
+by its own file, with 0.15 a record requires 1.1 times the capacity of its own; from 0.3 to 1 none is judged
+otherwise."""
 TOO_LARGE = 2.0
-"""Times what the record allows, that the declared capacity may be: a cell may have lost half of it. A convention; the
-measured records allow at least 1/1.06 of the capacity of their own file."""
+"""Largest ratio of the declared capacity to the upper bound of a record: a cell may have lost half of its capacity. A
+convention; the measured records allow at least 1/1.06 of the capacity of their own file."""
 TOO_SMALL = 1.25
-"""Times the declared capacity, that the record may want: batches differ by less. The measured records want at most 1.06
-times the capacity of their own cell's file, the drive of an LG M50T 1.31 times that of a Panasonic NCR18650PF."""
+"""Largest ratio of the lower bound of a record to the declared capacity: batches differ by less. The measured records
+require at most 1.06 times the capacity of their own cell's file, the drive of an LG M50T 1.31 times that of a Panasonic
+NCR18650PF."""
 ABOVE_FULL_V = 0.1
-"""A voltage at rest further above that of a full cell belongs to another chemistry."""
+"""How far a rest voltage may exceed that of a full cell, V; more belongs to another chemistry."""
 MOST_C_RATE = 100.0
-"""Of a current without a voltage in every row: the pulses that cells are sold for are of 50C at most, a drive in mA is
-of 1000C and more."""
+"""Largest C-rate of a current without a voltage in every row: cells are rated for pulses of 50C at most, a drive in mA
+has 1000C and more."""
 MOST_CAPACITIES = 10.0
-"""Of a cell, that may flow one way: a schedule asks for several where a start or a capacity is wrong, one in ms for a
-thousand times what it is."""
+"""Most charge in one direction, in capacities of the cell: a schedule with a wrong start or capacity has several, one
+with time in ms a thousand times the right value."""
 SMALL_C_RATE = 0.1
-"""Below it a cell all but rests."""
+"""C-rate below which a cell counts as nearly at rest."""
 CONVERTED, DECLARED = " was converted from ", " as declared"
-"""In a reader's note on a unit that the user gave, which is the first suspect where a charge is that of no cell."""
+"""Words in a reader's note on a unit that the user gave, which is the first suspect where a charge fits no cell."""
 SOC_GRID = 1201
-"""States of charge at which a voltage is looked up."""
+"""Number of states of charge in the table of rest voltages."""
 BEYOND_SOC = 0.1
-"""What a voltage beyond the window stands for."""
+"""State of charge beyond full or empty that a voltage outside the window is taken for."""
 
 
 @dataclass(frozen=True)
 class CapacityBounds:
-    """low_ah, high_ah : between them lies the capacity of any cell with these open-circuit potentials.
-    low_rows, high_rows : the two rows, the fuller first, whose voltages and charge bound it from there, if any do.
+    """low_ah, high_ah : bounds of the capacity of any cell with these open-circuit potentials, Ah.
+    low_rows, high_rows : the two rows, the fuller one first, that give each bound; None where no pair does.
     """
 
     low_ah: float
@@ -122,7 +129,7 @@ class CapacityBounds:
 
 
 def check_voltage(cell: Cell, data: Measurement) -> None:
-    """Raises DataError where the voltage leaves what the cell file admits."""
+    """Raises DataError where the voltage leaves the range of the cell file by more than `VOLTAGE_MARGIN_V`."""
     low, high = cell.lower_voltage_v - VOLTAGE_MARGIN_V, cell.upper_voltage_v + VOLTAGE_MARGIN_V
     outside = np.flatnonzero((data.voltage_v < low) | (data.voltage_v > high))
     if len(outside):
@@ -136,12 +143,12 @@ def check_voltage(cell: Cell, data: Measurement) -> None:
 
 
 def check_measured(cell: Cell, records: Sequence[Measurement], known: Collection[int] = ()) -> None:
-    """As `check_belongs`, and of every row of its voltage: for what fits a record or is judged on it, where a
-    simulation needs only its current.
+    """`check_belongs` and `check_voltage` for records to which a model is fitted or compared; a simulation needs only
+    their current.
 
-    known : of the records, the numbers of those whose full discharge the cell has its capacity from. What their
-    voltages want beside that is no other size but what the potentials of the file are off, which a fit moves: it is
-    allowed to all records, unless nobody said how warm they were and the cold would explain it.
+    known : numbers of the records whose full discharge gave the cell its capacity. Where their bounds still require
+    another capacity, the file's potentials are wrong, which a fit corrects. All records are allowed the same deviation,
+    except records without a temperature for which cold would explain it.
     """
     slack = Slack()
     for number in known:
@@ -157,23 +164,23 @@ def check_measured(cell: Cell, records: Sequence[Measurement], known: Collection
 
 @dataclass(frozen=True)
 class Slack:
-    """By how much the potentials of a file alone make a record want another capacity than its cell is known to have.
+    """Deviation of the capacity bounds from a known capacity, caused by wrong potentials in a file.
 
-    more, less : times the known capacity, at least 1 and at most 1.
+    more, less : allowed ratios to the known capacity, more >= 1 and less <= 1.
     """
 
     more: float = 1.0
     less: float = 1.0
 
     def with_what(self, cell: Cell, record: Measurement) -> Slack:
-        """Widened to what a record of a cell of known capacity wants."""
+        """The slack, widened to the bounds of a record whose cell has a known capacity."""
         bounds, known = capacity_bounds(cell, record), _capacity_ah(cell)
         return Slack(max(self.more, bounds.low_ah / known), min(self.less, bounds.high_ah / known))
 
 
 def unlike(cell: Cell, record: Measurement) -> str:
-    """A sentence where the voltages of a full discharge, which the cell has its capacity from, want another one by the
-    potentials of its file; '' where they do not."""
+    """A sentence where a full discharge gave the cell its capacity, but the voltages require another one by the file's
+    potentials; '' otherwise."""
     if not np.all(np.isfinite(record.voltage_v)) or _capacity_fault(cell, record) is None:
         return ""
     bounds, known = capacity_bounds(cell, record), _capacity_ah(cell)
@@ -188,9 +195,9 @@ def unlike(cell: Cell, record: Measurement) -> str:
 
 
 def check_belongs(cell: Cell, records: Iterable[Measurement]) -> None:
-    """Raises DataError, one sentence, for the first record that cannot be of this cell: of its voltages, before what
-    these and its charge say of the capacity, which means nothing where they are another cell's; of a current
-    without a voltage in every row, one that is of no cell of this capacity."""
+    """Raises DataError, one sentence, for the first record that cannot be of this cell. The voltages are checked first,
+    then the capacity by voltages and charge, which means nothing for another cell's voltages. Without a voltage in
+    every row, the current is checked against the capacity."""
     for record in records:
         if not np.all(np.isfinite(record.voltage_v)):
             _check_current(cell, record)
@@ -200,8 +207,8 @@ def check_belongs(cell: Cell, records: Iterable[Measurement]) -> None:
 
 
 def _check_current(cell: Cell, record: Measurement) -> None:
-    """Of a current without a voltage in every row: one that no cell of this capacity carries, or that moves many times
-    what it holds, is in another unit."""
+    """Raises DataError for a current in a wrong unit, in a record without a voltage in every row: one that no cell of
+    this capacity can carry, or that moves many times its capacity in one direction."""
     declared = _capacity_ah(cell)
     row = int(np.argmax(np.abs(record.current_a)))
     rate = float(np.abs(record.current_a[row])) / declared
@@ -222,8 +229,8 @@ def _check_current(cell: Cell, record: Measurement) -> None:
 
 
 def capacity_bounds(cell: Cell, record: Measurement) -> CapacityBounds:
-    """What the voltages and the charge of a record say of the capacity, eq. (4): 0 and infinity where they say
-    nothing."""
+    """Bounds of the capacity from the voltages and the charge of a record, eq. (4); 0 and infinity where there are
+    none."""
     rows = np.unique(np.linspace(0, len(record) - 1, ROWS).astype(int))
     charge = record.discharged_ah("backward")[rows]  # as loggers write
     voltage = record.voltage_v[rows]
@@ -245,12 +252,13 @@ def capacity_bounds(cell: Cell, record: Measurement) -> CapacityBounds:
 
 
 def _pair(rows: IntArray, entry: int) -> tuple[int, int]:
-    """Rows of the record of an entry of the table of pairs."""
+    """The two rows of the record that belong to an entry of the table of pairs."""
     return int(rows[entry // len(rows)]), int(rows[entry % len(rows)])
 
 
 def _check_window(cell: Cell, record: Measurement) -> None:
-    """Of a voltage at rest, or in discharge, where it is lower still: more than that of a full cell is another's."""
+    """Raises DataError for a first voltage below empty, and for a voltage at rest or on discharge (where it is even
+    lower) above that of a full cell."""
     calm = np.abs(record.current_a) < SMALL_C_RATE * cell.nominal_capacity_ah
     full_v = max(float(cell.rest_voltage_v(np.array([1.0]))[0]), cell.upper_voltage_v)
     first_v = float(record.voltage_v[0])
@@ -280,6 +288,11 @@ def _check_capacity(cell: Cell, record: Measurement, slack: Slack | None = None)
             f". Or it was far colder than the {_declared_degc(cell):.4g} degC that the cell's file declares: give its "
             "temperature in a column temperature_degc, or declare another in that file (Initial temperature [K])"
         )
+    if _of_leads(cell, record):
+        fault += (
+            ". Or its voltage holds the drop of leads, as on two wires (`aesi data convert` prints the resistance that "
+            "the steps of its current show): a file that was calibrated with them has it"
+        )
     declared = [note.rstrip(".") for note in record.notes if CONVERTED in note and DECLARED in note]
     if declared:
         fault += f". First look at what was declared: {'; '.join(declared)}"
@@ -287,9 +300,16 @@ def _check_capacity(cell: Cell, record: Measurement, slack: Slack | None = None)
 
 
 def _of_the_cold(cell: Cell, record: Measurement) -> bool:
-    """Whether a record that the cell's capacity does not explain would be of it in the cold."""
+    """Whether a record that does not fit the cell's capacity would fit it if the cell was cold."""
     coldest = replace(record, temperature_degc=np.full(len(record), COLD_DEGC - MOST_SPANS * COLD_SPAN_K))
     return _capacity_fault(cell, record) is not None and _capacity_fault(cell, coldest) is None
+
+
+def _of_leads(cell: Cell, record: Measurement) -> bool:
+    """Whether a record that the cell's capacity does not explain would be of it behind leads."""
+    leads_ohm = LEADS_V_PER_C / cell.nominal_capacity_ah
+    wired = replace(cell, contact_resistance_ohm=cell.contact_resistance_ohm + leads_ohm)
+    return _capacity_fault(cell, record) is not None and _capacity_fault(wired, record) is None
 
 
 def _capacity_ah(cell: Cell) -> float:
@@ -297,7 +317,8 @@ def _capacity_ah(cell: Cell) -> float:
 
 
 def _capacity_fault(cell: Cell, record: Measurement, slack: Slack | None = None) -> str | None:
-    """What is moved between two voltages and which capacity that is of, where it is not the cell's, and why."""
+    """A clause on the charge between two voltages, the capacity that this requires and the likely cause; None where it
+    fits the cell's capacity."""
     bounds, allowed = capacity_bounds(cell, record), slack or Slack()
     declared = _capacity_ah(cell)
     if bounds.low_rows is not None and bounds.low_ah > TOO_SMALL * allowed.more * declared:
@@ -314,7 +335,7 @@ def _capacity_fault(cell: Cell, record: Measurement, slack: Slack | None = None)
 
 
 def _moved(record: Measurement, rows: tuple[int, int]) -> str:
-    """What flows between two rows, the fuller first, and the voltages there: one of them may be what is wrong."""
+    """A clause on the charge between two rows, the fuller one first, and the voltages there."""
     first, last = sorted(rows)
     charge = record.discharged_ah("backward")
     amount, way = abs(charge[last] - charge[first]), "leave" if rows[0] == first else "enter"
@@ -325,7 +346,7 @@ def _moved(record: Measurement, rows: tuple[int, int]) -> str:
 
 
 def _cause(ratio: float, record: Measurement) -> str:
-    """What the ratio of capacities rather says: units differ by factors that cells do not."""
+    """The likely cause of a ratio of capacities, a clause: units differ by larger factors than cells."""
     if ratio > 200.0:
         return (
             "the current is in mA or the time in ms; give A and s, or declare it: --unit current_a=mA, or --unit "
@@ -361,12 +382,12 @@ def _cause(ratio: float, record: Measurement) -> str:
 
 
 def _largest_drop_v(cell: Cell, record: Measurement, rows: IntArray, sign: float) -> Array:
-    """(n_rows,) V, eq. (1): how far no cell is below its rest voltage, or above it, under its current, or after that of
-    the half hour before. A smaller current the other way does not undo what came before it: after pulses of 12 A an LG
-    18650HG2 at -7 degC is 0.5 V below rest while a drive puts 0.6 A back. A record without a temperature is as warm as
-    the cell's file declares.
+    """(n_rows,) V, eq. (1): largest distance of the voltage below the rest voltage, or above it, with the present
+    current and those of the half hour before. A smaller current in the other direction does not undo the after-effect:
+    after pulses of 12 A an LG 18650HG2 at -7 degC is 0.5 V below rest while a drive charges with 0.6 A. A record
+    without a temperature has the one of the cell's file.
 
-    sign : 1 for below it, where discharge leaves a cell; -1 for above it.
+    sign : 1 for below the rest voltage (discharge); -1 for above it.
     """
     flows = sign * record.current_a
     since = np.searchsorted(record.time_s, record.time_s[rows] - AFTER_S)
@@ -394,7 +415,7 @@ def _declared_degc(cell: Cell) -> float:
 
 
 def _soc_of(cell: Cell, voltage_v: Array) -> Array:
-    """(n,) state of charge at which the cell rests at these voltages, held at a little beyond empty and full."""
+    """(n,) state of charge at these rest voltages, clipped to `BEYOND_SOC` beyond empty and full."""
     soc = np.linspace(0.0, 1.0, SOC_GRID)
     ocv = np.maximum.accumulate(cell.rest_voltage_v(soc))
     inside = np.interp(voltage_v, ocv, soc)

@@ -1,7 +1,7 @@
-"""Why a simulation cannot go on, in one sentence that names the true cause.
+"""The sentence on why a simulation cannot go on, with the true cause.
 
-Three causes look alike in a voltage and ask for different remedies: more charge than the cell has, a current that solid
-diffusion cannot follow, and one that the electrolyte cannot carry; the latter two grow with the cold.
+Three causes look alike in a voltage and need different remedies: more charge than the cell has, a current that solid
+diffusion cannot follow, and a current that the electrolyte cannot carry. The latter two are more likely in the cold.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from aesi.physics.model import EspmModel
 LAYERS = {1: "negative electrode", 2: "positive electrode"}
 SALT, NO_SOLUTION = 3, 4
 DRY_SHARE = 0.02
-"""Of the rest concentration at a collector: no reaction can be found because there is no salt for one."""
+"""Share of the rest concentration at a collector below which the lack of salt is why no reaction can be found."""
 
 RUN_ON = ', or let it run on: aesi simulate --run-on, in Python on_depletion="clip".'
 """How each of these sentences ends."""
@@ -53,7 +53,7 @@ def sentence(
 
 
 def _no_salt(model: EspmModel, kelvin: float, amperes: float, where: str) -> str:
-    """That the electrolyte ran dry; the cold is to blame where it would carry notably more when warm."""
+    """A clause: the electrolyte ran out of salt, by the cold where it would carry notably more when warm."""
     reference_k = model.cell.reference_temperature_k
     here, there = (carried_a(model, t) for t in (kelvin, reference_k))
     cause = (
@@ -71,9 +71,9 @@ def _no_salt(model: EspmModel, kelvin: float, amperes: float, where: str) -> str
 def _surface_left(
     model: EspmModel, kelvin: float, amperes: float, rows: Array, at: int, what: int, where: str
 ) -> str:
-    """That a surface is empty or full: by the charge that was asked for, or by a current too large for solid diffusion.
+    """A clause: a surface is empty or full, by the charge of the record or by a current too large for solid diffusion.
 
-    rows : of `run_plain`.  at : the faulty one.  what : 1 or 2, the electrode.
+    rows : as of `run_plain`.  at : the faulty row.  what : 1 or 2, the electrode.
     """
     cell, electrode, row = model.cell, (model.cell.negative, model.cell.positive)[what - 1], rows[:, at]
     every = (rows[5] - cell.negative.theta_min) / (cell.negative.theta_max - cell.negative.theta_min)
@@ -83,7 +83,7 @@ def _surface_left(
         f"{100 * soc:.1f} %"
     )
     if not 0.0 <= soc <= 1.0:
-        # A simulation goes on past its fault, so that all that is asked for is known.
+        # A simulation goes on past its fault, so that the charge of the whole record is known.
         asks, by = (
             ("asks for more charge than the cell has", -np.nanmin(every))
             if soc < 0.0
@@ -122,7 +122,7 @@ def ran_out(name: str, at_s: Mapping[str, float]) -> str:
 
 
 def carried_a(model: EspmModel, kelvin: float) -> float:
-    """A, the steady current at which the salt of one electrode is used up, at a diffusivity as at rest."""
+    """Steady current at which the salt in one electrode is depleted, A, with the diffusivity at rest."""
     cell, stack = model.cell, stack_of(model)
     e = cell.electrolyte
     faster = rate_factor(e.diffusivity_ea_j_mol, kelvin, cell.reference_temperature_k)
@@ -139,9 +139,10 @@ def carried_a(model: EspmModel, kelvin: float) -> float:
 
 
 def _cut_off(model: EspmModel, time_s: Array, voltage_v: Array, at: int, charging: bool) -> str:
-    """Where the cut-off voltage of a charge, or of a discharge, was passed before the fault: a cell is taken off there.
+    """A clause on the time before the fault at which the cut-off voltage was passed, where a test would end; '' where
+    it was not.
 
-    charging : whether a charge ends at the fault."""
+    charging : whether the cell is charged at the fault."""
     cell, seen = model.cell, voltage_v[: at + 1]
     name, limit = ("upper", cell.upper_voltage_v) if charging else ("lower", cell.lower_voltage_v)
     passed = seen > limit if charging else seen < limit

@@ -1,4 +1,4 @@
-"""Effects that do no more than change numbers of the cell file, written into the cell."""
+"""Write effects that only change numbers of the cell file into the cell."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from aesi.physics.model import EspmModel
 
 @dataclass(frozen=True)
 class Folded:
-    """cell : with what it can hold, named in its description, which else would tell of a file's author alone.
-    held, left : the effects that are in it now, and those that are not."""
+    """cell : with all effects that a cell file can hold; its description names them.
+    held, left : the effects that are in the cell now, and those that are not."""
 
     cell: Cell
     held: tuple[ActiveEffect, ...]
     left: tuple[ActiveEffect, ...]
 
     def same_window(self, declared: Cell) -> bool:
-        """Whether a state of charge means the same: a loss of lithium or of active material moves full and empty."""
+        """True where the stoichiometry windows are those of `declared`, so that a state of charge means the same; a
+        loss of lithium or of active material moves full and empty."""
         return all(
             (new.theta_min, new.theta_max) == (old.theta_min, old.theta_max)
             for new, old in ((self.cell.negative, declared.negative), (self.cell.positive, declared.positive))
@@ -30,10 +31,10 @@ class Folded:
 def folded(
     cell: Cell, effects: Iterable[ActiveEffect], stays: Callable[[ActiveEffect], bool] = lambda active: False
 ) -> Folded:
-    """The cell with every effect in it that acts on nothing but the cell's own parameters.
+    """The cell with every effect applied that acts on the parameters of a cell file alone.
 
-    An effect on the record, on the reading, on the voltage, or on what a cell file does not declare (layers, particle
-    sizes, a heat balance) is left, and so is one that `stays`.
+    Effects on the record, on the reading, on the voltage, or on parameters that a cell file does not declare (layers,
+    particle sizes, a heat balance) are left, and so are those that `stays` selects.
     """
     held: list[ActiveEffect] = []
     left: list[ActiveEffect] = []

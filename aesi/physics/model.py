@@ -1,4 +1,4 @@
-"""What a simulation solves: a declared cell plus the constitutive choices that effects may change.
+"""The model that a simulation solves: a cell and the constitutive choices that effects may change.
 
 Frozen and hashable by value: effects return changed copies, and everything derived is cached by value.
 """
@@ -16,17 +16,18 @@ from aesi.physics.cell.parts import NO_FILM, UNITY
 from aesi.physics.cell.relations import Constant, hashed_once
 
 DEFAULT_SOLID_ORDER = 12
-"""Against 24, it moves the voltage by 0.001 mV RMS at most: LG M50 to 2C, the load of `aesi bench espm`; 8 by 0.03
-mV. Where diffusion is ten times as slow, under a third of the load, by 0.02 mV; 8 by 0.3. Where a diffusivity falls
-off with the stoichiometry, as in the calibrated files, by 0.07 to 1.3 mV on what they were fitted to; 16 by 0.01 to
-0.8, 8 by 0.4 to 3.2."""
+"""Error of the voltage against 24 polynomials: 0.001 mV RMS at most (LG M50 to 2C, the load of `aesi bench espm`); with
+8, 0.03 mV. Where diffusion is ten times as slow, under a third of the load, 0.02 mV; with 8, 0.3. Where a diffusivity
+falls with the stoichiometry, as in the calibrated files, 0.07 to 1.3 mV on the records of their fits; with 16, 0.01 to
+0.8, with 8, 0.4 to 3.2."""
 DEFAULT_ELECTROLYTE_ORDER = 3
-"""Against 8, it moves that voltage by 0.007 mV RMS at most; 2 by 0.09 mV."""
+"""Error of that voltage against order 8: 0.007 mV RMS at most; with 2, 0.09 mV."""
 DEFAULT_ELECTRODE_POINTS = 7
-"""Against 14 (with twice the modes and half the steps), it moves the voltage by 0.13 mV RMS at worst: LG M50 at 2C to
-its cut-off, where the salt is all but gone; 6 by 0.24 mV at 0.78 of the time, 8 by 0.13 mV at 1.12 of it."""
+"""Error of the voltage against 14 points (with twice the modes and half the steps): 0.13 mV RMS at worst, LG M50 at 2C
+to its cut-off, where the salt is nearly depleted; with 6, 0.24 mV at 0.78 of the time, with 8, 0.13 mV at 1.12 of
+it."""
 DEFAULT_SUBSTEP_S = 1.0
-"""A convention; the effect `numerical_error` tells what a shorter one changes."""
+"""A convention; the effect `numerical_error` shows the influence of a shorter step."""
 ANY_NUMBER = 2**31
 """No limit."""
 
@@ -44,10 +45,10 @@ NO_PLATING = Plating(0.0, 0.5)
 
 @dataclass(frozen=True)
 class Interface:
-    """What happens at the particles of one electrode, beyond what the cell file says.
+    """Properties of the particles of one electrode that a cell file does not declare.
 
-    transfer_coefficient : of delithiation, one half where symmetric.  double_layer_f_m2 : capacity per reactive area.
-    bins : (share of the reactive area, radius over the declared radius), one pair a particle size.
+    transfer_coefficient : of delithiation, 0.5 for symmetric kinetics.  double_layer_f_m2 : F per m2 of reactive area.
+    bins : (share of the reactive area, radius over the declared radius), one pair per particle size.
     """
 
     transfer_coefficient: float = 0.5
@@ -58,9 +59,9 @@ class Interface:
 
 @dataclass(frozen=True)
 class HeatBalance:
-    """The cell as one lump: heat capacity (J/K), conductance to its surroundings (W/K).
+    """Lumped heat balance of the cell: heat capacity (J/K), conductance to its surroundings (W/K).
 
-    Its surroundings are the air about it, or its own case where the temperature of that was measured.
+    The surroundings are the ambient air, or the cell's own case where its temperature was measured.
     """
 
     heat_capacity_j_k: float
@@ -73,16 +74,17 @@ PLAIN = Interface()
 @hashed_once
 @dataclass(frozen=True)
 class EspmModel:
-    """A cell and what is assumed of it; the single particle ("espm") and the porous electrode ("dfn") both solve this.
+    """A cell with its constitutive and numerical choices, for the single particle ("espm") and the porous electrode
+    ("dfn") alike.
 
-    Effects return changed copies of it. Its name is that of the extended single-particle model, which it was made for.
+    Effects return changed copies of it. Its name comes from the extended single-particle model, its first use.
 
-    regions : layers into which each electrode is cut, with a particle (or one of each size) in each.
+    regions : number of layers into which each electrode is cut, with a particle (or one of each size) in each.
     heat : None for a temperature that is given or constant; see `of_record`.
-    solid_order : even Legendre polynomials a particle.  electrolyte_order : polynomial degree a layer.
-    electrode_points : of a porous electrode, where reaction and salt are resolved.
-    substep_s : longest step of whatever is not stepped exactly.  most_substeps : of them between two samples.
-    step_refinement : how much shorter than the row and `substep_s`, whichever is less, a step is.
+    solid_order : number of even Legendre polynomials per particle.  electrolyte_order : polynomial degree per layer.
+    electrode_points : points across a porous electrode at which reaction and salt are resolved.
+    substep_s : longest step of states that are not stepped exactly, s.  most_substeps : most steps between two samples.
+    step_refinement : divisor of the step, which is the shorter of the row and `substep_s`.
     """
 
     cell: Cell
@@ -134,12 +136,12 @@ def activation_energies(cell: Cell) -> Array:
 
 
 def of_record(model: EspmModel, measured: bool) -> EspmModel:
-    """The model for a record with or without the temperature of its case.
+    """The model for a record with or without a measured temperature of the case.
 
         C dT/dt = Q - (T - T_case)/R
 
-    Where that was measured no other heat balance counts; the winding has the temperature of its case where the file
-    tells no resistance R between them (`Cell.winding_resistance_k_w`).
+    A measured case temperature replaces any other heat balance. The winding has the temperature of the case where the
+    file declares no resistance R between them (`Cell.winding_resistance_k_w`).
     """
     if not measured:
         return model
@@ -149,12 +151,12 @@ def of_record(model: EspmModel, measured: bool) -> EspmModel:
 
 
 def case_k(model: EspmModel, winding_k: Array) -> Array | None:
-    """(n,) K of the case, whose temperature nobody measured, of a cell whose winding is at `winding_k` (n,).
+    """(n,) K, temperature of the case for a simulated temperature of the winding `winding_k` (n,).
 
         T_case = T_amb + (1 - R G) (T - T_amb)
 
-    A record of it is simulated as the model was: `of_record` conducts to the case what G gives off. None where no case
-    lies between winding and surroundings, since the balance gives off more than the winding conducts, G R >= 1.
+    A simulation with this case temperature (`of_record`) reproduces the one with the heat balance. None where
+    G R >= 1: the balance dissipates more heat than the winding can conduct to a case.
     """
     if model.heat is None:
         return winding_k

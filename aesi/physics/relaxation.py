@@ -9,7 +9,8 @@ from aesi.numerics.typing import Array
 
 
 def relax(discharge_ah: Array, charge_ah: Array, rate_1_ah: float, start: float) -> Array:
-    """(n,) the state at the samples, exact for steps of one sign; discharge_ah, charge_ah : (n - 1,) Ah, >= 0."""
+    """(n,) the state at the samples, exact for steps of one sign.  discharge_ah, charge_ah : (n - 1,) Ah, >= 0, in each
+    step.  rate_1_ah : 1/Ah.  start : initial state, -1 to 1."""
     out = np.empty(len(discharge_ah) + 1)
     _relax(discharge_ah, charge_ah, rate_1_ah, start, out)
     return out

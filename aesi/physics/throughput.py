@@ -1,4 +1,4 @@
-"""Charge that passed, whichever way, from samples."""
+"""Charge throughput from samples, by direction."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from aesi.physics.effect import Trace
 
 
 def step_throughput_ah(trace: Trace) -> tuple[Array, Array]:
-    """(n - 1,) Ah that passed as discharge, and as charge (both >= 0), in each step of the record.
+    """(discharged, charged), (n - 1,) Ah each, >= 0, in each step of the record.
 
     Exact for straight lines between samples (also where the sign changes within a step) and for held rows.
     """

@@ -1,4 +1,4 @@
-"""How many digits of a number are significant."""
+"""The significant digits of a number."""
 
 from __future__ import annotations
 
@@ -14,5 +14,5 @@ def resolving(value: float, low: float, high: float, least: int = 3, most: int =
 
 
 def decimals(largest: float, significant: int = 3) -> int:
-    """Decimals with which numbers up to `largest` in size have so many significant digits; none for nought."""
+    """Number of decimals with which numbers up to `largest` in magnitude have so many significant digits; 0 for 0."""
     return max(0, significant - 1 - floor(log10(largest))) if largest > 0.0 else 0

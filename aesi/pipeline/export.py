@@ -1,4 +1,4 @@
-"""A cell and what was found about it, for other tools: a BPX file, or a script that PyBaMM runs."""
+"""Export of a cell with its found effects for other tools: a BPX file, or a script for PyBaMM."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ what they are where it has none."""
 
 @dataclass(frozen=True)
 class Exported:
-    """files : what was written.  held, left : sentences on what is in them, and on what others do not get."""
+    """files : that were written.  held, left : sentences on their content, and on what the target cannot hold."""
 
     files: tuple[Path, ...]
     held: tuple[str, ...]

@@ -22,7 +22,7 @@ from aesi.records import Hold, Measurement, Run, at_its_temperature
 
 SEPARATOR = ": "
 MERE_NAMES = re.compile(r"[^\s,]+(, [^\s,]+)*")
-"""What notes share: names of records that hold no space. A note of another stays by itself, as sentences do."""
+"""Pattern by which notes of several records are joined: a record's name without a space. Other notes stay separate."""
 TELLING_K = 5.0
 """K from a cell's reference temperature beyond which activation energies tell: with 20 kJ/mol rates differ by a
 sixth. A convention."""
@@ -172,7 +172,7 @@ def of_fitted(
 
 
 def of_dry_collector(name: str, run: Run, model: ModelName) -> tuple[str, ...]:
-    """That a single particle used up the salt at a collector, and from when; () where it did not."""
+    """A sentence that a single particle model depleted the salt at a collector, with the time; () where it did not."""
     dry = np.minimum(run.series["c_e0"], run.series["c_eL"]) < 0.0
     if model != "espm" or not dry.any():
         return ()

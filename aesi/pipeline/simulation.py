@@ -48,13 +48,13 @@ if TYPE_CHECKING:
 DIGITS = 9
 """Significant digits of what is written, except for the time (or the frequency)."""
 TOLD_SD = 0.01
-"""Of charge, for which it is told how many volts a start is worth. A convention."""
+"""Change of state of charge for which a note gives the change of the voltage. A convention."""
 SayNotes = Callable[[Iterable[str]], None]
 
 
 @dataclass(frozen=True)
 class ProfileRequest:
-    """What a user says of a profile beside its file.
+    """The user's options for a profile, in addition to its file.
 
     soc0 : state of charge at the first row; None takes it from the file's voltage, where it has one (see
     `initial_state`), else from the saved model.
@@ -63,7 +63,7 @@ class ProfileRequest:
     reading : how the file is read.
     self_heating : the cell warms itself, by the thermal data of its file.
     soh : share of the file's capacity that the cell had then, or the day of the test; None takes all of it.
-    soc0_sd : for `predict_file` alone: how far soc0 may be off, one standard deviation; None takes it as exact.
+    soc0_sd : for `predict_file` alone: standard deviation of soc0; None takes soc0 as exact.
     run_on : for `simulate_file` alone: go on where a surface or the electrolyte runs empty or full, as `simulate` does
     with on_depletion="clip".
     """
@@ -94,7 +94,7 @@ def simulate_file(
     cell : a BPX file, or a folder of a saved model, whose cell and effects are taken (not its correction).
     effects : added to those.
     model : "espm" or "dfn"; None takes that of a saved model, or that the cell's file was fitted with, else "espm".
-    say_notes : is given what the reader dropped or mapped, what was assumed and what was reached, a sentence each.
+    say_notes : called with sentences on changes by the reader, on assumptions and on the result.
     Raises DataError where a measurement cannot be of this cell.
     """
     asked, say = asked or ProfileRequest(), say_notes or _silent
@@ -330,7 +330,8 @@ def _beside_physics(record: Measurement, corrected_mv: float, alone_v: Array | N
 
 
 def _too_much(soc: Array) -> str:
-    """Words, from ': ' on, on how far a record empties, or fills, a cell beyond what it has.  soc : (n,) simulated."""
+    """A clause, beginning with ': ', on how far a record discharges or charges a cell beyond its limits.  soc : (n,)
+    simulated."""
     said = []
     if (low := -float(np.min(soc))) > GIVEN_SD:
         said.append(f"asks for more charge than the cell has, by {100 * low:.1f} % of its capacity")
@@ -371,7 +372,7 @@ def _of_first(record: Measurement, prediction: Prediction, model: HybridModel, m
 
 
 def _of_exact(record: Measurement, prediction: Prediction, model: HybridModel, soc0: float) -> str:
-    """A sentence on what a band around a given start leaves out: that the start may be off."""
+    """A sentence that a band around a given start does not include an error of the start."""
     worth_v = model.start_worth_v(record, soc0, TOLD_SD, prediction.physics_v)
     return (
         f"{record.name}: the band takes the start at {soc0:.4g} as exact; {TOLD_SD:g} of charge more or less is worth "
@@ -381,7 +382,7 @@ def _of_exact(record: Measurement, prediction: Prediction, model: HybridModel, s
 
 
 def _of_band(record: Measurement, prediction: Prediction, model: HybridModel, measured: bool) -> list[str]:
-    """Sentences on where the correction is used, and on what its band holds of the rows that have one."""
+    """Sentences on where the correction is applied, and on the share of rows within its band."""
     if model.correction is None:
         empty = ", and lower_v and upper_v are empty" if prediction.nominal is None else ""
         said = [f"the model carries no learnt correction: one step ahead is the same as a free run{empty}."]

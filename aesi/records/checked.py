@@ -1,4 +1,4 @@
-"""What a caller gives as rows of numbers, checked where it enters: an array, or one sentence on what it is instead."""
+"""Checks of a caller's rows of numbers: the result is an array, or an error of one sentence."""
 
 from __future__ import annotations
 

@@ -143,11 +143,11 @@ class FreeRun:
 
 
 class ErrorModel(Protocol):
-    """What every model of the voltage error offers: sparse ensembles, baselines, the bare ESPM (zero)."""
+    """The interface of every model of the voltage error: sparse ensembles, baselines, the bare ESPM (zero)."""
 
     @property
     def name(self) -> str:
-        """What tables call it."""
+        """Its name in tables."""
         ...
 
     def one_step(self, series: ErrorSeries) -> Array:

@@ -1,4 +1,4 @@
-"""What was measured: a test of current and voltage, an impedance spectrum, and how a current runs between rows."""
+"""Measured data: a test of current and voltage, an impedance spectrum, and how a current runs between rows."""
 
 from __future__ import annotations
 

@@ -1,27 +1,27 @@
-"""A correction is shrunk towards the physics: as a whole by its slope on left-out drives, and far from its fitted rows.
+"""Shrinkage of a correction towards the physics: as a whole, by its slope on left-out drives, and far from fitted rows.
 
     c'(x) = a w(x) c(x),     w = n(x) / (1 + KAPPA max(h(x) / h_u - 1, 0)**2)                               (1)
     a = b - t s_b,     b = sum_d <e_d, n c_d> / sum_d (|n c_d|**2 + DOUBT |e_d|**2)    within [0, 1]                (2)
 
-c is the sum of the terms, h the leverage of x in their fit (leverage.py), n its nearness to what they were fitted to
-(trained_region.py). The amplitude a is the slope of the error e on the correction over drives d that the terms of c_d
-had not seen, less t times its standard error s_b. That error is a jackknife over drives, whose parts err alike and
-count as one. t is the quantile of Student's distribution for so many drives where a normal error would have one
-standard error (the rule of one standard error, SE below): two drives agree by chance more often than six. DOUBT is a
-ridge on the slope: where each drive lies outside of what the others visit, n c is all but zero on every one of them,
-and the slope would rest on nothing.
-The leverage is not in (2), nor in what a search judges: only the chosen ensembles get it, and w = n without it.
-The ridge on the coefficients shrinks them for the noise within drives, (2) shrinks their sum for what differs between
+c is the sum of the terms, h the leverage of x in their fit (leverage.py), n the nearness of x to the fitted rows
+(trained_region.py). The amplitude a is the slope b of the error e on the correction, over drives d that were left out
+of the fit of c_d, minus t times its standard error s_b. s_b is a jackknife over drives; parts of one drive have similar
+errors and count as one. t is the quantile of Student's distribution for so many drives at the level of one standard
+error of a normal distribution (one-standard-error rule, SE below): two drives agree by chance more often than six.
+DOUBT is a ridge on the slope: where each drive lies outside the range of the others, n c is close to zero on all of
+them, and the slope would be undetermined.
+The leverage is neither in (2) nor in the losses of a search: only the chosen ensembles have it, and w = n without it.
+The ridge on the coefficients shrinks them for the noise within drives, (2) shrinks their sum for differences between
 drives. Efron & Morris, J. Am. Stat. Assoc. 68 (1973) 117.
 
-Only models whose terms are free of the error fade: in one that feeds back, an amplitude would change its dynamics.
+Only models without terms in the error fade: with feedback, an amplitude would change the dynamics.
 
-What alternatives cost was measured over the development splits of the NMC drive in `aesi bench splits` (16 candidates),
-in points of the per cent taken off the squared error: off the declared model's in the mean; off the recalibrated one's
-in the mean and at worst. Half of SE: -1.1; -2.5, -3.4; none of it: -2.3; -5.2, -7.1. DOUBT of 0.003: -0.4; -1.0, -1.5;
-of 0.1: 0.0; -0.1, 0.5. KAPPA of 0.1 in place of none, as it was in all of these: -0.2; -1.0, 4.7; of 1: -4.2; -12.3,
-8.3: it keeps a correction from harm, and takes from it where it helps. Drives and t, in place of halves of drives
-and a t of 1 as in all of these: -0.1; -0.5, 1.0.
+The cost of alternatives was measured over the development splits of the NMC drive in `aesi bench splits` (16
+candidates), as a change of the reduction of the squared error, in percentage points: for the declared model in the
+mean; for the recalibrated one in the mean and at worst. Half of SE: -1.1; -2.5, -3.4; none of it: -2.3; -5.2, -7.1.
+DOUBT of 0.003: -0.4; -1.0, -1.5; of 0.1: 0.0; -0.1, 0.5. KAPPA of 0.1 in place of none, as it was in all of these:
+-0.2; -1.0, 4.7; of 1: -4.2; -12.3, 8.3: it avoids harm by a correction, and reduces its benefit. Drives and t, in
+place of halves of drives and a t of 1 as in all of these: -0.1; -0.5, 1.0.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ DOUBT = 0.03
 
 @dataclass(frozen=True, eq=False)
 class Fade:
-    """amplitude : a of (2).  region : what the terms were fitted to."""
+    """The weight of a correction.  amplitude : a of (2).  region : range of the rows that the terms were fitted to."""
 
     amplitude: float
     region: TrainedRegion
@@ -56,8 +56,11 @@ class Fade:
         return self.amplitude * self.kept(scaled, soc, temperature_degc, excess)
 
     def kept(self, scaled: Array, soc: Array, temperature_degc: Array | None, excess: Array | None) -> Array:
-        """(n,) w along scaled inputs (n, n_inputs) that were not held at the edge, with the (n,) excess of
-        the leverage, or None, which leaves w = n."""
+        """(n,) w of (1).
+
+        scaled : (n, n_inputs) scaled inputs, not clipped.  soc : (n,).  temperature_degc : (n,) degC, or None.
+        excess : (n,) of the leverage; None takes w = n.
+        """
         leverage = 0.0 if excess is None else KAPPA * excess**2
         near = self.region.nearness(scaled, soc, temperature_degc)
         return np.asarray(near / (1.0 + leverage))
@@ -75,8 +78,8 @@ class Fade:
 def amplitude(
     error: Array, correction: Array, folds: Sequence[Span], drives: IntArray, weights: Array
 ) -> float:
-    """a of (2).  error, correction n c, weights : (n,) of all folds; each row counts by its weight.
-    drives : (n_folds,) to which drive each fold belongs."""
+    """a of (2).  error : (n,) e.  correction : (n,) n c.  weights : (n,) of the rows.  drives : (n_folds,) number of
+    the drive of each fold."""
     sums = [
         (w @ e**2, w @ (e * c), w @ c**2)
         for e, c, w in ((error[a:b], correction[a:b], weights[a:b]) for a, b in folds)
@@ -85,10 +88,10 @@ def amplitude(
 
 
 def shrunken(sums: Array, drives: IntArray) -> float:
-    """a of (2) from (n_folds, 3) sums of e**2, e n c and (n c)**2; nought where there is nothing to tell it from.
+    """a of (2) from (n_folds, 3) sums of e**2, e n c and (n c)**2; 0 where these do not determine it.
 
-    drives : (n_folds,) to which drive each belongs; of a single drive the folds stand for drives. One fold alone has no
-    scatter to be wary of.
+    drives : (n_folds,) number of the drive of each fold; with a single drive its folds count as drives. A single fold
+    has no standard error, so that nothing is subtracted.
     """
     if not np.isfinite(sums).all() or not sums[:, 2].sum() > 0.0:
         return 0.0

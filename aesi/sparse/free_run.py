@@ -1,8 +1,8 @@
-"""Compiled free runs: the predicted error feeds back on itself, no measured voltage after the start.
+"""Compiled free runs: the predicted error is fed back, with no measured voltage after the start.
 
-A sparse model splits by the function q of the error that a term holds, e'[k+1] = sum_q q(e'[k]) g_q[k], where
-g_q depends on the inputs alone and is known for the whole record before the loop starts. What is left of a
-step is a sum over at most twelve functions.
+The terms of a sparse model are grouped by their function q of the error, e'[k+1] = sum_q q(e'[k]) g_q[k]. g_q depends
+on the inputs alone and is known for the whole record before the loop starts, so that a step is a sum over at most
+twelve functions.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ def ahead(drive: Array, functions: IntArray, measured: Array, steps: int, clip: 
 
 
 def remember(given: Array, memory: float, start: float) -> Array:
-    """Free run of a model without feedback: (n,) what the inputs give, and what is left of the first error.
+    """(n,) free run of a model without feedback: the prediction by the inputs plus the decaying first error.
 
     given : (n,) g(U[k]), the prediction of sample k + 1 by the inputs alone.  start : the error at sample 0.
     """
@@ -119,8 +119,10 @@ def remember_ahead(given: Array, memory: float, measured: Array, steps: int) -> 
 
 
 def held(scaled: Array, start: float) -> tuple[Array, int]:
-    """The series, which comes after `start`, with its last value inside LIMIT held from the first beyond it; and where
-    that is, or -1."""
+    """(series with the last value within LIMIT held from the first value beyond it on, index of that one or -1).
+
+    start : the value before the series.
+    """
     beyond = np.flatnonzero(~(np.abs(scaled) <= LIMIT))
     if not len(beyond):
         return scaled, -1

@@ -1,12 +1,12 @@
-"""How far a sample lies from those that a regression was fitted to: its leverage.
+"""The leverage of a sample: its distance from the rows of a regression's fit.
 
     h(x)**2 = theta(x)' (Theta' W Theta + lambda1 1)^-1 theta(x), the leverage                           (1)
     excess  = max(h / h_u - 1, 0),     h_u the upper quartile of h over the training rows                 (2)
 
-h is, in units of the noise, the standard error of the fitted value at x. It sees what the ranges of the inputs do
-not: a high current at a state of charge at which none was high, each of them within range. What a wrong model errs
-by there grows with h too. W are the weights of the rows, lambda1 is the ridge; (2) has no unit, so models with
-different rows compare. Hoaglin & Welsch, Am. Stat. 32 (1978) 17, doi:10.1080/00031305.1978.10479237.
+h is the standard error of the fitted value at x, in units of the noise. It detects combinations that the ranges of the
+single inputs do not: a high current at a state of charge where no fitted current was high. The error of a wrong model
+grows with h too. W are the weights of the rows, lambda1 is the ridge. (2) has no unit, so that models with different
+rows can be compared. Hoaglin & Welsch, Am. Stat. 32 (1978) 17, doi:10.1080/00031305.1978.10479237.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from aesi.numerics.typing import Array
 from aesi.sparse.stridge import triangle
 
 UPPER_QUARTILE = 0.75
-"""Quantile of h over the fitted rows; above it a row lies at their edge."""
+"""Quantile of h over the fitted rows above which a row counts as extreme."""
 LEAST_RIDGE = 1e-12
 """Least ridge, as a share of the largest squared diagonal: collinear terms without a ridge leave directions without
 any information."""

@@ -6,12 +6,12 @@ residual, and then
 
     e[k + 1] = g(U[k]) + memory (e[k] - g(U[k - 1]))
 
-which is stable, as memory < 1. (At the start of a record g(U[0]) stands for what came before, and where nothing was
-measured for the error there, too. A model with terms in the error then begins with none.)
+which is stable, as memory < 1. (At the start of a record g(U[0]) replaces g(U[-1]), and also the first error where that
+was not measured. A model with terms in the error then begins with zero error.)
 
-It lives in scaled variables (scaling.py). Inputs outside the trained range are held at its edge and flagged
-in `FreeRun.outside`; a prediction ten times beyond the trained range of the error is a divergence. What the model
-would say there if its terms went on with the slope they have at the edge is told by `reach`, for bands.
+The model works in scaled variables (scaling.py). Inputs outside the trained range are held at its edge and flagged in
+`FreeRun.outside`; a prediction ten times beyond the trained range of the error is a divergence. `reach` gives, for
+bands, how far the prediction would move if the terms continued beyond the edge with their slope there.
 """
 
 from __future__ import annotations
@@ -40,13 +40,12 @@ class SparseModel:
     """Active terms and their coefficients, in scaled variables.
 
     library : the active terms, over the error and the inputs.  coefficients : (m,), none of them zero.
-    dt_s : the sampling interval of the training records; the model is a map over one such step.
+    dt_s : sampling interval of the training records, s; the model is a map over one such step.
     memory : see above; 0 for a model with terms in e.
     inclusion : (m,) share of the ensemble's members that hold each term.
     low, high : (m,) 5th and 95th percentile of each coefficient over the ensemble's members.
-    leverage : of the fit. Bands of a free run ask for it, and where there is a `fade` it takes part in that, so that a
-    model says less with it than without.
-    fade : how the correction gives way to the physics, of a model without terms in e; None where it does not.
+    leverage : of the fit. Bands of a free run need it; a `fade` uses it too, and then shrinks the correction further.
+    fade : shrinkage towards the physics, for a model without terms in e; None for no shrinkage.
     """
 
     name: str
@@ -71,7 +70,7 @@ class SparseModel:
 
     @property
     def input_names(self) -> tuple[str, ...]:
-        """Inputs the model reads; those a record lacks are derived where that is possible."""
+        """Names of the model's inputs; inputs that a record lacks are derived where possible."""
         return self.library.variables[1:]
 
     def named(self, name: str) -> SparseModel:
@@ -79,7 +78,7 @@ class SparseModel:
         return replace(self, name=name)
 
     def coefficient_table(self) -> dict[str, float]:
-        """Term to coefficient."""
+        """Name of each term -> coefficient, in scaled variables."""
         return dict(zip(self.terms, self.coefficients.tolist(), strict=True))
 
     @property
@@ -92,8 +91,10 @@ class SparseModel:
         return self.k_step(series, 1)
 
     def free_run(self, series: ErrorSeries, error0_v: float | None = None) -> FreeRun:
-        """Prediction from `error0_v` (default: the measured error_v[0], or where that is NaN what the inputs give) with
-        its own feedback only."""
+        """Prediction of the whole record without measured errors after the first.
+
+        error0_v : initial error, V; None takes the measured error_v[0], or the value by the inputs where that is NaN.
+        """
         start_v = float(series.error_v[0]) if error0_v is None else error0_v
         variables = self._variables(series)
         error_v, diverged = self._freely(self._drive(variables, series), start_v)
@@ -112,10 +113,10 @@ class SparseModel:
         return self._ahead(self._drive(self._variables(series), series), series.error_v, steps)
 
     def reach(self, series: ErrorSeries, steps: int | None = None, error0_v: float | None = None) -> Array:
-        """(n,) V, >= 0: how much a prediction leaves open by holding inputs at the edge of their trained range.
+        """(n,) V, >= 0: change of the prediction if inputs were not held at the edge of their trained range, but the
+        terms continued beyond it with their slope there.
 
-        It is how far the prediction would move if the terms went on beyond the edge with the slope they have there.
-        steps : of a prediction so far ahead (`k_step`), or None for a `free_run`.  error0_v : as there.
+        steps : for a prediction so many samples ahead (`k_step`); None for a `free_run`.  error0_v : as there.
         """
         variables = self._variables(series)
         further = self.scaling.cut_off(variables)
@@ -133,14 +134,14 @@ class SparseModel:
         return self.scaling.is_outside(self._variables(series))
 
     def kept(self, series: ErrorSeries) -> Array:
-        """(n,) share of the correction that is kept along a record, w of fade.py; 1 of one that does not fade."""
+        """(n,) share of the correction that is applied along a record, w of fade.py; 1 where it does not fade."""
         if self.fade is None:
             return np.ones(len(series))
         return self.fade.kept(*self._place(self._variables(series), series))
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values, and an array in the leverage; the terms by their factors (variable, function) and, to be read,
-        by name."""
+        """Plain values, and an array in the leverage. Terms are given by their factors (variable, function) and, for
+        readers, by name."""
         return {
             "schema": SCHEMA,
             "name": self.name,
@@ -205,7 +206,8 @@ class SparseModel:
         return self.leverage.excess(evaluate_terms(self.library.terms, self.scaling.apply(variables)))
 
     def _freely(self, drive: Array, start_v: float) -> tuple[Array, int]:
-        """(n,) V from the error `start_v`, NaN where it is not known, and where the scaled run diverged, or -1."""
+        """(free run (n,) V, index at which the scaled run diverged or -1).  start_v : initial error, V; NaN where it is
+        not known."""
         start = self._unmeasured_v(drive) if np.isnan(start_v) else start_v
         scaled0 = float(self.scaling.error_to_scaled(np.array(start)))
         if self.has_feedback:
@@ -217,7 +219,7 @@ class SparseModel:
         return np.append(start, self.scaling.error_to_volts(scaled)), diverged
 
     def _unmeasured_v(self, drive: Array) -> float:
-        """V, the error at the first sample of a record of which nothing is measured."""
+        """The error at the first sample of a record without a measured error, V."""
         return 0.0 if self.has_feedback else float(self.scaling.error_to_volts(drive[0, :1])[0])
 
     def _ahead(self, drive: Array, error_v: Array, steps: int) -> Array:
@@ -232,8 +234,8 @@ class SparseModel:
         return np.append(error_v[:1], self.scaling.error_to_volts(scaled))
 
     def _drive(self, variables: Array, series: ErrorSeries, further: Array | None = None) -> Array:
-        """(n_functions, n): for each function of the error, the sum of its terms' input parts; further : how far
-        they go on along their slopes."""
+        """(n_functions, n): for each function of the error, the sum of its terms' input parts.  further : (n,
+        n_variables) distance by which the functions are continued along their slopes."""
         products = evaluate_terms(
             [term.without_error() for term in self.library.terms], self.scaling.apply(variables), further
         )
@@ -246,13 +248,13 @@ class SparseModel:
         return drive if self.fade is None else self._weight(variables, series) * drive
 
     def _weight(self, variables: Array, series: ErrorSeries) -> Array:
-        """(n,) what is left of the correction."""
+        """(n,) weight of the correction, a w of fade.py."""
         assert self.fade is not None
         return self.fade.weight(*self._place(variables, series))
 
     def _place(
         self, variables: Array, series: ErrorSeries
     ) -> tuple[Array, Array, Array | None, Array | None]:
-        """What a fade asks of each row."""
+        """The arguments of `Fade.weight` for each row."""
         unheld = self.scaling.apply(variables) + self.scaling.cut_off(variables)
         return unheld[:, 1:], series.soc, series.temperature_degc, self._excess(variables)

@@ -1,8 +1,8 @@
-"""The library and the solver for those who use PySINDy: a feature library and an optimizer.
+"""The library and the solver for PySINDy: a feature library and an optimizer.
 
     model = pysindy.DiscreteSINDy(feature_library=chebyshev_library(library), optimizer=stridge_optimizer(1e-3, 0.1))
 
-PySINDy takes seconds to import, so its classes are derived when they are asked for.
+PySINDy takes seconds to import, so that its classes are derived only when they are needed.
 """
 
 from __future__ import annotations

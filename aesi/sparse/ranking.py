@@ -2,9 +2,9 @@
 
     S = Theta diag(xi) = U Sigma V*,    S_j = sum_k u_jk U_k,    x_j = sum_k |u_jk| sigma_k / sum_k sigma_k
 
-The least-squares coefficients u_jk are exactly sigma_k V_jk, as U is orthonormal; the magnitude is taken, as
-the sign of a singular vector is arbitrary (the paper's formula has none, and would depend on that sign). The
-sum in the denominator runs over the singular values there are, m of them.
+The least-squares coefficients u_jk are exactly sigma_k V_jk, as U is orthonormal. Their magnitude is used, since the
+sign of a singular vector is arbitrary (the paper's formula has no magnitude, and depends on that sign). The sum in the
+denominator runs over all m singular values.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The solver of the sparse model for those who use scikit-learn: pipelines, cross-validation, grid search.
+"""The solver of the sparse model as a scikit-learn regressor, for pipelines, cross-validation and grid search.
 
     GridSearchCV(STRidgeRegressor(), {"lambda1": np.logspace(-6, 0, 7), "lambda2": [0.01, 0.1]})
 

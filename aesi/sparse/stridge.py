@@ -2,9 +2,9 @@
 
     xi = argmin |y - Theta xi|**2 + lambda1 |xi|**2,    then xi_j = 0 where |xi_j| < lambda2,
 
-repeated on the terms that are left until none is dropped. The norms are squared, as ridge regression means
-them. Solved through triangular factors: the normal equations would lose the cancelling coefficients of a
-collinear library, the more so as lambda1 goes down to 1e-13.
+repeated on the remaining terms until none is dropped. The norms are squared, as in ridge regression. It is solved
+through triangular factors: the normal equations would lose the accuracy of cancelling coefficients in a collinear
+library, all the more as lambda1 goes down to 1e-13.
 
 Rudy, Alla, Brunton & Kutz, SIAM J. Appl. Dyn. Syst. 18 (2019) 643, doi:10.1137/18M1191944.
 """
@@ -22,7 +22,8 @@ from aesi.numerics.typing import Array, IntArray
 
 @dataclass(frozen=True)
 class STRidge:
-    """lambda1 : ridge weight, >= 0.  lambda2 : smallest coefficient kept.  max_iter : solves at most."""
+    """The solver.  lambda1 : ridge weight, >= 0.  lambda2 : smallest coefficient kept, >= 0, in scaled units.
+    max_iter : most solves, >= 1."""
 
     lambda1: float
     lambda2: float

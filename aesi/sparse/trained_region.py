@@ -1,13 +1,13 @@
-"""How much of a correction is left at a sample that is remote from the rows that it was fitted to.
+"""The weight of a correction at a sample by its distance from the rows of the fit.
 
     w(x) = exp(-(sum_j d_j(x)**2 + d_T(x)**2) / (2 DISTANCE**2)) rho(g(x))                                  (1)
 
-d_j is how far the scaled input j lies outside its trained range, -1 to 1, d_T how far the temperature does, 1 where
-overpotentials change e-fold, and g the distance in the state of charge to the nearest trained row, since a gap between
-two drives lies within the range of each input. rho is the correlation of errors that far apart
-(`aesi.numerics.visited`): (1) is the share of its value at the nearest fitted row that the mean of a Gaussian process
-keeps, if that row alone is known. No term is in the temperature, which drives at one ambient do not vary enough to
-learn; so half its trained range, 2 K there, says nothing of how fast errors change with it, and Arrhenius' law does.
+d_j is the distance of the scaled input j from its trained range, -1 to 1. d_T is the distance of the temperature from
+its trained range, in units that change overpotentials e-fold. g is the distance in state of charge to the nearest
+trained row, since a gap between two drives lies within the range of each input. rho is the correlation of errors that
+far apart (`aesi.numerics.visited`): (1) is the mean of a Gaussian process at x over its value at the nearest fitted
+row, if that row alone is known. No term is in the temperature, which varies too little in drives at one ambient. Its
+scale is therefore from Arrhenius' law, not half its trained range, which is 2 K there.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ one's. A distance of 0.2 loses 0.6 and 1.4, and 1.2 and 0.9; one of 0.5 loses 0.
 
 @dataclass(frozen=True, eq=False)
 class TrainedRegion:
-    """low, high : (n_inputs,) the trained range, scaled.  visited : the charges and temperatures of the fitted rows."""
+    """The range of fitted rows.  low, high : (n_inputs,) of the scaled inputs.  visited : states of charge and
+    temperatures."""
 
     low: Array
     high: Array

@@ -1,4 +1,4 @@
-"""The baseline that nothing is fitted for, shown beside every figure: physics without a correction."""
+"""The baseline without a fit: physics without a correction."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from aesi.records import ErrorSeries, FreeRun
 
 @dataclass(frozen=True)
 class Bare:
-    """A physics model as it is: what `ErrorSeries.physics` holds under its name, or else the model of the series."""
+    """A physics model without correction: the one in `ErrorSeries.physics` under this name, else that of the series."""
 
     name: str = "ESPM"
 
     def one_step(self, series: ErrorSeries) -> Array:
-        """(n,) V: no measured error helps it; the first sample is the measured error_v[0]."""
+        """(n,) V, the difference of its voltage to that of the series; the first sample is the measured error_v[0]."""
         return self.k_step(series, 1)
 
     def free_run(self, series: ErrorSeries, error0_v: float | None = None) -> FreeRun:
-        """What it says beyond the model of the series; it knows no range, so no sample lies outside."""
+        """The difference of its voltage to that of the series; without a trained range no sample is outside."""
         return FreeRun(self._beyond(series), None, np.zeros(len(series), dtype=bool))
 
     def k_step(self, series: ErrorSeries, steps: int) -> Array:

@@ -1,1 +1,1 @@
-"""What every other folder stands on: environment, console, content keys, stored stages."""
+"""The basis of all other folders: environment, console, content keys, stored stages."""

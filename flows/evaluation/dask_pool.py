@@ -225,7 +225,7 @@ def _evaluate_timed(
 
 
 def evaluate_bytes(content: str, base: str, study: str, genome: bytes) -> bytes:
-    """What runs on a worker: genome in, outcome out, both without pickle."""
+    """The function that runs on a worker: genome in, outcome out, both without pickle."""
     return codec.dumps(guarded(_scorer(content, base, study), codec.loads(genome)))
 
 

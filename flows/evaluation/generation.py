@@ -14,7 +14,7 @@ from flows.evaluation.pool import Pool
 
 T = TypeVar("T")
 POLL_S = 0.2
-"""How often candidates that another process has claimed are looked for."""
+"""Interval between looks for candidates that another process has claimed, s."""
 
 
 @dataclass

@@ -25,7 +25,7 @@ from flows.base.interrupt import leaving_interrupts_to_us
 from flows.evaluation.pool import Evaluate, guarded, limit_memory
 
 WATCH_S = 1.0
-"""How often a worker's memory and its parent are looked at."""
+"""Interval between checks of a worker's memory and of its parent, s."""
 
 
 @dataclass

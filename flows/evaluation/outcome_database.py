@@ -1,4 +1,4 @@
-"""What has been computed, by content key, in a database that several machines reach."""
+"""Outcomes of candidates by content key, in a database that several machines share."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What has been computed, by content key, and who is computing what: on disk, or in a database.
+"""Outcomes of candidates by content key, and which process computes which: on disk, or in a database.
 
 Every process on a study walks through the same deterministic search. Before it evaluates a candidate it looks
 here, then claims it; a claim ends with its owner, whatever ends the owner.
@@ -16,7 +16,7 @@ class Outcomes(Protocol):
     """A store of results by key; keys are hexadecimal. All but `close` raise OSError where it is lost."""
 
     def get(self, key: str) -> bytes | None:
-        """What was stored under the key, or None."""
+        """The stored outcome of a key, or None."""
         ...
 
     def put(self, key: str, data: bytes) -> None:

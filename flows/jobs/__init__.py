@@ -1,1 +1,1 @@
-"""What a person starts: an experiment, a discovery, a calibration, a worker; as Prefect flows or plain functions."""
+"""The jobs that a user starts: experiment, discovery, calibration, worker; as Prefect flows or plain functions."""

@@ -71,7 +71,7 @@ def batch(
 
 
 def _say_plan(console: Console, jobs: Sequence[Job], source: Path, out: Path, workers: int) -> None:
-    """What will be done, what is passed over, and what is done again."""
+    """Print the jobs that will run, those that are skipped, and those that run again."""
     cells = "1 cell" if len(jobs) == 1 else f"{len(jobs)} cells, {workers} at a time,"
     console.say(f"{cells} from {source}; results in {out}")
     if empty := without_records(source):

@@ -1,4 +1,4 @@
-"""What was asked for on the command line of `aesi run`."""
+"""The options of one call of `aesi run`."""
 
 from __future__ import annotations
 

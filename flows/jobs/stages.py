@@ -37,7 +37,7 @@ class Stages(Protocol):
         ...
 
     def progress(self, name: str, done: int, total: int) -> None:
-        """How far the stage at work has come."""
+        """Progress of the present stage."""
         ...
 
     def publish(self, key: str, markdown: str, about: str) -> None:

@@ -1,1 +1,1 @@
-"""What is read back from the tracking store: tables, the user interface."""
+"""Results that are read back from the tracking store: tables, the user interface."""

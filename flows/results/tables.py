@@ -20,9 +20,9 @@ from flows.tracking.experiment_log import CODE, SETTING, UNFITTED
 from flows.tracking.store import KIND, Store, without_login
 
 RANGED = ("test_mser_pct", "test_mser_recalibrated_pct", "coverage_pct")
-"""What tables show with the range over seeds."""
+"""Figures that tables show with their range over seeds."""
 COUNTED = ("diverged",)
-"""What runs have together: a mean of them would say nothing."""
+"""Figures that are summed over the runs of one setting, not averaged."""
 NO_SETTING = ("seed", "versions", "search.workers", "search.timeout_s", "search.memory_mb")
 NO_SETTINGS = ("chosen_", "runner.", "tracking.")
 """Tracked parameters, and beginnings of some, that tell runs of one setting apart."""

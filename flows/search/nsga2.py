@@ -52,7 +52,7 @@ class Constraints:
 
 @dataclass(frozen=True)
 class SearchSettings:
-    """How a search goes about it.
+    """Settings of a search.
 
     population : candidates in a generation.  weights : of the scalar fitness.
     space : of the genomes; None takes the default one of the problem's library.

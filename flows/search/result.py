@@ -58,7 +58,7 @@ class SearchResult:
 
     @classmethod
     def of(cls, study: Study, library_size: int, weights: FitnessWeights) -> SearchResult:
-        """What the study holds now, in the order of the index."""
+        """The candidates of the study so far, in the order of the index."""
         stored = study.get_trials(deepcopy=False, states=FINISHED)
         trials = sorted((_read(trial) for trial in stored), key=lambda trial: trial.number)
         return cls(study, tuple(trials), library_size, weights)

@@ -164,7 +164,7 @@ class _Scores:
 
 
 def settings_of(problem: Problem, config: ExperimentConfig) -> SearchSettings:
-    """How an experiment searches."""
+    """Settings of the search of an experiment."""
     asked = config.search
     return SearchSettings(
         asked.population,

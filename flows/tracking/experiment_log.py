@@ -1,4 +1,4 @@
-"""What is logged of data, candidates and models, under names that suit the compare view and the tables."""
+"""The log of data, candidates and models, under names that suit the compare view and the tables."""
 
 from __future__ import annotations
 

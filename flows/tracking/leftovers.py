@@ -1,4 +1,4 @@
-"""What ended runs could not deliver to the tracking store, delivered by whoever comes next."""
+"""Items that an ended run could not deliver to the tracking store; the next process delivers them."""
 
 from __future__ import annotations
 

@@ -73,7 +73,7 @@ class Outbox:
 
     @property
     def pending(self) -> int:
-        """How many items are not delivered yet."""
+        """Number of items that are not delivered yet."""
         return len(self._waiting())
 
     def flush(self, timeout_s: float) -> int:

@@ -1,4 +1,4 @@
-"""What a tracked result came from: versions, commit, and whether the tree had changes."""
+"""Provenance of a tracked result: versions, commit, and whether the tree had changes."""
 
 from __future__ import annotations
 

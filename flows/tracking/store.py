@@ -31,7 +31,7 @@ from flows.tracking.whole_run import read_runs
 SQLITE = "sqlite:///"
 SERVERS, DATABASES = ("http", "https"), ("sqlite", "postgresql", "mysql", "mssql")
 DATABRICKS = ("databricks", "databricks-uc", "uc")
-"""What an address may begin with; MLflow's folder of files, which is any other, takes no new runs."""
+"""Admissible schemes of an address. Any other is a folder of files for MLflow, which takes no new runs."""
 MEANT_OTHERWISE = re.compile(r"%[0-9A-Fa-f]{2}|[?]")
 """Parts of a path that the address of a database has for other things: the file would be another."""
 PARENT = "mlflow.parentRunId"

@@ -1,4 +1,4 @@
-"""How MLflow's pages open: what an experiment is about, and the columns of its table of runs.
+"""Initial view of MLflow's pages: a description of the experiment, and the columns of its table of runs.
 
 MLflow keeps a view of an experiment as a tag of it and opens it by name, `?viewStateShareKey=aesi` in the address,
 which `aesi ui` prints. Without it the table shows no figure at all. Tags that are there already stay, so what a person

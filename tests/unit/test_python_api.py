@@ -94,6 +94,7 @@ def test_a_model_and_its_prediction_are_short_in_words(cell, record):
     prediction = model.predict(record.time_s, record.current_a)
     assert len(repr(prediction)) < 100
     assert "no band" in repr(prediction)
+    assert "97.5 % band" in repr(replace(prediction, nominal=0.975))
     assert {trace.name for trace in prediction.plot().data} == {
         "predicted",
         "physics alone",

@@ -37,7 +37,8 @@ ALIKE: dict[str, tuple[str, ...]] = {
     PANASONIC: ("25degC_cycle_1", "25degC_cycle_2", "25degC_cycle_3", "25degC_la92"),
     NMC: ("drive_cycle", "C2", "1C"),
 }
-"""Development records of one cell at one temperature."""
+"""Records of development cases of one cell at one temperature. Cases that judge are on them, too: a fault of every kind
+is put into the same drive of its cell, in sizes that choose and sizes that judge."""
 BEYOND_SDS = 2.58
 """99 % of a normal distribution."""
 

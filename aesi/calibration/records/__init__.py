@@ -1,1 +1,1 @@
-"""What a calibration takes of measured records: rows, a start, a temperature, and the zero of their current."""
+"""Measured records prepared for a calibration: rows, initial state, temperature, and zero offset of the current."""

@@ -1,4 +1,4 @@
-"""What a calibration is told beside the cell's file and the rows of its records."""
+"""Knowledge for a calibration in addition to the cell's file and the rows of its records."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from aesi.records import Spectrum
 
 
 class Prior(NamedTuple):
-    """What is known of a parameter from elsewhere, in the unit in which a report has it (of a factor, times the start
-    file's).  sd : standard deviation, in that unit; of the natural logarithm for factors, double layers and the thermal
+    """A user's prior of a parameter, in the unit of the report (a factor is relative to the start file).
+
+    sd : standard deviation in that unit; of the natural logarithm for factors, double layers and the thermal
     conductivity.
     """
 
@@ -23,18 +24,18 @@ class Prior(NamedTuple):
 
 @dataclass(frozen=True)
 class Conditions:
-    """Under which the records were taken, and what the file is to them; mappings are by record name.
+    """The conditions of the records, and their relation to the file; mappings are by record name.
 
-    soc0 : state of charge at the first row of every record that its voltage does not contradict.
-    temperatures_degc : of records without a column.
-    dates : days of the records: what is of another day may be of another age.  as_of : of the file's state, the last
-    with a load without it.
-    model : that is fitted, "espm" or "dfn"; None takes "espm".
-    same_cell : the file is of this very cell, so that a charge that is missing was lost and the stoichiometries of full
-    charge may be far from the file's; else it may be of a cell of another size, and its area is scaled to the charge
-    of a full discharge.
-    spectra : impedance of this very cell, fitted beside the records.
-    priors : of parameters as the report names them, in place of those that every cell has; a `Prior` or its two values.
+    soc0 : state of charge at the first row, for every record whose voltage does not contradict it.
+    temperatures_degc : degC, of records without a temperature column.
+    dates : days of the records; records of different days may have different ages.  as_of : day of the file's state;
+    None takes the last with a load.
+    model : "espm" or "dfn"; None takes "espm".
+    same_cell : True where the file is of this very cell: missing charge was lost, and the stoichiometries of full
+    charge may be far from the file's. False where it may be of a cell of another size: its area is scaled to the
+    charge of a full discharge.
+    spectra : impedance spectra of this very cell, fitted together with the records.
+    priors : parameter, as named in the report -> a `Prior` or its two values, in place of the default prior.
     """
 
     soc0: float | None = None

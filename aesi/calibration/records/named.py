@@ -1,4 +1,4 @@
-"""Names that tell the records of a calibration apart: what is given and found of a record is kept under its name."""
+"""Unique names for the records of a calibration, which are the keys of all that is given and found for a record."""
 
 from __future__ import annotations
 

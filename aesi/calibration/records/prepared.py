@@ -1,4 +1,4 @@
-"""Records made ready for a calibration: thinned, with an initial state and a temperature."""
+"""Records prepared for a calibration: thinned, with an initial state and a temperature."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from aesi.physics.simulation import ModelName
 from aesi.records import Hold, Measurement, at_its_temperature, hold_sentence
 
 SOC_SD = 0.005
-"""Least standard deviation of an initial state of charge that was read from a voltage, since the potentials that it was
-read from are being fitted; one that the user gave keeps its own."""
+"""Least standard deviation of an initial state of charge that was read from a voltage, since the fit moves the
+potentials of that reading; one that the user gave keeps its own."""
 OTHER_CELL_SD = 0.01
 """The same where the file is of another cell. The start file of the shipped ones, an LG M50, reads eight full
 charges of an LG 18650HG2 and a Panasonic NCR18650PF as 0.984 to 1.000, off by 0.010 root mean square. With 0.005 the
@@ -33,11 +33,12 @@ starts of the Panasonic's pulses at 10 and 0 degC, read as 0.976 and 0.977, end 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """One record as a calibration sees it.
+    """One record for a calibration.
 
-    data : as measured.  rows, hold : what is simulated.  kelvin : (rows,) K or None for the cell's own.
-    start : state of charge at the first row; soc_sd : what it is uncertain by here.  slow : C/7 at most.
-    flows : (rows,) 1 where a current flows, else 0.  trusted : (rows,) see `Thinned`.
+    data : as measured.  rows, hold : thinned rows for the simulation, and how their current runs.  kelvin : (rows,) K,
+    or None for the cell's own temperature.  start : state of charge at the first row.  soc_sd : its standard deviation
+    in the fit.  slow : True for C/7 at most.  flows : (rows,) 1 where a current flows, else 0.
+    trusted : (rows,) see `Thinned`.
     """
 
     data: Measurement
@@ -69,10 +70,11 @@ def prepared(
     same_cell: bool = False,
     cut: Collection[str] = (),
 ) -> tuple[Prepared, ...]:
-    """Every record with its rows and its initial state.  soc0 : of all that their voltage does not contradict.
+    """The records with their rows and initial states.
 
-    same_cell : the potentials are of this very cell.  cut : names of records without the rows that `soc0` is of, which
-    start where their voltage says.
+    soc0 : state of charge of all records whose voltage does not contradict it.  same_cell : True where the potentials
+    are of this very cell.  cut : names of records whose first rows were cut off, so that `soc0` does not apply and the
+    voltage is read.
     """
     least = SOC_SD if same_cell else OTHER_CELL_SD
     return tuple(
@@ -110,7 +112,7 @@ def _prepared(
 
 
 def hold_told(record: Prepared) -> str:
-    """How the current was taken between the rows that are simulated, for a reader; declared or not."""
+    """A sentence on the rows that are fitted and how the current runs between them."""
     declared = record.data.hold
     if record.rows is record.data:
         return hold_sentence(record.name, record.hold, declared is not None)
@@ -130,10 +132,10 @@ def hold_told(record: Prepared) -> str:
 def with_temperatures(
     cell: Cell, records: Sequence[Measurement], degc: Mapping[str, float]
 ) -> tuple[tuple[Measurement, ...], tuple[str, ...]]:
-    """The records with given temperatures (by name) where they have no column, and sentences on what is used.
+    """(records with the given temperatures, by name, where they have no column; sentences on the temperatures used).
 
-    cell : at whose temperature the others are taken.
-    Raises DataError for a temperature of a record that is not among them, or that has a column of its own.
+    cell : its initial temperature is that of the remaining records.
+    Raises DataError for a temperature of an unknown record, or of one that has a column of its own.
     """
     known = {r.name for r in records}
     for name in degc:
@@ -165,7 +167,7 @@ def with_temperatures(
 
 
 def check_charge(cell: Cell, record: Prepared) -> None:
-    """Refuse charge that takes the cell far beyond full or empty."""
+    """Raises DataError for a record whose charge takes the cell far beyond full or empty."""
     rows = record.rows
     soc = record.start.soc - rows.discharged_ah(record.hold) / cell.capacity_ah
     wrong = (soc < -SOC_MARGIN) | (soc > 1.0 + SOC_MARGIN)

@@ -16,10 +16,10 @@ OTHER_CELL = "the start file is of a cell with other kinetics, and what the fit 
 def against_temperature(
     cell: Cell, records: Sequence[Prepared], model: ModelName, given: Container[str] = ()
 ) -> tuple[str, ...]:
-    """A sentence for each such record: by the start file, before a fit makes up for it.
+    """A sentence for each record that contradicts its temperature, judged by the start file before a fit hides it.
 
-    cell : of the start file, of the size that the records tell.
-    given : names of the records whose temperature no column has.
+    cell : start cell, at the size that the records indicate.
+    given : names of the records whose temperature was given by the user, not in a column.
     """
     out = []
     for record in records:

@@ -1,7 +1,8 @@
-"""The zero of a cycler's current: what it reads too much, which at C/20 is several per cent.
+"""The zero offset of a cycler's current (reading minus true current), which at C/20 is several per cent.
 
-One discharge cannot tell it from capacity. A slow record that ends about as full as it began can: a cell gives back all
-but a thousandth of a charge, so that what a discharge seems to take beyond the charge after it is the zero's,
+One discharge cannot distinguish it from capacity. A slow record that ends about as full as it began can: a cell returns
+all but a thousandth of its charge, so that the excess of a discharge over the charge after it comes from the zero
+offset,
 
     zero = (q + Q (s_end - s_start)) / t,     q = integral of I dt over the record, I > 0 on discharge           (1)
 
@@ -37,8 +38,8 @@ from aesi.records import Measurement
 SLOW_C_RATE = 0.15
 """Slow records: below this rate the zero offset of a cycler's current is a notable share of it, and is fitted."""
 ZERO_SHARE = 5e-4
-"""Uncertainty of a cycler's zero where no cycle tells it, as a share of the largest current among the records; 0.1 %
-of a cycler's range is usual."""
+"""Standard deviation of a cycler's zero where no cycle determines it, as a share of the largest current among the
+records; 0.1 % of a cycler's range is usual."""
 
 
 REST_SHARE = 0.05
@@ -50,9 +51,9 @@ read 0, where there are any, and the least that flows is 32 % of the usual curre
 
 @dataclass(frozen=True)
 class Zero:
-    """What a cycler reads where no current flows: mean (A) and standard deviation, the same for all slow records.
+    """Zero offset of a cycler's current: mean and standard deviation, A, the same for all slow records.
 
-    sentences : on the cycles that tell it, and on those that do not, and why.
+    sentences : on the cycles that determine it, and on those that do not, with the reason.
     """
 
     mean_a: float
@@ -69,7 +70,7 @@ class Zero:
         return -self.mean_a / self.sd_a
 
     def taken_out(self, record: Measurement, nominal_ah: float) -> Measurement:
-        """A slow record without the mean; others as they are."""
+        """A slow record with the mean subtracted from its current; other records unchanged."""
         if not is_slow(record, nominal_ah):
             return record
         return replace(record, current_a=record.current_a - self.mean_a * steadily_flowing(record))
@@ -81,7 +82,7 @@ def is_slow(record: Measurement, nominal_ah: float) -> bool:
 
 
 def steadily_flowing(data: Measurement) -> BoolArray:
-    """(n,) True where a current flows in a slow record, and is not what its cycler reads at rest."""
+    """(n,) True where a current flows in a slow record, beyond the cycler's reading at rest."""
     size = np.abs(data.current_a)
     order = np.argsort(size)
     moved_as = np.cumsum((size * np.diff(data.time_s, prepend=data.time_s[0]))[order])
@@ -90,7 +91,7 @@ def steadily_flowing(data: Measurement) -> BoolArray:
 
 
 def zero_of(cell: Cell, records: Sequence[Measurement]) -> Zero:
-    """What is known of the zero before anything is fitted: from the cycles of slow records, (1), or of any cycler."""
+    """Prior of the zero offset: from the cycles of slow records, (1), else the usual one of cyclers."""
     means, sds, sentences = [], [], []
     for record in records:
         if not is_slow(record, cell.nominal_capacity_ah) or not _is_cycle(cell, record):
@@ -129,8 +130,8 @@ def _moved_ah(data: Measurement) -> Array:
 
 
 def _of_cycle(cell: Cell, data: Measurement) -> tuple[float, float] | str:
-    """(1) and its standard deviation, A, of a cycle; of one that does not go from full to full and rest there, why it
-    tells neither."""
+    """((1), its standard deviation), A, of a cycle; for one that does not go from full to full with a rest there, a
+    clause with the reason."""
     flows = steadily_flowing(data)
     last = int(np.flatnonzero(flows)[-1])
     if data.current_a[last] > 0.0:

@@ -1,1 +1,1 @@
-"""Rules from the past residuals to a raw band: fixed, rolling, or by quantile regression."""
+"""Rules that make a raw band from past residuals: fixed, rolling, or by quantile regression."""

@@ -1,4 +1,4 @@
-"""What a conformal method has to supply: a raw band from the past, for a whole record and for one step."""
+"""The interface of a conformal method: a raw band from past residuals, for a whole record and for one step."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from aesi.numerics.typing import Array, BoolArray, SavedState
 
 @dataclass(frozen=True, eq=False)
 class RawBand:
-    """low, high : (n,) V.  ready : (n,) False where the band cannot be made (history too short)."""
+    """An uncalibrated band.  low, high : (n,) V.  ready : (n,) False where the history is too short for a band."""
 
     low: Array
     high: Array
@@ -20,10 +20,10 @@ class RawBand:
 
 
 class Band(ABC):
-    """A fitted rule from the past to a raw band.
+    """A fitted rule that makes a raw band from past residuals.
 
-    `batch` and `row` agree: row k of `batch(residuals, current)` is `row(past, current[k - 3 : k + 1])`, `past` the
-    residuals before k since the last missing one, at most the window.
+    `batch` and `row` agree: row k of `batch(residuals, current)` is `row(past, current[k - 3 : k + 1])`, with `past`
+    the residuals before k since the last missing one, at most `window` of them.
     """
 
     kind: ClassVar[str]
@@ -35,13 +35,19 @@ class Band(ABC):
 
     @abstractmethod
     def batch(self, residuals: Array, current_a: Array | None) -> RawBand:
-        """The band of every sample of a record, (n,) V, from the residuals before it (NaN is missing) and the
-        current (n,) A up to and at it; None where the band does not need it."""
+        """The bands of all samples of a record. Each uses the residuals (n,) V before its sample (NaN where missing)
+        and the currents (n,) A up to and at it.
+
+        current_a : None where `needs_current` is False.
+        """
 
     @abstractmethod
     def row(self, past: Array, recent_current: Array) -> tuple[float, float] | None:
-        """The band after `past`: the finite residuals since the last missing one, at most the window,
-        most recent last. recent_current : A, the coming sample's at the end. None where `past` is too short."""
+        """(low, high) V of the next sample; None where `past` is too short.
+
+        past : finite residuals since the last missing one, V, at most `window`, most recent last.  recent_current : A,
+        with that of the next sample at the end.
+        """
 
     @abstractmethod
     def to_state(self) -> SavedState:

@@ -1,4 +1,4 @@
-"""What a regression sees: the raw window or causal features of it, and the current if it was calibrated with it."""
+"""The inputs of a regression: the raw window of residuals or features of it, and the current where it is used."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ class History:
 
     @property
     def needed(self) -> int:
-        """Samples before the first row."""
+        """Number of samples before the first row."""
         return N_LAGS if self.view == "features" else self.window
 
     @property
     def n_history(self) -> int:
-        """Columns that are made of residuals, V; they come first."""
+        """Number of columns that are made of residuals, V; they come first."""
         return n_features(self.window) if self.view == "features" else self.window
 
     def rows(self, residuals: Array, current_a: Array | None) -> tuple[Array, BoolArray]:
-        """Rows (n, p) for every sample of a record, and (n,) whether the history suffices."""
+        """(features (n, p) of every sample of a record, (n,) True where the history suffices)."""
         if self.view == "features":
             rows, ready = history_features(residuals, self.window)
         else:

@@ -1,4 +1,4 @@
-"""Bands that look at the residuals' distribution only: fixed (split conformal) or rolling (EnbPI)."""
+"""Bands from the distribution of the residuals alone: fixed (split conformal) or rolling (EnbPI)."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from aesi.numerics.compiled import kept_njit
 from aesi.numerics.typing import Array, BoolArray, SavedState
 
 ROUND_OFF = 1e-9
-"""Round-off that a rank is allowed, so that it is not missed by it."""
+"""Tolerance for round-off in a rank."""
 
 
 @dataclass(frozen=True, eq=False)
 class FixedBand(Band):
-    """Split conformal prediction: the same two quantiles for ever. low, high : V."""
+    """Split conformal prediction: two constant quantiles.  low, high : V."""
 
     low: float
     high: float
@@ -42,8 +42,8 @@ class FixedBand(Band):
 
 @kept_njit()
 def _window_quantiles(past: Array, levels: Array, out: Array) -> None:
-    # Position (n + 1) level among the order statistics: the rank of conformal prediction, interpolated. One that n
-    # residuals do not have is at infinity: the extreme in its place would make the band narrower than its level.
+    # Position (n + 1) level among the order statistics: the rank of conformal prediction, interpolated. A rank that n
+    # residuals do not have is infinite: the extreme in its place would make the band narrower than its level.
     ordered = np.sort(past)
     n = ordered.size
     for j in range(levels.size):
@@ -69,8 +69,8 @@ def _rolling(series: Array, window: int, needed: int, levels: Array, out: Array,
 class RollingBand(Band):
     """EnbPI's interval: the narrowest pair of quantiles of the last `window` residuals.
 
-    levels : (2 B,) pairs beta, 1 - alpha + beta; a pair is one to choose from once the residuals have its ranks.
-    needed : residuals before any pair is.
+    levels : (2 B,) pairs beta, 1 - alpha + beta; a pair may be chosen once there are enough residuals for its ranks.
+    needed : number of residuals before any pair may be chosen.
     Xu & Xie, ICML 2021 (EnbPI).
     """
 

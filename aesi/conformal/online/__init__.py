@@ -1,1 +1,1 @@
-"""One step ahead: a method calibrates on residuals, then replays a record or runs beside a cell."""
+"""Intervals one step ahead: a method is calibrated on residuals, then replays a record or runs online with a cell."""

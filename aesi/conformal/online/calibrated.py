@@ -1,4 +1,4 @@
-"""A calibrated method: replay a record, or run beside a cell one sample at a time."""
+"""A calibrated method: replays a record, or runs online with a cell one sample at a time."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ SCHEMA = "aesi.conformal/1"
 class Calibrated:
     """Intervals of the next residual at miss rate `alpha`, from the residuals before it.
 
-    method : the name it is registered under.  window : samples of history that are looked at.
-    band : the fitted rule.  scale : where the adaptive step starts.  rate : of that step; 0 without.
+    method : registered name.  window : number of past samples that are used.
+    band : the fitted rule.  scale : initial factor on its width.  rate : of the adaptive step; 0 for none.
     marginal_v : (low, high) V, used while the history is too short.
-    floor_v : V, no interval is narrower (the resolution of the calibration residuals).
+    floor_v : least width of an interval, V (the resolution of the calibration residuals).
 
-    A missing residual (NaN, a gap) ends the history: the marginal interval stands in, flagged by
-    `Intervals.warm`, until enough residuals have come.
+    A missing residual (NaN, a gap) ends the history. The marginal interval is then used, and `Intervals.warm` is False,
+    until there are enough residuals again.
     """
 
     method: str
@@ -41,16 +41,16 @@ class Calibrated:
     floor_v: float
 
     def __repr__(self) -> str:
-        return f"Calibrated({self.method}, {100 * (1 - self.alpha):.0f} %, window {self.window})"
+        return f"Calibrated({self.method}, {100 * (1 - self.alpha):g} %, window {self.window})"
 
     @property
     def needs_current(self) -> bool:
-        """Whether it was calibrated with the current, and so must be used with it."""
+        """True where it was calibrated with the current, so that predictions need the current too."""
         return self.band.needs_current or self.scale.needs_current
 
     def intervals(self, residuals: Array, current_a: Array | None = None) -> Intervals:
-        """Replay one continuous record: the interval of sample k is made from the residuals of samples before k
-        and the current up to and at k.
+        """The intervals along one continuous record. That of sample k uses the residuals before k and the current up to
+        and at k.
 
         residuals : (n,) V, evenly sampled as in the calibration; NaN where the voltage is missing.
         current_a : (n,) A, discharge positive; needed where `needs_current`, else ignored.
@@ -96,10 +96,10 @@ class Calibrated:
 
 
 class Stream:
-    """Intervals beside a running cell: `interval()` before a sample, `update(error_v)` after it.
+    """Intervals online with a running cell: call `interval()` before a sample, `update(error_v)` after it.
 
-    Memory is fixed (twice the window). The intervals equal those of `Calibrated.intervals` on the same
-    residuals. The object is mutable and belongs to one continuous record; call `gap()` after an interruption.
+    The memory is fixed (twice the window). The intervals equal those of `Calibrated.intervals` on the same residuals.
+    The object is mutable and belongs to one continuous record; call `gap()` after an interruption.
     """
 
     def __init__(self, calibrated: Calibrated) -> None:
@@ -110,9 +110,10 @@ class Stream:
         self._pending: _Pending | None = None
 
     def interval(self, current_a: float | None = None) -> tuple[float, float]:
-        """(low, high) V of the coming residual, given the current at its sample, A, where `needs_current`.
+        """(low, high) V of the next residual.
 
-        Asking again before `update` gives the same interval, or that of another current.
+        current_a : A, current at that sample; needed where `needs_current`. It may be called again before `update`,
+        also with another current.
         """
         pending = self._pending
         if pending is None or pending.current_a != current_a:
@@ -121,13 +122,13 @@ class Stream:
 
     @property
     def warm(self) -> bool:
-        """False while the history is too short and the marginal interval stands in (after `interval`)."""
+        """False while the history is too short, so that the last `interval` was the marginal one."""
         return self._pending is not None and self._pending.warm
 
     def update(self, error_v: float) -> None:
-        """Take in the residual that the last interval was for; NaN or infinity means that it is missing.
+        """Add the residual of the sample of the last interval, V; NaN or infinity where it is missing.
 
-        Raises InputError where the interval of this sample was not asked for and needs the current.
+        Raises InputError where `interval` was not called for this sample although it needs the current.
         """
         calibrated = self._calibrated
         low, high = self.interval() if self._pending is None else (self._pending.low, self._pending.high)
@@ -144,7 +145,7 @@ class Stream:
         self._past.append(error_v)
 
     def gap(self) -> None:
-        """The samples that follow are not adjacent to those before: forget the history, keep the scale."""
+        """Begin anew after an interruption: the history is dropped, the scale is kept."""
         self._past.clear()
         self._currents.clear()
         self._pending = None
@@ -171,7 +172,7 @@ class Stream:
 
 @dataclass(frozen=True)
 class _Pending:
-    """The interval that was given out and not yet judged."""
+    """The last interval, before its residual is known."""
 
     current_a: float | None
     low: float

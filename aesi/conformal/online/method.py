@@ -1,4 +1,4 @@
-"""From calibration residuals to a `Calibrated` method."""
+"""Methods: each makes a `Calibrated` from calibration residuals."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from aesi.numerics.quantiles import conformal_quantile
 from aesi.numerics.typing import Array
 
 RELATIVE_FLOOR = 1e-3
-"""No interval is narrower than this share of the marginal one: at rest the residual is constant to the sensor's
-quantisation, and a fitted width would shrink to zero."""
+"""Least width of an interval, as a share of the marginal one: at rest the residual is constant within the sensor's
+resolution, and a fitted width would shrink to zero."""
 MIN_WINDOW = 10
-"""The lags alone are ten residuals (`aesi.numerics.windows`)."""
+"""Shortest window, samples: the lagged features alone are ten residuals (`aesi.numerics.windows`)."""
 
 
 @dataclass(frozen=True, eq=False)
 class CalibrationData:
-    """What a method calibrates on: checked records (n_i,) V, their currents (n_i,) A or None, and settings."""
+    """Data and settings of a calibration: checked records (n_i,) V, their currents (n_i,) A or None, and settings."""
 
     records: list[Array]
     currents: list[Array] | None
@@ -40,7 +40,8 @@ class CalibrationData:
 
 @dataclass(frozen=True)
 class Method(ABC):
-    """A way to calibrate. `rate` is that of the adaptive step (`tracker`), 0 without."""
+    """A conformal method before calibration.  name : registered name.  rate : of the adaptive step (`tracker`); 0 for
+    none."""
 
     name: str
     rate: float = 0.0
@@ -53,14 +54,14 @@ class Method(ABC):
         rng: np.random.Generator | None = None,
         current_a: Sequence[Array] | None = None,
     ) -> Calibrated:
-        """Calibrate on out-of-sample residuals: held out or out of bag, never those of the fit.
+        """The method calibrated on out-of-sample residuals: held out or out of bag, never those of the fit.
 
-        residuals : one (n_i,) array a continuous record, V, all at one sampling rate; NaN is missing.
-        alpha : share of misses allowed, in (0, 1).  window : samples of history.
-        rng : used by randomised regressors only; default seed 0.
-        current_a : one (n_i,) array a record, A; methods that can use it then need it at prediction too.
+        residuals : one (n_i,) array per continuous record, V, all at one sampling rate; NaN where missing.
+        alpha : miss rate, in (0, 1).  window : samples of history.
+        rng : for randomised regressors only; the default has seed 0.
+        current_a : one (n_i,) array per record, A, discharge positive. A method that uses it needs it to predict, too.
 
-        Raises InputError for an impossible alpha, window or current, FitError for too few or constant residuals.
+        Raises InputError for an inadmissible alpha, window or current; FitError for too few or constant residuals.
         """
         self.check(alpha, window)
         records = checked_records(residuals)
@@ -73,16 +74,16 @@ class Method(ABC):
         return Calibrated(self.name, alpha, window, band, scale, self.rate, marginal, floor)
 
     def check(self, alpha: float, window: int) -> None:
-        """Raises InputError for settings that it cannot calibrate with, whatever the data."""
+        """Raises InputError for settings that the method cannot use with any data."""
         check_settings(alpha, window)
 
     @abstractmethod
     def band(self, data: CalibrationData) -> tuple[Band, Scale]:
-        """The raw band, and the factor on its half-width that calibrates it."""
+        """(raw band, factor on its half-width that calibrates it)."""
 
 
 def check_settings(alpha: float, window: int) -> None:
-    """Raises InputError for an alpha that is no share, or a window that is no number of samples, or too few."""
+    """Raises InputError for an alpha outside (0, 1), and for a window that is no whole number or too short."""
     if not 0 < alpha < 1:
         raise InputError(f"alpha = {alpha:g} is not a share of misses; give a value between 0 and 1.")
     if not isinstance(window, int | np.integer):
@@ -116,7 +117,7 @@ def width_floor(records: Sequence[Array], marginal_v: tuple[float, float]) -> fl
 
 
 def _at_least(width_v: float, interval_v: tuple[float, float]) -> tuple[float, float]:
-    """The interval, V, V; widened about its middle where it is narrower, as that of residuals mostly alike is."""
+    """(low, high) V: the interval, widened about its middle to at least `width_v` (most residuals may be equal)."""
     low, high = interval_v
     if high - low >= width_v:
         return interval_v
@@ -154,6 +155,6 @@ class EnbPI(Method):
         return RollingBand(data.window, self._needed(data.alpha), levels), Scale.none()
 
     def _needed(self, alpha: float) -> int:
-        """Residuals before any pair of ranks exists."""
+        """Number of residuals before any pair of ranks exists."""
         betas = level_pairs(alpha, self.n_betas)[: self.n_betas]
         return int(np.ceil(1 / np.minimum(betas, alpha - betas).max() - 1e-9)) - 1

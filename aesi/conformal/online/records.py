@@ -1,4 +1,4 @@
-"""Check what comes in: residuals and currents, one array a continuous record."""
+"""Checks of residuals and currents, one array per continuous record."""
 
 from __future__ import annotations
 

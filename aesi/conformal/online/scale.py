@@ -1,4 +1,4 @@
-"""The factor on the raw band that calibrates it, for each range of the current."""
+"""The factor on the half-width of the raw band that calibrates it, for each range of the current."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ for the misses of that. Records of which 20, 10 and 5 % are driven by currents o
 grow with them (spci_boosted at 90 %): charging is covered 91.2, 91.6 and 91.4 %, in one group with rest 85.1, 79.8 and
 69.5; discharging 90.9, 90.3 and 91.5, and 92.4, 92.6 and 96.0."""
 ENOUGH_SCORES = 200
-"""Held-out samples from which a group is scaled by its own scores rather than by all."""
+"""Fewest held-out samples for a group to be scaled by its own scores; a smaller one is scaled by all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ class Scale:
 
     @property
     def needs_current(self) -> bool:
-        """Whether there is more than one group."""
+        """True where there is more than one group."""
         return self.edges_a.size > 0
 
     def groups(self, current_a: Array) -> IntArray:

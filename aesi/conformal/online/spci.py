@@ -26,11 +26,12 @@ from aesi.numerics.blocks import dealt_folds
 from aesi.numerics.typing import Array, BoolArray
 
 N_BLOCKS = 25
-"""Contiguous runs that the rows are cut into, each long against the correlation of neighbours. A convention."""
+"""Number of contiguous runs of rows, each long against the correlation of neighbours. A convention."""
 N_FOLDS = 5
 """Every fifth run is held out in turn, as is usual in cross-validation."""
 ENOUGH_ROWS = 20_000
-"""From here on one fold scales the band; a coverage of 90 % over its 4,000 rows has a standard error of 0.5 %."""
+"""Number of rows from which one held-out fold scales the band: a coverage of 90 % over its 4,000 rows has a standard
+error of 0.5 %."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,9 +47,9 @@ class SPCI(Method):
     rows_a_column: int = 10
 
     def band(self, data: CalibrationData) -> tuple[Band, Scale]:
-        """With fewer than ENOUGH_ROWS rows cross-conformal: all folds are scored, each by a regression that did not see
-        it, and one on all rows is served. From there split conformal: one fold is held out and scored, and the
-        regression that did not see it is served."""
+        """With fewer than ENOUGH_ROWS rows the calibration is cross-conformal: each fold is scored by a regression
+        without it, and the band is that of a regression on all rows. With more rows it is split conformal: one fold is
+        held out and scored, and the band is that of the regression without it."""
         currents = data.currents if self.use_current else None
         history = History(data.window, self.view, currents is not None)
         rows, targets, current = stacked(data.records, currents, history)
@@ -90,9 +91,9 @@ def stacked(
 
 
 def cross_scores(of_folds: list[RegressionBand], held_out: list[BoolArray], task: FitTask) -> Array:
-    """(n,) `half_width_scores` of each row by the band that did not see it, NaN of a row that all have seen.
+    """(n,) `half_width_scores` of each row by the band that was fitted without it; NaN for a row in all fits.
 
-    held_out : (n,) of each band, the rows that it did not see; no row twice.
+    held_out : (n,) for each band, True for the rows that it was fitted without; no row twice.
     """
     scores = np.full(len(task.targets), np.nan)
     for band, held in zip(of_folds, held_out, strict=True):

@@ -1,4 +1,4 @@
-"""What a regressor of the SPCI family has to supply: quantiles of the next residual from feature rows.
+"""The interface of a regressor of the SPCI family: quantiles of the next residual from feature rows.
 
 A new regressor is one small file with a `QuantileModel`, a line in `aesi.conformal.saved` and a method that
 fits it in `aesi.conformal.registry`.
@@ -18,10 +18,10 @@ from aesi.numerics.typing import Array, BoolArray, SavedState
 
 @dataclass(frozen=True, eq=False)
 class FitTask:
-    """What a regressor is fitted to.
+    """The data and settings of a regressor's fit.
 
     rows : (n, p); the first n_history columns are residuals or linear in them, V.  targets : (n,) V.
-    levels : (2 B,) quantile levels.  floor_v : V, no band is narrower.
+    levels : (2 B,) quantile levels.  floor_v : least width of a band, V.
     """
 
     rows: Array
@@ -52,9 +52,9 @@ class QuantileModel(ABC):
     @classmethod
     @abstractmethod
     def from_state(cls, state: SavedState, kinds: Kinds) -> Self:
-        """Inverse of `to_state`; `kinds` holds the regressors that may stand inside this one."""
+        """Inverse of `to_state`; `kinds` has the regressors that may be part of this one."""
 
 
 RegressorFit = Callable[[FitTask], QuantileModel]
 Kinds = Mapping[str, type[QuantileModel]]
-"""Regressors by their `kind`, the word that a saved state names them by."""
+"""Kind, as in a saved state -> class of the regressor."""

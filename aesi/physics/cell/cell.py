@@ -28,18 +28,19 @@ class Cell(CellParameters):
 
     @classmethod
     def from_bpx(cls, source: str | PathLike[str] | Mapping[str, Any], fitted: bool = False) -> Self:
-        """Read a BPX file (a path) or what it holds (a dict), versions 0.x and 1.x.
+        """The cell of a BPX file (a path) or of its content (a dict), versions 0.x and 1.x.
 
-        fitted : it is of a saved model, and a fit may have moved transport and kinetics beyond what tells another unit.
-        Raises CellError, one sentence, for a file that fails the schema or lacks a field this model needs.
+        fitted : True for the file of a saved model: transport and kinetics are not checked for wrong units, since a fit
+        may have moved them beyond those limits.
+        Raises CellError, one sentence, for a file that fails the schema or lacks a field that this model needs.
         """
         return cls(**vars(read_bpx(source, fitted)))
 
     def with_cut_offs(self, lower_v: float, upper_v: float) -> Self:
-        """The cell with other cut-off voltages, V: what is empty and full of a cell that is cycled between these.
+        """The cell with other cut-off voltages, V, for a cell that is cycled between these.
 
-        Stoichiometry limits stay, so that until a calibration has moved them a state of charge of 0 or 1 is still at
-        the cut-offs before.
+        The stoichiometry limits do not change: a state of charge of 0 or 1 stays at the previous cut-offs until a
+        calibration moves the limits.
 
         Raises CellError for cut-offs that no cell has, and for an upper one far from the voltage of the full cell.
         """
@@ -48,5 +49,5 @@ class Cell(CellParameters):
         return cell
 
     def to_bpx(self) -> dict[str, Any]:
-        """The cell as a BPX 1.x dict; `Cell.from_bpx` gives the cell back."""
+        """The cell as a BPX 1.x dict; `Cell.from_bpx` restores it."""
         return write_bpx(self)

@@ -1,4 +1,4 @@
-"""Priors of activation energies, for cells whose records do not determine them, and when records do."""
+"""Priors of activation energies, for records that do not determine them."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from typing import NamedTuple
 from aesi.physics.cell.cell import Cell
 
 SPAN_K = 8.0
-"""Records have to span this many kelvins before activation energies and entropy move."""
+"""Least span of the records' temperatures for a fit to move activation energies and entropy, K."""
 SOLID_EA, SALT_EA = 20e3, 5e3
-"""J/mol, deviations of the prior: a convention, with the sources below between 12 and 81, and 12 and 21 kJ/mol."""
+"""Standard deviations of the prior, J/mol: a convention; the sources below have 12 to 81, and 12 to 21 kJ/mol."""
 ENERGIES = (
     "graphite 30.3, NCO 80.6 kJ/mol, Ecker et al. 2015, doi:10.1149/2.0551509jes; graphite-SiOx 17.4, NMC811 12.0, "
     "O'Regan et al. 2022, doi:10.1016/j.electacta.2022.140700; NMC811 25, O'Kane et al. 2022; all as PyBaMM has them"
 )
 RATE_ENERGY, RATE_ENERGY_SD = 55e3, 12e3
-"""J/mol: what lithium pays to leave its solvent, the mean of the sources. Lower values (40 and 24 in O'Regan et al.
-2022, as PyBaMM has them) are of rates that hold contacts and films too."""
+"""J/mol: desolvation energy of lithium, the mean of the sources. Lower values (40 and 24 in O'Regan et al. 2022, as
+PyBaMM has them) are of rates that include contacts and films."""
 KINETIC_ENERGIES = (
     "graphite 68, NCA 50 kJ/mol, Jow, Marx & Allen 2011, ECS Trans. 33 (23) 1, abstract; graphite 53.4, NCO 43.6, "
     "Ecker et al. 2015, as PyBaMM has them"
@@ -37,7 +37,7 @@ OF_FILMS = (
 
 
 class EnergyPrior(NamedTuple):
-    """Of an activation energy that no record tells: mean and standard deviation, J/mol, and where they are from."""
+    """Prior of an activation energy: mean and standard deviation, J/mol, and source."""
 
     mean_j_mol: float
     sd_j_mol: float
@@ -45,8 +45,8 @@ class EnergyPrior(NamedTuple):
 
 
 def energy_priors(cell: Cell) -> dict[tuple[str, str], EnergyPrior]:
-    """(part of the cell, its rate) -> what is known of that rate's energy: of diffusion about what the file has, of
-    kinetics and films about the literature, since those of files often hold contacts, too."""
+    """(part of the cell, its rate) -> prior of that rate's activation energy. It is centred on the file's value for
+    diffusion, and on the literature for kinetics and films, since the values of files often include contacts."""
     n, p, e = cell.negative, cell.positive, cell.electrolyte
     return {
         ("negative", "diffusivity"): EnergyPrior(n.diffusivity_ea_j_mol, SOLID_EA, ENERGIES),

@@ -1,15 +1,15 @@
-"""State of health: the share of its file's capacity that a cell had, given as that share or as the day of a test.
+"""State of health: capacity of a cell over that in its file, given as this share or as the day of a test.
 
-A cell that is tested for weeks ages on the way, so that a record is of the capacity of its day and not of the file's.
-The records of a calibration each have a share of the file's capacity, and those with a date tell how it went: between
-two days the share runs evenly,
+A cell that is tested for weeks ages in the meantime, so that a record has the capacity of its day and not that of the
+file. Each record of a calibration has a share of the file's capacity. Between the days of dated records the share is
+interpolated linearly,
 
     soh(t) = soh_k + (soh_{k+1} - soh_k) (t - t_k)/(t_{k+1} - t_k)                                             (1)
 
-with the mean of the records of one day. Before the first day and after the last nothing tells it.
+with the mean of the records of one day. Before the first day and after the last it is unknown.
 
-Leaves out that cells age by use more than by days, whatever a record itself would say of its cell's capacity, and the
-day of the file's own state where no record is of it.
+Left out: ageing by use and not by days, information of a record itself on its cell's capacity, and the day of the
+file's own state where no record has that day.
 """
 
 from __future__ import annotations
@@ -26,14 +26,15 @@ Soh = float | date
 """A share of the file's capacity, or the day of a test."""
 
 LEAST_SOH, MOST_SOH = 0.2, 1.5
-"""Cells are followed to half of their capacity, seldom further: less than a fifth is a slip of the point, and the model
-a shell. A file may be of an aged cell; beyond the other end it is of another. Conventions."""
+"""Limits of a state of health. Tests seldom go below half of the capacity, so that less than a fifth is a misplaced
+decimal point. More than 1 is possible with the file of an aged cell; beyond the upper limit it is of another cell.
+Conventions."""
 
 
 def read_soh(text: str) -> Soh:
-    """A state of health as it is written: a share (0.97) or a day (2018-11-13).
+    """The state of health in a text: a share (0.97) or a day (2018-11-13).
 
-    Raises CellError for what is neither, and for a share as `checked_soh` does.
+    Raises CellError for any other text, and for a share as `checked_soh` does.
     """
     try:
         share = float(text)
@@ -51,7 +52,7 @@ def read_soh(text: str) -> Soh:
 
 
 def checked_soh(soh: Soh) -> Soh:
-    """The state of health; a moment becomes its day.
+    """The state of health, checked; a `datetime` becomes its day.
 
     Raises CellError for a share outside [`LEAST_SOH`, `MOST_SOH`].
     """
@@ -66,16 +67,16 @@ def checked_soh(soh: Soh) -> Soh:
 
 
 def day_of(given: date) -> date:
-    """The day of a date, which in Python may also be a moment (`datetime`): two moments of one day are one day here."""
+    """The day of a date; a `datetime`, which Python counts as a date too, loses its time."""
     return given.date() if isinstance(given, datetime) else given
 
 
 def shares_by_day(
     shares: Iterable[tuple[str, float]], tested: Mapping[str, date]
 ) -> tuple[list[date], Array]:
-    """Days in order, and (days,) the mean share of the records of each.
+    """(days in order, mean share (days,) of the records of each).
 
-    shares : (record, share of the file's capacity).  tested : days by record; one without a day tells nothing.
+    shares : (record, share of the file's capacity).  tested : record -> day; records without a day are ignored.
     """
     by_day: dict[date, list[float]] = {}
     for name, share in shares:

@@ -1,6 +1,6 @@
-"""Constitutive relations: a constant, an expression in x, a table, and what effects make of them.
+"""Constitutive relations: a constant, an expression in x, a table, and their scaled copies, sums and products.
 
-Relations are frozen and hashable by value, so that whatever is computed from them can be cached.
+Relations are frozen and hashable by value, so that results computed from them can be cached.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from aesi.numerics.typing import Array
 from aesi.physics.cell.expression import compile_expression
 
 OCP_POINTS = 8193
-"""At which the models look potentials up. Four times as many points move the voltage by less than 1e-4 mV RMS under the
-load of `aesi bench espm`, and so for the electrolyte's. A mixture without closed form is written at them too, so that
-the models read the same numbers back."""
+"""Points of the tables in which the models look up potentials and electrolyte properties. Four times as many change the
+voltage by less than 1e-4 mV RMS under the load of `aesi bench espm`. A combination without closed form is written to a
+file at these points too, so that the models read the same numbers back."""
 
 LEAST_TRANSPORT = 1e-3
-"""Of a diffusivity at half filling, or of a transport property of the salt at rest: what is taken where its formula
-gives no positive number, as a polynomial may outside the range of its fit."""
+"""Share of a diffusivity at half filling, or of a transport property of the salt at rest, that replaces values which
+are not positive; a polynomial may have such values outside the range of its fit."""
 WORKING_SPAN = (0.05, 2.0)
 """Concentrations of salt, relative to rest, at which cells work."""
 
@@ -32,10 +32,10 @@ HASH = "_hash"
 
 
 def hashed_once(kind: type[Hashed]) -> type[Hashed]:
-    """A frozen dataclass whose hash by value is worked out once: each simulation looks its model up by value, and a
-    cell is deep.
+    """Class decorator: a frozen dataclass whose hash by value is computed once. Each simulation looks up its model by
+    value, and a cell is deeply nested.
 
-    What is pickled is without it, since a text has another hash in each process.
+    The hash is not pickled, since texts have another hash in each process.
     """
     by_value = kind.__hash__
 
@@ -84,7 +84,7 @@ class Expression:
 @hashed_once
 @dataclass(frozen=True)
 class LookupTable:
-    """Straight lines between points; constant beyond the first and the last."""
+    """Linear interpolation between points; constant beyond the first and the last."""
 
     x: tuple[float, ...]
     y: tuple[float, ...]
@@ -102,7 +102,7 @@ class LookupTable:
 
     @cached_property
     def _points(self) -> tuple[Array, Array]:
-        """As arrays: balances look a potential up hundreds of times."""
+        """(x, y) as arrays; cached, since a balance evaluates a potential hundreds of times."""
         return np.array(self.x), np.array(self.y)
 
 
@@ -159,7 +159,7 @@ def scaled(relation: Relation, factor: float) -> Relation:
 
 
 def relation(value: object, what: str) -> Relation:
-    """A relation from what a BPX file holds: a number, text, or {"x": [...], "y": [...]}.
+    """The relation of a value in a BPX file: a number, text, or {"x": [...], "y": [...]}.
 
     Raises CellError naming `what`.
     """
@@ -178,7 +178,7 @@ def relation(value: object, what: str) -> Relation:
 
 
 def _column(table: Mapping[str, Any], name: str) -> tuple[float, ...]:
-    """Raises CellError for what is no list of numbers; a file may hold words, gaps or a lone number there."""
+    """One column of a table.  Raises CellError for anything but a list of numbers."""
     values = table[name]
     if not isinstance(values, Sequence | np.ndarray) or isinstance(values, str):
         raise CellError(f"{name} of a table is {values!r}, and has to be a list of numbers.")
@@ -192,10 +192,10 @@ def _column(table: Mapping[str, Any], name: str) -> tuple[float, ...]:
 
 
 def to_bpx(item: Relation, low: float = 0.0, high: float = 1.0) -> float | str | dict[str, list[float]]:
-    """The relation as a BPX file holds it; a mixture without closed form becomes a table on [low, high].
+    """The relation as a value in a BPX file; a combination without closed form becomes a table on [low, high].
 
-    Its rows are the points of its own tables and, where it is curved between them, a uniform grid of `OCP_POINTS`.
-    Raises CellError where such a mixture is not finite inside.
+    The rows of such a table are the points of its own tables and, where it is curved between these, a uniform grid of
+    `OCP_POINTS`.  Raises CellError where the combination is not finite inside.
     """
     match item:
         case Constant(value):
@@ -223,7 +223,7 @@ def to_bpx(item: Relation, low: float = 0.0, high: float = 1.0) -> float | str |
 
 
 def without_poles(values: Array) -> Array:
-    """(n,) values on a grid, those at either end replaced by their neighbours where they are not finite."""
+    """(n,) values on a grid, with values at either end that are not finite replaced by their neighbours."""
     values = values.copy()
     values[0] = values[0] if np.isfinite(values[0]) else values[1]
     values[-1] = values[-1] if np.isfinite(values[-1]) else values[-2]
@@ -244,7 +244,7 @@ def _knots(item: Relation) -> Array:
 
 
 def _straight(item: Relation) -> bool:
-    """Do straight lines between its knots, and its values at the ends beyond them, give all of it?"""
+    """True where the relation is linear between its knots and constant beyond them."""
     match item:
         case Constant() | LookupTable():
             return True
@@ -282,7 +282,7 @@ def _joined(first: Relation, sign: str, second: Relation) -> str | None:
 
 
 def value_at(item: Relation, x: float) -> float:
-    """What a relation gives of an array of one number, to the last digit, in a fifth of the time: roots ask for
+    """The value at a single x, equal to that for an array to the last digit, in a fifth of the time: root searches need
     thousands."""
     match item:
         case Constant(value):
@@ -315,7 +315,7 @@ def _leaf_values(item: Relation, low: float, high: float, points: int) -> Array:
 
 
 def tabulated(item: Relation, low: float, high: float, points: int) -> Array:
-    """(points,) values on a uniform grid; the parts that a search leaves unchanged come from a cache."""
+    """(points,) values on a uniform grid; unchanged parts of a relation come from a cache."""
     match item:
         case Scaled(base, factor):
             return factor * tabulated(base, low, high, points)

@@ -1,4 +1,4 @@
-"""What the compiled steps know and what they change, by name; numba takes named tuples of arrays as they are.
+"""Constants and state of the compiled steps, by name; numba takes named tuples of arrays as they are.
 
 Units are particles: of one size, at one place. Places are Gauss points, those of the negative electrode first, each
 counted from its collector. Currents of units and places are per area of the cell, positive for delithiation.
@@ -93,7 +93,7 @@ class Electrodes(NamedTuple):
 
 
 class DfnState(NamedTuple):
-    """What a step changes.
+    """State that a step changes.
 
     z : (units, modes) stoichiometry.  mean, theta : (units,) the same, of the whole particle and of its surface.
     y : (units,) A/m2, what the particles give.  trend : (units,) A/(m2 s), how y leaves its share of the current.

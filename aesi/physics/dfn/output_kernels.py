@@ -60,7 +60,7 @@ def record_profile(k, p, e, state, profile, salt_profile):  # type: ignore[no-un
 
 @njit(inline="always", fastmath=FASTMATH)
 def left_range(theta_n, theta_p, c, c0):  # type: ignore[no-untyped-def]
-    """What left its range: 1 the negative surfaces, 2 the positive, 3 the salt, 0 nothing."""
+    """The state that left its range: 1 negative surfaces, 2 positive surfaces, 3 salt, 0 none."""
     if not 0.0 <= theta_n <= 1.0:
         return 1
     if not 0.0 <= theta_p <= 1.0:

@@ -16,6 +16,7 @@ from aesi.physics.espm.kernels import (
     compiled,
     lookup,
     open_circuit,
+    out_of_range,
     parts_of,
     salt_at_separator,
     slot_of,
@@ -104,7 +105,8 @@ def run_general(  # type: ignore[no-untyped-def]
             voltage -= i1 * cell.contact
             if heat[0] > 0.0:
                 power = 0.0
-                if fault_at < 0 and surfaces_inside(particles, memory.theta):
+                theta_n, theta_p = electrode_surfaces(particles, memory.theta)
+                if fault_at < 0 and 0.0 <= theta_n <= 1.0 and 0.0 <= theta_p <= 1.0:
                     power = reaction_heat(t_k, cell, particles, surfaces, memory, modes.means) - i1 * voltage
                 if k > 0:
                     t_k = heated(start_k, mean_heat(watts, power, i0, i1), dt, heat, around_k)
@@ -230,29 +232,26 @@ def reaction_heat(t_k, cell, particles, surfaces, memory, means):  # type: ignor
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def surfaces_inside(particles, theta):  # type: ignore[no-untyped-def]
-    """Is the mean surface of each electrode in [0, 1]?  That of a particle that has filled lies a hair beyond."""
+def electrode_surfaces(particles, theta):  # type: ignore[no-untyped-def]
+    """Mean surface stoichiometry of each electrode (negative, positive). A particle that has filled lies a little
+    beyond [0, 1] by itself."""
     mean_n, mean_p = 0.0, 0.0
     for u in range(theta.shape[0]):
         if particles.place[u, 0] == 0:
             mean_n += particles.share[u] * theta[u]
         else:
             mean_p += particles.share[u] * theta[u]
-    return 0.0 <= mean_n <= 1.0 and 0.0 <= mean_p <= 1.0
+    return mean_n, mean_p
 
 
 @njit(inline="always", fastmath=FASTMATH)
 def record_sample(k, particles, memory, modes, c, c0, out):  # type: ignore[no-untyped-def]
     """Means of the electrodes, salt at the collectors, plated lithium; returns what left its range, 0 for nothing."""
-    what = 0
-    for row in range(1, 7):
-        out[row, k] = 0.0
+    theta_n, theta_p = electrode_surfaces(particles, memory.theta)
+    out[1, k], out[2, k] = theta_n, theta_p
+    out[5, k], out[6, k] = 0.0, 0.0
     for u in range(memory.y.shape[0]):
-        side = particles.place[u, 0]
-        out[1 + side, k] += particles.share[u] * memory.theta[u]
-        out[5 + side, k] += particles.volume[u] * modes.means[u]
-    if not surfaces_inside(particles, memory.theta):
-        what = 1 if not 0.0 <= out[1, k] <= 1.0 else 2
+        out[5 + particles.place[u, 0], k] += particles.volume[u] * modes.means[u]
     out[3, k], out[4, k] = c[0], c[c.shape[0] - 1]
     out[8, k] = np.mean(memory.plated)
-    return what if what > 0 or salt_at_separator(c, c0) > 0.0 else 3
+    return out_of_range(theta_n, theta_p, salt_at_separator(c, c0))

@@ -81,7 +81,8 @@ def open_circuit(table, theta):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", fastmath=FASTMATH)
 def wet(salt):  # type: ignore[no-untyped-def]
-    """Salt over rest, kept positive: itself down to `NEARLY_DRY`, then falling to nought with the slope it had."""
+    """Salt concentration over rest, kept positive: unchanged down to `NEARLY_DRY`, then decaying to zero with the same
+    slope there."""
     return (
         salt if salt >= NEARLY_DRY else NEARLY_DRY * math.exp(max(salt / NEARLY_DRY, SMALLEST_EXPONENT) - 1.0)
     )
@@ -95,6 +96,18 @@ def salt_at_separator(c, c0):  # type: ignore[no-untyped-def]
     """
     layer = (c.shape[0] - 1) // 3
     return min(c[layer], c[2 * layer]) / c0
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def out_of_range(theta_n, theta_p, driest):  # type: ignore[no-untyped-def]
+    """What left its range: 1 the negative surface, 2 the positive, 3 the electrolyte, 0 nothing."""
+    if not 0.0 <= theta_n <= 1.0:
+        return 1
+    if not 0.0 <= theta_p <= 1.0:
+        return 2
+    if not driest > 0.0:
+        return 3
+    return 0
 
 
 @njit(inline="always", fastmath=FASTMATH)

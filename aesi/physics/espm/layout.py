@@ -1,4 +1,4 @@
-"""What the compiled steps of the single particle know and what they change, by name.
+"""Constants and state of the compiled steps of the single particle, by name.
 
 numba takes named tuples of arrays as they are, without cost. Units are particles: of one size, in one region of an
 electrode, those of the negative electrode first; regions are counted from the collector.
@@ -121,7 +121,7 @@ class Whole(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What a step of the reaction reads and changes.
+    """Arrays that a step of the reaction reads and changes.
 
     y, theta, pred, give : (units,) A/m2 of cell; surface stoichiometry, that if each unit carried its share, and what
     one unit of deviating current takes from it.  ohm : (regions, regions) ohm m2.
@@ -162,7 +162,7 @@ class Memory(NamedTuple):
 
 
 class Modes(NamedTuple):
-    """What the steps of diffusion know of the particles.
+    """Constants of the particles for the steps of diffusion.
 
     z, means : (units, modes) and (units,).  nodes, force, force_end : scratch of the variable part.
     faster : (3,) factors of temperature, negative, positive, salt.
@@ -186,7 +186,7 @@ class Modes(NamedTuple):
 
 
 class StepEnd(NamedTuple):
-    """What holds for one electrode at the end of a step.
+    """State of one electrode at the end of a step.
 
     dt : s.  held : whether the current jumped to its value where the step began; a double layer's current is then no
     continuation of the last one, and would ring.  thermal : R T / F, V.  rise : K above the reference.
@@ -203,7 +203,7 @@ class StepEnd(NamedTuple):
 
 
 class SaltMemory(NamedTuple):
-    """What a step of the electrolyte changes.  q, forcing, before : (modes,).  c, rest : (nodes,)."""
+    """State that a step of the electrolyte changes.  q, forcing, before : (modes,).  c, rest : (nodes,)."""
 
     q: Array
     c: Array

@@ -16,6 +16,7 @@ from aesi.physics.espm.kernels import (
     lookup,
     mean_asinh,
     open_circuit,
+    out_of_range,
     parts_of,
     salt_at_separator,
     share_ahead,
@@ -166,15 +167,3 @@ def voltage(current, theta_n, theta_p, cell, salt, c, g):  # type: ignore[no-unt
     return (
         open_circuit(cell.ocp_p, theta_p) - open_circuit(cell.ocp_n, theta_n) - eta + concentration_v - ohmic
     )
-
-
-@njit(inline="always", fastmath=FASTMATH)
-def out_of_range(theta_n, theta_p, driest):  # type: ignore[no-untyped-def]
-    """What left its range: 1 the negative surface, 2 the positive, 3 the electrolyte, 0 nothing."""
-    if not 0.0 <= theta_n <= 1.0:
-        return 1
-    if not 0.0 <= theta_p <= 1.0:
-        return 2
-    if not driest > 0.0:
-        return 3
-    return 0

@@ -1,4 +1,4 @@
-"""What the compiled steps of the plain path know and what they change, by name; see `layout`."""
+"""Constants and state of the compiled steps of the plain path, by name; see `layout`."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""A cell at rest: its voltage without what instruments add, and the state of charge that it means."""
+"""A cell at rest: its voltage without instrument faults, and the state of charge at that voltage."""

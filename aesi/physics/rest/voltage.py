@@ -1,4 +1,4 @@
-"""The voltage of a cell at rest: as it was read, freed of instrument faults, and of what effects add in series."""
+"""The voltage of a cell at rest: as read, without instrument faults, and without voltage effects in series."""
 
 from __future__ import annotations
 
@@ -12,16 +12,17 @@ from aesi.physics.model import EspmModel
 from aesi.physics.rest.open_circuit import OpenCircuit
 
 CALM_ROWS = 60
-"""First rows of a rest that say where a charge has ended."""
+"""Number of first rows of a rest that show where a charge has ended."""
 MOVING_V = 4e-3
-"""A voltage that moves more over these is that of the last of them. A convention: a full cell falls by 6 to 30 mV."""
+"""Change over these rows, V, above which only the last of them are used. A convention: a full cell falls by 6 to
+30 mV."""
 
 ROUNDS = 4
-"""Fixed-point iterations of a voltage in series and the state of charge, of which it depends little."""
+"""Fixed-point iterations of a voltage in series, which depends little on the state of charge."""
 
 
 def first_rows_v(rest_v: Array) -> float:
-    """V at which a rest begins: the mean of its first rows, of their last quarter where it moves."""
+    """Voltage at the start of a rest, V: the mean of its first rows, or of their last quarter where it changes."""
     calm = rest_v[:CALM_ROWS]
     part = len(calm) // 4
     moved = float(calm[-part:].mean() - calm[:part].mean()) if part > 3 else 0.0
@@ -45,9 +46,9 @@ def freed_of_series(
     terminal_v: float,
     current_a: float = 0.0,
 ) -> float:
-    """A terminal voltage without what effects add in series with the cell at the first row, such as a hysteresis.
+    """The first terminal voltage without the voltage of effects in series with the cell (a hysteresis), V.
 
-    open_circuit : of the model's cell.  current_a : that flows in this row.
+    open_circuit : of the model's cell.  current_a : in this row, A.
     """
     series = [active for active in effects if active.effect.on_voltage is not None]
     cell_v = terminal_v
@@ -65,7 +66,7 @@ def _in_series_v(
     soc: float,
     current_a: float,
 ) -> float:
-    """V that the effects add to `cell_v` where a record begins at a state of charge, in the windows of the model."""
+    """Voltage that the effects add to `cell_v` at the start of a record, V.  soc : in the windows of the model."""
     cell = model.cell
     theta_n, theta_p = cell.stoichiometries(soc)
     states = {

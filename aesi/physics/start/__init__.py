@@ -1,1 +1,1 @@
-"""State of charge at the first row of a record: from a rest that still relaxes, or from a start under load."""
+"""State of charge at the first row of a record: from a relaxing rest, or from a start under load."""

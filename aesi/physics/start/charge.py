@@ -1,8 +1,8 @@
-"""What the charge that a record moves says of the state of charge that it begins at.
+"""Bounds of the initial state of charge from the charge that a record moves.
 
-A voltage on a flat potential, or in the minutes after a current that nobody saw, says little. A discharge of 0.95 of
-the capacity hardly begins at 0.7, though: it would end further beyond empty than any cell does. What was read is taken
-as normal, and cut off there.
+A voltage on a flat potential, or shortly after an unrecorded current, gives an uncertain state of charge. But a
+discharge of 0.95 of the capacity cannot begin at 0.7, since it would end further beyond empty than any cell can. The
+reading is taken as normally distributed, and truncated at these bounds.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from aesi.physics.start.state import InitialState
 from aesi.records import Hold, Measurement
 
 CONTRADICTED = 0.02
-"""Share of what was read, within the bounds, below which the charge contradicts it, as two deviations do: such a record
-is of another cell, or in another unit, which is told elsewhere and not mended."""
+"""Probability of the reading within the bounds below which the charge contradicts it, as at two standard deviations.
+Such a record is of another cell, or in another unit; it is reported elsewhere and left as read."""
 MOVED_SDS = 0.1
-"""Of its deviation; what the bounds would move a reading by less than that leaves it as it is."""
+"""Smallest correction by the bounds that is applied, in standard deviations of the reading."""
 
 
 def told_by_charge(read: InitialState, record: Measurement, hold: Hold, capacity_ah: float) -> InitialState:
-    """What was read under load, where no row of the record is further beyond empty or full than cells hold more than
-    they are declared to; itself where that leaves it as it is, or contradicts it."""
+    """The state read under load, truncated so that no row of the record is further beyond empty or full than cells may
+    be; unchanged where the bounds hardly matter, or contradict it."""
     moved = record.discharged_ah(hold) / capacity_ah
     ends = _ends(moved)
     low, high = ((ends - read.soc) / read.sd).tolist()

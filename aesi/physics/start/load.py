@@ -2,15 +2,17 @@
 
     p(soc) ~ sum_h p_h N(V - V_h(soc); 0, n SHAPE_V**2 + DROP_ERROR**2 d' d'^T + C_h**2 g g^T)              (1)
 
-V are n means over the first minutes, and V_h those of the model, which is at soc in the first row. What flowed before
-nobody saw. It was nothing, or for one of `FLOWED_S` the mean current of as long after the first row: what a record
-shows of its own currents is the best that is known of those before it. How far they are from their mean is in C_h,
-beside one of `OTHER_C_RATES`; g is what one C for that time leaves of itself in the voltage after it. d is how far V_h
-is below the open-circuit voltage, and d' is d without its mean.
+V are n means over the first minutes, and V_h those of the model with state of charge soc in the first row. The current
+before the record is unknown. History h assumes that there was none, or that for one of the times `FLOWED_S` the mean
+current over as long a time after the first row flowed: the record's own currents are the best estimate of earlier ones.
+C_h is the standard deviation of the earlier current about this mean, with one of `OTHER_C_RATES`; g is the after-effect
+on the voltage of a current of 1C over that time. d is the distance of V_h below the open-circuit voltage, and d' is d
+without its mean.
 
-All rows may be off by the same share of the mean of d, and by what the potentials are off. No shape tells of this: it
-is added to the deviation of (1) by the potentials at both ends of it. Where the model follows the record at no state,
-the errors in (1) are as many times larger as what is left asks for. Double layers are left out of g, as for rests.
+All rows may also be off by the same share of the mean of d, and by the error of the potentials. The shape of the
+voltage does not show this error: it is added to the standard deviation of (1), by the potentials at both of its ends.
+Where the model follows the record at no state, the errors in (1) are enlarged to the size of the residual. Double
+layers are left out of g, as for rests.
 """
 
 from __future__ import annotations
@@ -28,15 +30,16 @@ from aesi.physics.simulation import ModelName, simulate
 from aesi.records import Hold, Measurement
 
 FLOWED_S = (0.0, 20.0, 200.0, 2000.0)
-"""Times for which the current may have flowed before: after the last, only the slowest drops still grow."""
+"""Times, s, for which the current may have flowed before the record: beyond the last, only the slowest drops still
+grow."""
 HISTORY_C_RATE = 0.25
-"""Of the current that g of (1) is simulated with."""
+"""C-rate of the current with which g of (1) is simulated."""
 OTHER_C_RATES = (0.0, 0.25, 1.0, 4.0)
-"""C_h of (1) of a record that is calm: from slow discharges to pulses, as the history of a rest."""
+"""C_h of (1), C-rates, for a record of steady current: from slow discharges to pulses, as for the history of a rest."""
 DROP_ERROR = 0.2
 """Relative standard deviation of the model's drop at the first row of a record."""
 JUDGED_S = 300.0
-"""First part of a record that (1) looks at, of at most JUDGED_ROWS rows."""
+"""Duration of the first part of a record that (1) uses, s, with at most JUDGED_ROWS rows."""
 JUDGED_ROWS = 3000
 SHAPE_V = 2e-3
 """Standard deviation of a model's error over the first minutes, without its mean; it does not average out over them.
@@ -44,26 +47,29 @@ Of 54 rows under load of nine measured records at 0 to 25 degC, by the file of t
 off by 1.5 points of charge and 0.57 of their deviations RMS, and by 1.9 deviations at most; with twice of it by 1.5
 points and 0.51 deviations, with half of `DROP_ERROR` by 1.4 points and 0.67 deviations."""
 JUDGED_PARTS = 8
-"""Of the first minutes, the first of them one row and each the longer the later it is, as what the voltage remembers
-slows down."""
+"""Number of parts of the first minutes whose means (1) uses. The first is one row, and each is longer than the one
+before, since the voltage relaxes ever more slowly."""
 NODES = 13
 MORE_NODES = 6
 TURNS = 3
-"""States of charge at which the model is simulated: from empty to full, the closer the nearer to either, then a few
-more where (1) is likeliest, in so many turns."""
+"""Numbers of states of charge at which the model is simulated: NODES from empty to full, denser near both ends, then
+MORE_NODES where (1) is most likely, in each of TURNS rounds."""
 BETWEEN = 12
-"""Of two of them, states of charge at which (1) is looked at."""
+"""Number of states of charge between two nodes at which (1) is evaluated."""
 ROUNDS = 4
-"""Fixed-point iterations of drop and state of charge, of which the drop depends little on the other."""
+"""Fixed-point iterations of drop and state of charge; the drop depends little on the state of charge."""
 FLOWS = np.concatenate([[0.0], np.geomspace(0.02, 1.0, 8)])
 LINGERS = np.geomspace(1e-4, 1.0, 40)
-"""Rows that g is simulated at, as shares of the time for which its current flows, and of that of the record."""
+"""Rows at which g is simulated, as shares of the time for which its current flows, and of the time of the record."""
 
 
 @dataclass(frozen=True, eq=False)
 class _FirstMinutes:
-    """rows : of the record.  average : (p, n), means over its parts.  seen_v : (p,), without what is no cell's.
-    moved : (p,) of the capacity, discharged since the first row."""
+    """The first minutes of a record.
+
+    rows : the first rows.  average : (p, n) weights of the means over p parts.  seen_v : (p,) V, means of the voltage
+    without instrument faults and effects in series.  moved : (p,) share of the capacity discharged since the first row.
+    """
 
     rows: Measurement
     average: Array
@@ -78,8 +84,8 @@ class _FirstMinutes:
 
 @dataclass(frozen=True)
 class _History:
-    """h of (1).  kind : which of the times `FLOWED_S` but the first.  began : nothing flowed before in the mean.
-    prior : p_h.  sd : C_h."""
+    """A history h of (1).  kind : number of its time in `FLOWED_S`, without the first.  began : True where the mean
+    current before the record is zero.  prior : p_h.  sd : C_h."""
 
     kind: int
     began: bool
@@ -96,9 +102,10 @@ class LoadedStart:
         self.current_a = float(record.current_a[0])
 
     def state_of_charge(self, first_v: float) -> tuple[float, float, bool]:
-        """That of (1) in the mean, its standard deviation, and whether the current likelier began with the record.
+        """(mean state of charge by (1), its standard deviation, True where the current more likely began with the
+        record).
 
-        first_v : V, the first voltage, without what effects add in series and instruments do.
+        first_v : first voltage without effects in series and instrument faults, V.
         Raises DataError where this belongs to no state of the cell.
         """
         likely = [self._by_first(first_v), *(self._flowed_since(first_v, b) for b in FLOWED_S[1:])]
@@ -131,7 +138,8 @@ class LoadedStart:
         return mean, max(sd, GIVEN_SD), bool(began >= 0.5)
 
     def drop(self, voltage_v: float, current_a: float, before_s: float) -> float:
-        """V between the open-circuit voltage and `voltage_v`, under a current that flows since `before_s`."""
+        """Voltage drop of the model below the open-circuit voltage, V, for a terminal voltage `voltage_v` and a current
+        that has flowed for `before_s`."""
         drop = 0.0
         for _ in range(ROUNDS):
             soc = self.open_circuit.soc_at(voltage_v + drop)
@@ -141,7 +149,7 @@ class LoadedStart:
         return drop
 
     def _by_first(self, first_v: float) -> float:
-        """State of charge by the first voltage, under a current that began there."""
+        """State of charge by the first voltage, for a current that began with the record."""
         drop = self.drop(first_v, self.current_a, 0.0)
         typical_a = HISTORY_C_RATE * self.cell.capacity_ah
         begun = first_v + drop
@@ -162,7 +170,7 @@ class LoadedStart:
         )
 
     def _before_a(self) -> Array:
-        """(b,) A, the mean current for as long after the first row as each of `FLOWED_S`, or of the record."""
+        """(b,) A, mean current over each of the times `FLOWED_S` after the first row, or over the record if shorter."""
         passed = self.record.time_s - self.record.time_s[0]
         if len(passed) == 1:
             return np.full(len(FLOWED_S), self.current_a)
@@ -178,7 +186,7 @@ class LoadedStart:
             own = float(self.record.current_a[passed <= flowed_s].std()) / self.cell.capacity_ah
             for c_rate in OTHER_C_RATES:
                 sd = float(np.hypot(own, c_rate))
-                # That nothing flowed is as likely as each time for which something may have.
+                # No current before has the same prior as each of the times.
                 found.append(_History(kind, True, 1.0 / len(FLOWED_S[1:]), sd))
                 found.append(_History(kind, False, 1.0, sd))
         return found
@@ -186,7 +194,7 @@ class LoadedStart:
     def _likelihood(
         self, minutes: _FirstMinutes, histories: Sequence[_History], soc: Array, model_v: Array
     ) -> Array:
-        """(s, h) terms of (1) over the largest.  model_v : (s, 2 b, p) V, d and g, see `_simulated`."""
+        """(s, h) terms of (1), relative to the largest.  model_v : (s, 2 b, p) V, d and g, see `_simulated`."""
         drops, left = model_v[:, : len(FLOWED_S)], model_v[:, len(FLOWED_S) :]
         parts = left.shape[2]
         ocv = np.interp(soc[:, None] - minutes.moved, self.open_circuit.soc, self.open_circuit.ocv)
@@ -206,7 +214,7 @@ class LoadedStart:
     def _simulated(self, minutes: _FirstMinutes, before_a: Array, soc: float) -> Array:
         """(2 b, p) V: d of (1) for each of `FLOWED_S`, and g for all but the first.
 
-        before_a : (b,) A, that has flowed in the mean since each of these times.
+        before_a : (b,) A, mean current before the record over each of these times.
         """
         ocv = np.interp(soc - minutes.moved, self.open_circuit.soc, self.open_circuit.ocv)
         times = zip(FLOWED_S, before_a, strict=True)
@@ -215,8 +223,8 @@ class LoadedStart:
         return np.array([*drops, *left])
 
     def _since(self, minutes: _FirstMinutes, flowed_s: float, before_a: float, soc: float) -> Array:
-        """(n,) V at the rows, after a current that has flowed until the row before the first."""
-        # No longer than since the cell was full, or empty.
+        """(n,) V of the model at the rows, after a current of `before_a` for `flowed_s` before the first row."""
+        # The current cannot have flowed for longer than since the cell was full, or empty.
         rate = before_a / SECONDS_PER_HOUR / self.cell.capacity_ah
         if flowed_s and rate:
             flowed_s = min(flowed_s, max(((1.0 if rate > 0.0 else 0.0) - soc) / rate, 1.0))
@@ -230,7 +238,7 @@ class LoadedStart:
         return self._run(time, current, soc + moved)[len(earlier) :]
 
     def _left_of(self, soc: float, flowed_s: float, time_s: Array) -> Array:
-        """(n,) V over C-rate, g of (1), at times since its current has stopped."""
+        """(n,) V per C-rate, g of (1), at times after its current stopped."""
         cell = self.cell.with_negative(double_layer_f_m2=0.0).with_positive(double_layer_f_m2=0.0)
         # It comes from the middle of the range, so that it does not begin beyond full or empty.
         rate = HISTORY_C_RATE if soc < 0.5 else -HISTORY_C_RATE
@@ -264,7 +272,8 @@ class LoadedStart:
 
 
 def _longer_and_longer(rows: int) -> Array:
-    """(p, rows) weights of means over parts, the first of one row and the others in a geometric series."""
+    """(p, rows) weights of means over p parts, the first of one row, the lengths of the others in a geometric
+    series."""
     starts = np.unique(np.append(0, np.geomspace(1.0, max(rows, 1), JUDGED_PARTS + 1)[:-1].astype(int)))
     starts = starts[starts < rows]
     part = np.searchsorted(starts, np.arange(rows), side="right") - 1
@@ -273,17 +282,17 @@ def _longer_and_longer(rows: int) -> Array:
 
 
 def _between(soc: Array, nodes: Array, values: Array) -> Array:
-    """(s, ...) of values (n, ...) at the nodes, on straight lines."""
+    """(s, ...) values at states of charge (s,), interpolated linearly between values (n, ...) at the nodes (n,)."""
     columns = values.reshape(len(nodes), -1)
     between = np.column_stack([np.interp(soc, nodes, column) for column in columns.T])
     return between.reshape(len(soc), *values.shape[1:])
 
 
 def _squares_and_logdet(off: Array, doubts: Array, variance: float) -> tuple[Array, Array]:
-    """(s,) off' C^-1 off and (s,) log |C| of C = variance I + doubts doubts'.  off : (s, p).  doubts : (s, p, k).
+    """((s,) off' C^-1 off, (s,) log |C|) for C = variance I + doubts doubts'.  off : (s, p).  doubts : (s, p, k).
 
-    By the singular values of the doubts, since C itself cannot be inverted where they are large: a formula of a
-    potential may rise by 1e9 V beyond full.
+    It uses the singular values of the doubts, since C cannot be inverted numerically where they are large: the formula
+    of a potential may rise by 1e9 V beyond full.
     """
     across, size, _ = np.linalg.svd(doubts, full_matrices=False)
     along = (across * off[:, :, None]).sum(axis=1)

@@ -1,15 +1,16 @@
-"""The voltage that a cell relaxes to, read from a record that begins with a rest of unknown length and history.
+"""The voltage to which a cell relaxes, from a record that begins with a rest of unknown length and history.
 
     V(t) = U + a g(t) + e,     a ~ N(0, C**2),     e ~ N(0, RELAXED_SHAPE_V**2 + (RELAXED_SHAPE (V - V_last))**2)  (1)
 
-g is how far the model's voltage is from rest, over C-rate, after a current has flowed for one of some times and has
-stopped one of some times before the record; C is one of some C-rates. U is averaged over these histories by how well
-each explains the means of the rest over equal parts, and is as uncertain as they leave it and as what is still to come
-is by the shape. Of one row all is left to the histories. Double layers are left out of g: they follow within a second,
-and what charge they take is taken from the particles for good.
+g is the distance of the model's voltage from rest, per C-rate, after a history: a current that flowed for one of
+several times and stopped one of several times before the record. C is one of several C-rates. U is averaged over these
+histories, weighted by how well each explains the means of the rest over equal parts. Its uncertainty has two parts: the
+posterior over the histories, and the error of the shape for the relaxation still to come. With one row only the
+histories remain. Double layers are left out of g: they relax within a second, and the charge that they take is lost to
+the particles for good.
 
-g is that of a small current, which another has in proportion where kinetics and diffusion are linear. In the cold they
-are not, and a drive is many currents: hence the errors in proportion.
+g is simulated with a small current, and is proportional to the current where kinetics and diffusion are linear. In the
+cold they are not, and a drive has many currents: hence the errors in proportion.
 """
 
 from __future__ import annotations
@@ -31,32 +32,33 @@ C_RATE_SDS = OTHER_C_RATES[1:]
 are off by 0.44 points of charge RMS with the three, 0.44 and 0.45 with the first and the second alone, and 1.11 where
 the voltage is taken as it stands; six of a drive by 1.1 of the deviations that they claim at most, 2.2 and 2.5."""
 STOPPED_S = (0.0, 2.0, 20.0, 200.0, 2000.0)
-"""Times before the record at which the current may have stopped: as `FLOWED_S`, decades of what slows down as it goes
-on."""
+"""Times before the record at which the current may have stopped, s: decades, as in `FLOWED_S`, since relaxation slows
+down with time."""
 RELAXED_SHAPE_V = 5e-4
 """Standard deviation of a model's error over one part of a rest, without its mean. With a fifth, twice and four times
 of it those readings are off by 0.44, 0.44 and 0.45 points."""
 RELAXED_SHAPE = 0.1
 TO_COME = 0.3
-"""The same in proportion: of how far a part is from the last voltage, and of what is to come after it. Of rests of 100,
-300 and 1000 s after drives and steady currents of four cells with their own file, at 0 and -10 degC, readings are off
-by 0.9, 1.2 and 0.8 deviations RMS and 2.5, 1.6 and 0.7 points, at 25 degC by 0.8, 0.6 and 0.6 deviations; with 0.03 and
-0.1 by 1.7, 2.2 and 1.3 deviations and 3.6, 1.7 and 0.7 points, and by 2.0, 1.3 and 0.9; without either by 3.7, 4.9 and
-1.9 deviations and 4.0, 2.2 and 0.7 points. The 62 measured rests are off by 0.46 points with and without."""
+"""The same, relative to the distance of a part from the last voltage (RELAXED_SHAPE) and to the relaxation still to
+come (TO_COME). On rests of 100, 300 and 1000 s after drives and steady currents of four cells with their own file, at 0
+and -10 degC, readings are off by 0.9, 1.2 and 0.8 deviations RMS and 2.5, 1.6 and 0.7 points, at 25 degC by 0.8, 0.6
+and 0.6 deviations; with 0.03 and 0.1 by 1.7, 2.2 and 1.3 deviations and 3.6, 1.7 and 0.7 points, and by 2.0, 1.3 and
+0.9; without either by 3.7, 4.9 and 1.9 deviations and 4.0, 2.2 and 0.7 points. The 62 measured rests are off by 0.46
+points with and without."""
 PARTS = 8
-"""Of a rest, by which it is looked at; rows where they are fewer."""
+"""Number of equal parts of a rest whose means are used; rows where there are fewer."""
 UNKNOWN_V = 1.0
-"""Standard deviation of U before the record is looked at, about its last voltage."""
+"""Prior standard deviation of U about the last voltage of the rest, V."""
 WITHIN = np.concatenate([[0.0], np.geomspace(0.02, 1.0, 8)])
-"""Rows of a history, as shares of the time for which its current flows."""
+"""Rows of a simulated history, as shares of the time for which its current flows."""
 
 
 @dataclass(frozen=True, eq=False)
 class Rest:
-    """The rest that a record begins with.
+    """The rest at the beginning of a record.
 
-    rows : those before a load starts, or before a small current has moved the state of charge; at least the first row.
-    flows : a small current goes on after these rows, and has likely flowed before them.
+    rows : those before a load starts, or before a small current has changed the state of charge; at least the first.
+    flows : True where a small current goes on after these rows, and has probably flowed before them.
     """
 
     rows: Measurement
@@ -64,10 +66,10 @@ class Rest:
 
 
 def resting_rows(record: Measurement, limit_a: float, most_ah: float, hold: Hold) -> Rest:
-    """The rest that a record begins with.
+    """The rest at the beginning of a record.
 
-    limit_a : A, below which a cell rests.  most_ah : charge that its rows may move, either way, and be of one state.
-    hold : how the current runs.
+    limit_a : current below which a cell rests, A.  most_ah : largest charge, in either direction, that its rows may
+    move, Ah.  hold : how the current runs between rows.
     """
     current = np.abs(record.current_a)
     small = current <= max(float(current[0]), limit_a)
@@ -78,9 +80,9 @@ def resting_rows(record: Measurement, limit_a: float, most_ah: float, hold: Hold
 
 
 def settled_voltage(open_circuit: OpenCircuit, rest: Measurement, model: ModelName) -> tuple[float, float]:
-    """U of (1) and its standard deviation, V.
+    """(U of (1), its standard deviation), V.
 
-    rest : rows without a current.  model : that g is simulated with.
+    rest : rows without a current.  model : with which g is simulated.
     """
     starts = np.linspace(0, len(rest), min(PARTS, len(rest)) + 1).astype(int)[:-1]
     last = float(rest.voltage_v[starts[-1] :].mean())
@@ -94,7 +96,7 @@ def settled_voltage(open_circuit: OpenCircuit, rest: Measurement, model: ModelNa
     ]
     nats, to_come, variance = (np.array(column) for column in zip(*found, strict=True))
     variance += (TO_COME * to_come) ** 2
-    # Of what a cell cannot rest at, nothing is to come: 8 s of a drive of an LFP cell were to relax to 20 V.
+    # A voltage at which the cell cannot rest is discarded: 8 s of a drive of an LFP cell were to relax to 20 V.
     outside_v = last + to_come - np.clip(last + to_come, open_circuit.ocv[0], open_circuit.ocv[-1])
     nats -= 0.5 * outside_v**2 / (variance + open_circuit.potentials_v**2)
     weight = np.exp(nats - nats.max())
@@ -104,10 +106,10 @@ def settled_voltage(open_circuit: OpenCircuit, rest: Measurement, model: ModelNa
 
 
 def _explained(seen: Array, away: Array, rate_sd: float, shape_v: Array) -> tuple[float, float, float]:
-    """How well one history explains the means over parts of a rest (nats), and the mean (V) and variance of U by it.
+    """(log likelihood of one history for the means over parts of a rest, nats; mean of U, V; variance of U, V**2).
 
-    seen : (p,) V, the means about the last voltage.  away : (p,) V over C-rate, those of g of (1) for this history.
-    shape_v : (p,) V, deviations of e.
+    seen : (p,) V, the means relative to the last voltage.  away : (p,) V per C-rate, means of g of (1) for this
+    history.  shape_v : (p,) V, standard deviations of e.
     """
     slopes = np.column_stack([np.ones(len(seen)), away]) / shape_v[:, None]
     prior = np.diag([UNKNOWN_V**-2, rate_sd**-2])
@@ -123,10 +125,10 @@ def _means(values: Array, starts: IntArray) -> Array:
 
 
 def _histories(open_circuit: OpenCircuit, time_s: Array, soc: float, model: ModelName) -> Iterator[Array]:
-    """(n,) V over C-rate, g of (1) at the rows of a rest, for each history."""
-    # With the charge of its double layers a cell rests beside the open-circuit voltage of its state of charge, and far
-    # beside it where that is steep: layers of 7 and 11 F/m2 made 60 mV of 20 s of C/4 at a full LFP cell, and of a rest
-    # that stands still within 0.2 mV a state of charge of 0.996 +/- 0.48.
+    """(n,) V per C-rate, g of (1) at the rows of a rest, for each history."""
+    # With the charge of its double layers a cell rests away from the open-circuit voltage of its state of charge, and
+    # far away where that is steep: layers of 7 and 11 F/m2 made 60 mV of 20 s of C/4 at a full LFP cell, and of a rest
+    # that is constant within 0.2 mV a state of charge of 0.996 +/- 0.48.
     whole = open_circuit.cell
     cell = whole.with_negative(double_layer_f_m2=0.0).with_positive(double_layer_f_m2=0.0)
     # The history comes from the middle of the range, so that it does not begin beyond full or empty.

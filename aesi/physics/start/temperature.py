@@ -1,17 +1,17 @@
-"""A column of temperatures that the voltage of its record contradicts: a sensor that is dead, or not on the cell.
+"""Detection of a temperature column that the voltage of its record contradicts: a sensor that is dead or off the cell.
 
-The declared cell is simulated at other temperatures, each the same in every row. Where it follows the record at one of
-them and leaves many times as much at that of the column, the column is what is wrong with the record, or the cell
-answers as one that much colder or warmer would: a single record does not tell which.
+The declared cell is simulated at other temperatures, each constant over the record. If it follows the record at one of
+them, and its error at the temperature of the column is many times larger, either the column is wrong or the cell
+responds like a colder or warmer one; a single record does not tell which.
 
 Measured on 112 records of three cells with a temperature, -20 to 40 degC. With each file that was calibrated to their
-cell, or is of the model before it (277 pairs), 12 are followed within FOLLOWS_V at another temperature, and their
-column leaves at most 2.28 times as much as that one: none is told. With files of other cells, brought to the size of
-theirs (837 pairs), 28 are followed so and 15 are told, for their kinetics are others, which the sentence leaves open:
-five drives of a Panasonic at 2 to 16 degC with files of an LG 18650HG2 (3.0 to 4.1 times), and five of the HG2 at 24
-degC with files of the Panasonic and of an NCA cell (3.1 to 7.0). With the LG M50 that shipped cells were fitted from
-it is 2.9 times at most. With 0 degC for their column 11 of 28 are followed by their own file, and all are told (3.3 to
-153 times).
+cell, or is of the model before it (277 pairs), 12 are followed within FOLLOWS_V at another temperature, and the error
+at their column is at most 2.28 times as large: none is reported. With files of other cells, scaled to the size of
+theirs (837 pairs), 28 are followed so and 15 are reported, since their kinetics differ, which the sentence mentions as
+a cause: five drives of a Panasonic at 2 to 16 degC with files of an LG 18650HG2 (3.0 to 4.1 times), and five of the HG2
+at 24 degC with files of the Panasonic and of an NCA cell (3.1 to 7.0). With the LG M50 that shipped cells were fitted
+from it is 2.9 times at most. With 0 degC for their column 11 of 28 are followed by their own file, and all are reported
+(3.3 to 153 times).
 """
 
 from __future__ import annotations
@@ -32,21 +32,24 @@ from aesi.physics.simulation import ModelName, simulate
 from aesi.records import Hold, Measurement
 
 GRID_DEGC = (-20.0, -10.0, 0.0, 10.0, 20.0, 30.0, 40.0, 50.0)
-"""Tried, and that of the cell's file."""
+"""Temperatures that are tried, with that of the cell's file."""
 CLEAR_V = 0.03
-"""An error of the declared cell below it is no evidence against a temperature: models of measured cells err by that."""
+"""RMS error of the declared cell, V, below which it is no evidence against a temperature: a usual error of measured
+cells."""
 FOLLOWS_V = 0.04
-"""What the declared cell leaves where it follows a record: calibrated files at most of those, at their temperature."""
+"""RMS error, V, within which the declared cell follows a record, as calibrated files do on most of those records at
+their temperature."""
 TIMES = 3.0
-"""What the column leaves, over what another temperature does: above the 2.28 of records with the file of their cell."""
+"""Least ratio of the error at the column's temperature to that at another one: above the 2.28 of records with the file
+of their cell."""
 FURTHER_K = 8.0
-"""A step of the grid, less what a cell warms by: closer temperatures are no other ones."""
+"""Least distance of another temperature, K: a step of the grid, minus the usual warming of a cell."""
 
 
 @dataclass(frozen=True)
 class OtherTemperature:
-    """degc : in the mean of the rows, at which the declared cell leaves `left_v` (RMS).  there_degc, there_v : of the
-    temperature at which it leaves least."""
+    """degc, left_v : mean temperature of the rows, and the RMS error of the declared cell at it, V.  there_degc,
+    there_v : temperature with the smallest RMS error, and that error, V."""
 
     degc: float
     left_v: float
@@ -61,8 +64,8 @@ class OtherTemperature:
         *,
         given: bool = False,
     ) -> str:
-        """For a reader.  name : of the record.  model : that was simulated, in words.  otherwise : what is so where the
-        temperature is right.  given : it was, with --temperature, and there is no column."""
+        """The sentence for a reader.  name : of the record.  model : the simulated one, in words.  otherwise : clause
+        on the cause if the temperature is right.  given : True for a temperature by --temperature, without a column."""
         wrong = (
             "what was given is not the cell's (correct --temperature FILE=DEGC)"
             if given
@@ -84,8 +87,8 @@ def contradicted_temperature(
     effects: Iterable[ActiveEffect] = (),
     model: ModelName = "espm",
 ) -> OtherTemperature | None:
-    """Another temperature by which a cell with its effects follows a record; None where the record's own is not
-    contradicted, and without one, or without a voltage in every row.
+    """The temperature at which a cell with its effects follows a record; None where the record's own temperature is not
+    contradicted, where it has none, and without a voltage in every row.
 
     soc0 : state of charge at the first row.  hold : how the current runs between the rows.
     """
@@ -124,10 +127,10 @@ def _left_v(
 def other_temperature(
     column_degc: Array, declared_degc: float, error_v: Callable[[Array], float | None]
 ) -> OtherTemperature | None:
-    """Another temperature by which the declared cell follows a record; None where its column is not contradicted.
+    """The temperature at which the declared cell follows a record; None where its column is not contradicted.
 
     column_degc : (n,) of the record.  declared_degc : of the cell's file.
-    error_v : RMS, V, that the declared cell leaves at temperatures (n,) degC; None where it cannot be simulated.
+    error_v : temperatures (n,) degC -> RMS error of the declared cell, V; None where it cannot be simulated.
     """
     left_v, mean = error_v(column_degc), float(np.mean(column_degc))
     if left_v is None or not CLEAR_V < left_v < np.inf:  # this way round, NaN is no evidence

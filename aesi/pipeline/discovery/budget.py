@@ -1,4 +1,4 @@
-"""How many rows a search is run on. Only the records that it fits decide that, not those that judge it.
+"""The number of rows for a search. It depends on the fitted records alone, not on test records.
 
 Fitted records are thinned where they have more than `MOST_ROWS` together, the longest first. A test record chooses
 nothing, not even this: it is thinned by its own length. One that begins with a fitted record, or continues it, is

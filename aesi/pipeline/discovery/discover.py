@@ -36,14 +36,14 @@ from aesi.tracer.report.yardstick import POINTS_TO, Pointer
 SCHEMA = "aesi.discovery/1"
 STATES: tuple[State, ...] = ("before", "recalibrated", "after")
 HOLDOUT = 0.3
-"""Last share of the data that is kept back where there are no test records and nothing else is said."""
+"""Default share of the data, at the end, that is kept back where there are no test records."""
 ABBREVIATIONS = {"ocv": "OCV", "ocp": "OCP"}
 """Words of effect ids -> how titles write them."""
 
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """One case as it was asked for.
+    """One case, as requested.
 
     cell : a BPX file, or a saved model or its folder, whose cell and effects are what is declared.
     only, without : ids of the effects that are tried, or are not; all where neither names one.
@@ -77,7 +77,7 @@ class Case:
 
     @property
     def records(self) -> tuple[Measurement, ...]:
-        """All of them: those that are looked at, those that are known to be good, and those that choose nothing."""
+        """All records: the fitted ones, those that are known to be good, and the test records."""
         return (*self.measurements, *self.good, *self.tests)
 
     def with_each(self, changed: Callable[[Measurement], Measurement]) -> Case:
@@ -88,7 +88,7 @@ class Case:
 
     @property
     def kept_back(self) -> float:
-        """Last share of each record that chooses nothing."""
+        """Share of each record, at the end, that is kept back for the test."""
         if self.tests:
             return 0.0
         return HOLDOUT if self.holdout is None else self.holdout
@@ -203,7 +203,8 @@ def found_model(found: Discovery) -> HybridModel:
 
 
 def discovery_content(found: Discovery, asked: Sequence[str] = ()) -> dict[str, Any]:
-    """The content of discovery.json.  asked : what was not tried or not used, and what a reader did to the files."""
+    """The content of discovery.json.  asked : sentences on effects not tried, options not used and changes by a
+    reader."""
     verdict, explained_v = found.verdict, found.after.yardstick.explained_v
     return {
         "schema": SCHEMA,

@@ -1,4 +1,4 @@
-"""What the page that compares runs shows of one of them: how sure its figures are, its genes and terms, maps of its
+"""The content of one run on the page that compares runs: uncertainty of its figures, its genes and terms, maps of its
 error."""
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What `aesi run` leaves in its folder: report.html, figures/, tables.md, tables.tex, model/ and summary.json."""
+"""The output files of `aesi run`: report.html, figures/, tables.md, tables.tex, model/ and summary.json."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Result:
 
     @property
     def best(self) -> str:
-        """The ensemble of the lower validation loss, or the last model where that one is not judged.
+        """The ensemble with the lower validation loss, or the last model where that one is not judged.
 
         Without validation records the loss is that on the left-out pieces; the test chooses nothing.
         """

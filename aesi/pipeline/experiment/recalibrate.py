@@ -105,7 +105,7 @@ class FitRecord:
     """An evenly sampled record, its state of charge at the start by the declared cell, and the rows that a fit may look
     at.
 
-    soc0_sd : standard deviation of the start where it was read from a voltage; nought elsewhere.
+    soc0_sd : standard deviation of a start that was read from a voltage; 0 for others.
     begins : for another cell to tell where it starts; None where soc0 is all that is known.
     lost_v : (n,) V that resampling takes from the voltage of the declared model, see `as_declared`; None where nothing.
     """
@@ -272,7 +272,7 @@ class _Fit:
 
 
 def _spacing(data: Measurement) -> tuple[int, float]:
-    """How many rows, and how many s, lie between two that are fitted."""
+    """(number of rows, time in s) between two fitted rows."""
     dt_s = float(data.time_s[1] - data.time_s[0])
     every = max(1, round(EVERY_S / dt_s))
     return every, every * dt_s

@@ -317,7 +317,8 @@ class ConformalConfig(Section):
     alpha : share of misses that is aimed at; 0.1 for intervals of 90 %.
     window : rows, the residuals that an interval looks back at.
     horizons_s : s, times since the last measured voltage for which bands are calibrated, beside the whole record, in
-    whole steps of `data.dt_s`; None takes those of 1, 10 and 60 s that are.
+    whole steps of `data.dt_s`; None takes those of 1, 10 and 60 s that are. One that the records are too short for has
+    no band, which is noted.
     compare : methods that the tables show beside it, calibrated on the same residuals; `spci_refitted`, the paper's
     forest refitted as it goes, can stand here alone.
     """

@@ -1,1 +1,1 @@
-"""What a user keeps: the hybrid model, its predictions, and its folder on disk."""
+"""The hybrid model, its predictions, and its folder on disk."""

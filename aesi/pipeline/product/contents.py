@@ -1,4 +1,4 @@
-"""What is in files and saved models, for keys of what rests on them."""
+"""Contents of files and saved models, for cache keys of results that depend on them."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from aesi.pipeline.written import EFFECTS
 
 
 def contents(paths: Iterable[Path]) -> list[bytes]:
-    """What is in each file, and in each file of a folder, in order; of a saved model also the user's effects that it
-    names elsewhere, as those did that were saved before a copy lay in the folder. Nothing of what is not there."""
+    """The bytes of each file, and of each file of a folder, in order; missing files are skipped. For a saved model they
+    include the user's effects that it refers to elsewhere (older models had no copy in their folder)."""
     files = [file for path in paths for file in _files(path)]
     return [file.read_bytes() for file in files if file.is_file()]
 
 
 def effect_files(folder: Path) -> list[Path]:
-    """The files of the user's own effects that a saved model names; none of what is no model, or cannot be read, which
-    whoever loads it says."""
+    """The files of the user's own effects that a saved model refers to; empty where it is no model or cannot be read,
+    which loading it reports."""
     try:
         effects = json.loads((folder / f"{EFFECTS}.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):

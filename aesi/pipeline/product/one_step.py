@@ -38,7 +38,7 @@ class RowsAhead:
 
     @property
     def left_v(self) -> Array:
-        """(p,) V, measured minus predicted; nought at the first stamp, which is given."""
+        """(p,) V, measured minus predicted; 0 at the first time, whose error is given."""
         return self.error_v - self.predicted_v
 
     @property

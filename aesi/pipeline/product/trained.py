@@ -1,4 +1,4 @@
-"""How far a record lies from what a correction was trained on, and how much of the correction is left there."""
+"""Distance of a record from the training data of a correction, and the share of the correction that is applied."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def trained_figures(
     visited: Visited | None,
     kept: Array,
 ) -> dict[str, float | None]:
-    """How far a record lies from what a correction was trained on.
+    """Distance of a record from the training data of a correction.
 
     outside, kept : (n,), of `outside_trained` and of `SparseModel.kept`.
     Returns outside_pct; kept_pct of the correction in the mean, None of one that does not fade; mean_degc; beyond_k,

@@ -18,7 +18,7 @@ SKY, ORANGE, PURPLE, GREY = "#56B4E9", "#E69F00", "#CC79A7", "#8c8c8c"
 MEASURED, PHYSICS, CHOSEN, INTERVAL = "#000000", VERMILLION, BLUE, SKY
 MODEL_COLOURS = (BLUE, GREEN, PURPLE, ORANGE, SKY)
 MEASURED_WIDTH = 1.6
-"""Of the line of what was measured, px: that of a model is thinner."""
+"""Width of the line of measured values, px; lines of models are thinner."""
 STATE_COLOURS = {"before": VERMILLION, "recalibrated": ORANGE, "after": BLUE}
 KIND_COLOURS = {"physics": BLUE, "parameter": GREEN, "instrument": ORANGE}
 KIND_SYMBOLS = {"physics": "circle", "parameter": "diamond", "instrument": "square"}

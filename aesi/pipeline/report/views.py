@@ -1,4 +1,4 @@
-"""What a report shows, as frozen records: arrays in SI units and plain rows, all computed beforehand.
+"""The content of a report as frozen records: arrays in SI units and plain rows, all computed beforehand.
 
 Current is positive on discharge; voltage error e = V_measured - V_model, in volts here and in millivolts on
 the page.

@@ -106,7 +106,7 @@ def write_discovery_report(path: str | Path, view: DiscoveryView) -> Path:
 
 
 def _moved_rows(discovery: Mapping[str, Any]) -> list[Row]:
-    """A row a declared parameter: what it is, and where the refit and, with a finding, the fit with it put it."""
+    """One row per declared parameter: its meaning, its value in the refit and, with a finding, in the fit with that."""
     own = discovery.get("own_parameters", {})
     rows: dict[str, dict[str, str]] = {}
     for state in discoveries.states_of(discovery):

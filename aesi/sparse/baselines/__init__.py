@@ -1,6 +1,6 @@
-"""Baselines: what a user would pick instead, on the same features and splits, each a function of problem and tuning.
+"""Baselines on the same features and splits as the search, each a function of problem and tuning.
 
-Those that try several settings judge them as the search does: by losses in its regime, its weights and its constraints.
+Those with several settings judge them as the search does: by losses in its regime, its weights and its constraints.
 While they are judged, SINDy-C and ridge (where no term holds the error) and boosted trees fade as the search's
 candidates do. None has the leverage in its fade, which the ensembles get only once they are chosen. The constant,
 PySINDy's median and DMD do not fade.
@@ -24,10 +24,10 @@ from aesi.sparse.search.problem import Problem
 
 @dataclass(frozen=True)
 class Tuning:
-    """What a baseline may spend and is judged by, the same as the search.
+    """Budget and judgement of a baseline, the same as of the search.
 
-    candidates : how many are evaluated, population : in each generation.  space : ranges (None: the widest).
-    judge : weights of the fitness, and constraints.  told : is called with each candidate, a row of plain values.
+    candidates : number of evaluations.  population : size of a generation.  space : ranges of the genes; None takes the
+    widest.  judge : weights of the fitness, and constraints.  told : called with each candidate, a row of plain values.
     """
 
     seed: int = 0

@@ -2,11 +2,11 @@
 
     e[k + 1] = g(U[k]) + memory (e[k] - g(U[k - 1]))
 
-The trees see the inputs alone: a tree that sees e[k] learns persistence, which is worth nothing in free run. Rows count
-as in every fit of the search. Number of leaves and of trees come from a small grid, judged as candidates of the search
-are: on what physics that has not seen them leaves of the left-out pieces, and on validation records. Where sparse
-corrections fade to the physics, so do the trees, but for the leverage, which is that of a regression. They have no
-terms: in the fitness the sparsity of each counts as nought.
+The trees have the inputs alone: a tree with e[k] learns persistence, which is useless in free run. Rows have the same
+weights as in every fit of the search. The numbers of leaves and trees come from a small grid, judged like candidates of
+the search: on left-out pieces, with the errors of physics that was fitted without these, and on validation records.
+Where sparse corrections fade to the physics, so do the trees, without the leverage, which only a regression has. They
+have no terms, so that their sparsity counts as 0 in the fitness.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ from aesi.sparse.terms.scaling import Scaling
 
 LEAVES = (4, 15)
 TREES = (25, 50, 100, 200)
-"""The grid, at the default learning rate. Conventions."""
+"""Grid of leaves and trees, at the default learning rate. Conventions."""
 
 
 @dataclass(frozen=True, eq=False)
 class BoostedErrorModel:
-    """A fitted regressor of the scaled next error on the scaled inputs; `fade` as of a sparse model."""
+    """A fitted regressor of the scaled next error on the scaled inputs; `fade` as in a sparse model."""
 
     regressor: Any
     scaling: Scaling
@@ -92,7 +92,7 @@ def gradient_boosting(problem: Problem, seed: int = 0, judge: Judge | None = Non
 
 
 def _tried(problem: Problem, leaves: int, seed: int, judge: Judge) -> Iterator[_Boosted]:
-    """One for each number of trees."""
+    """The models with these leaves, judged, one for each number of trees."""
     left_out = [_left_out(problem, fold, leaves, seed) for fold in range(len(problem.folds))]
     for number, trees in enumerate(TREES):
         given = np.concatenate([each[number] for each in left_out])

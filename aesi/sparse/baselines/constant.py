@@ -1,9 +1,9 @@
-"""The mean error of the training rows, whatever the input: the least that a correction has to beat.
+"""The mean error of the training rows, for any input: the baseline that every correction has to beat.
 
     e[k + 1] = c
 
-A voltage sensor's offset, or a slow overpotential that the physics lacks, is mostly a constant: a correction that
-takes off no more than this has learnt nothing of the physics.
+The offset of a voltage sensor, or a slow overpotential that the physics lacks, is mostly constant. A correction that
+removes no more than the constant has learnt nothing about the physics.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ NAME = "constant"
 
 
 def constant(problem: Problem) -> SparseModel:
-    """The constant of least squares over all training rows, each counting what it counts in every fit."""
+    """The least-squares constant over all training rows, with the weights that rows have in every fit."""
     place = np.array([problem.library.terms.index(Term())])
     value = STRidge(0.0, 0.0).fit_factor(problem.full_factor[:, np.append(place, len(problem.library))])
     return sparse_model(problem, place, value, 0.0, NAME)

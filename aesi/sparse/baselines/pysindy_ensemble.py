@@ -1,8 +1,8 @@
 """PySINDy's own ensemble: STLSQ on rows drawn one by one with replacement, and the median of its coefficients.
 
 The library, the scaling and the rows are those of the search; the ridge and the extent of the library come from a
-small grid, judged as candidates of the search are, by single fits. Rows are thinned to `MOST_ROWS`: neighbours say the
-same.
+small grid, judged like candidates of the search, by single fits. Rows are thinned to `MOST_ROWS`: neighbouring rows
+have nearly the same information.
 Fasel et al., Proc. R. Soc. A 478 (2022) 20210904, doi:10.1098/rspa.2021.0904.
 """
 

@@ -22,7 +22,7 @@ FactorFit = Callable[[Array], Array]
 
 
 class Tried(HasFitness, Protocol):
-    """A setting of a baseline that was tried: its fitness, and what the constraints ask of."""
+    """A tried setting of a baseline: its fitness, and the values that constraints apply to."""
 
     @property
     def pearson_train(self) -> float:
@@ -31,7 +31,7 @@ class Tried(HasFitness, Protocol):
 
     @property
     def valid(self) -> Judged:
-        """How it did on validation."""
+        """Its scores on the validation records."""
         ...
 
 
@@ -47,18 +47,19 @@ class Judge:
     pearson_valid: float = 0.5
 
     def admits(self, one: Tried) -> bool:
-        """Whether a candidate keeps to the constraints."""
+        """Whether a candidate meets the constraints."""
         return one.pearson_train > self.pearson_train and one.valid.pearson > self.pearson_valid
 
     def best(self, tried: Iterable[T]) -> T:
-        """The fittest that keeps to the constraints, or of all where none does; of equally fit ones the first."""
+        """The fittest of those that meet the constraints, or of all where none does; of equal ones the first."""
         return ranked(tried, self.admits)[0]
 
 
 @dataclass(frozen=True, eq=False)
 class Single:
-    """A single fit: its losses (left-out pieces, validation, terms), fitness, model, and how it did on validation.
+    """A single fit, judged.
 
+    losses : on left-out pieces, on validation, and the number of terms.  valid : scores on validation.
     pearson_train : correlation of error and prediction in free run, on left-out pieces.
     """
 
@@ -73,9 +74,9 @@ class Single:
 def evaluate_single(
     problem: Problem, genome: Genome, fit: FactorFit, name: str, weights: FitnessWeights | None = None
 ) -> Single | Failed:
-    """Fit all training rows at once, and judge.
+    """One candidate fitted to all training rows at once, and judged.
 
-    Without resamples there are no out-of-bag rows; the loss on pieces left out of the fit takes their place.
+    Without resamples there are no out-of-bag rows; the loss on pieces left out of the fit replaces their loss.
     """
     active = np.flatnonzero(genome.active(problem.library))
     columns = np.append(active, len(problem.library))

@@ -1,1 +1,1 @@
-"""Candidates of the search: what one is made of, what all share, how one is fitted and judged."""
+"""Candidates of the search: their genome, the shared problem, their fit and their judgement."""

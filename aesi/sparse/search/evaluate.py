@@ -21,12 +21,13 @@ from aesi.sparse.stridge import STRidge
 
 @dataclass(frozen=True)
 class FitnessWeights:
-    """gamma of the paper's loss; each loss is made comparable first (see `Candidate`).
+    """Weights gamma of the paper's loss; each loss is normalised first (see `Candidate`).
 
-    The paper gives none. A test drive lies further from the trained rows than out-of-bag blocks of them, and nearer
-    than drives left out, so both count alike; few terms promise nothing for it. With 0.05, 0.9 and 0.05 AESI I
-    takes 0.7 points less off the recalibrated model's squared error on the NMC drive, 1.4 on the LG M50T, 0.2 on the LG
-    HG2 and 3.0 on the Panasonic: three searches of 16 candidates on each development split of `aesi bench splits`.
+    The paper gives no values. A test drive is further from the training rows than out-of-bag blocks, and nearer than
+    left-out drives, so that both have the same weight; few terms do not improve it. With 0.05, 0.9 and 0.05 the
+    reduction of the recalibrated model's squared error by AESI I is 0.7 points smaller on the NMC drive, 1.4 on the LG
+    M50T, 0.2 on the LG HG2 and 3.0 on the Panasonic: three searches of 16 candidates on each development split of `aesi
+    bench splits`.
     """
 
     oob: float = 0.5
@@ -36,13 +37,13 @@ class FitnessWeights:
 
 @dataclass(frozen=True, eq=False)
 class OutOfFoldResiduals:
-    """Out-of-fold prediction errors, for the calibration of intervals: each by coefficients not fitted to its row.
+    """Out-of-fold prediction errors of one record, for the calibration of intervals.
 
     one_step_v : (n - 1,) V, measured minus predicted error of samples 1 to n - 1 of the record, one step ahead,
-    by models fitted on all rows but the piece around each.  stable_v : the same by fits of the stable terms, and which
-    terms these are was selected over all rows, the piece's too. So `stable_v` is a little too small: on records of
-    noise alone, where what is selected is chance, by half a per cent of its RMS (a relative squared error of 1.011
-    instead of 1.019, and with fewer terms 0.998 instead of 1.009; standard errors 0.003 to 0.004 over 12 draws).
+    by models fitted to all rows except the piece around each.  stable_v : the same by fits of the stable terms. These
+    terms were selected over all rows, the piece included, so that `stable_v` is a little too small: on records of pure
+    noise, where the selection is chance, by half a per cent of its RMS (a relative squared error of 1.011 instead of
+    1.019, and with fewer terms 0.998 instead of 1.009; standard errors 0.003 to 0.004 over 12 draws).
     """
 
     record: str
@@ -59,19 +60,18 @@ class Candidate:
     """A genome, fitted and judged.
 
     loss_oob, loss_valid : mean squared error over that of the bare physics model on the same samples, in the
-    problem's regime (1 is no better than none). loss_oob is the mean over the members, see out_of_bag.py.
-    loss_valid is the mean over both ensembles, on the left-out pieces, by fits of all and of the stable terms (in free
-    run from the measured error and from none, see `Judged`), and where there are validation records half of it is on
-    these.
-    valid_losses : that of AESI I and that of AESI II.
+    problem's regime (1: no better than no correction). loss_oob is the mean over the members, see out_of_bag.py.
+    loss_valid is the mean over both ensembles, on left-out pieces, by fits of all and of the stable terms (in free run
+    from the measured error and without one, see `Judged`). With validation records, half of it is on these.
+    valid_losses : loss_valid of AESI I and of AESI II.
     loss_sparse : number of active terms of AESI I.
     fitness : 1 - (g1 loss_oob + g2 loss_valid + g3 loss_sparse / library size).
-    pearson_train, pearson_valid : correlation of error and prediction of AESI I, in free run: on training
-    rows by fits without the piece around each, started anew with each, and on validation.
-    free_run_valid_mser_pct, one_step_valid_rmse_v : of AESI I on the validation records (of the fold models
-    on the folds where there are none); the first against the physics that is corrected.
-    fold_sums : (2, n_folds, 3) for `aesi.sparse.search.pick.nested`, of AESI I and II.
-    members : the candidates that this one is the mean of (average.py); none where it is one by itself.
+    pearson_train, pearson_valid : correlation of error and prediction of AESI I in free run: on each training piece, by
+    a fit without it, started from its first error; and on validation records.
+    free_run_valid_mser_pct, one_step_valid_rmse_v : of AESI I on the validation records (without these, of the fold
+    models on their folds), in % relative to the corrected physics, and in V.
+    fold_sums : (2, n_folds, 3) sums of AESI I and II for `aesi.sparse.search.pick.nested`.
+    members : the candidates that this one is the mean of (average.py); empty for a single candidate.
     """
 
     genome: Genome
@@ -92,12 +92,12 @@ class Candidate:
 
     @property
     def genomes(self) -> tuple[Genome, ...]:
-        """That of each member, or its own."""
+        """The genomes of its members, or its own."""
         return tuple(member.genome for member in self.members) or (self.genome,)
 
     @property
     def ridge(self) -> float:
-        """lambda1, of several the geometric mean."""
+        """lambda1; with members the geometric mean of theirs."""
         return float(np.prod([genome.lambda1 ** (1.0 / len(self.genomes)) for genome in self.genomes]))
 
     @property
@@ -106,12 +106,12 @@ class Candidate:
         return self.bagging, self.stability
 
     def named(self, name: str) -> SparseModel | None:
-        """The ensemble of that name; None where it is that of another model."""
+        """The ensemble of that name; None for another name."""
         return next((model for model in self.ensembles if model.name == name), None)
 
     @property
     def better(self) -> SparseModel:
-        """The ensemble of the lower validation loss, AESI I where they are equal."""
+        """The ensemble with the lower validation loss; AESI I where they are equal."""
         return self.stability if self.valid_losses[1] < self.valid_losses[0] else self.bagging
 
     @property
@@ -121,7 +121,7 @@ class Candidate:
 
 
 def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = None) -> Candidate | Failed:
-    """Fit, judge and combine one candidate.
+    """One candidate, fitted, judged and combined.
 
     Returns Failed, with the reason, where no term is admitted, thresholding leaves none, every resample
     diverges in free run, no term is stable, or the combined models diverge on the validation data.
@@ -174,7 +174,7 @@ def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = 
 def _combined(
     problem: Problem, genome: Genome, active: IntArray, columns: IntArray, solver: STRidge
 ) -> tuple[Ensemble, float] | Failed:
-    """The best of the fits to all resamples as one ensemble, and the mean of their out-of-bag losses.
+    """(ensemble of the best fits to resamples, mean of their out-of-bag losses).
 
     active : (m,) numbers of the terms.  columns : (m + 1,) of a factor, those of the terms and of the target.
     """
@@ -204,7 +204,8 @@ def fitness(losses: tuple[float, float, float], library_size: int, weights: Fitn
 def _fold_fits(
     problem: Problem, columns: IntArray, stable: BoolArray, solver: STRidge
 ) -> tuple[Array, Array]:
-    """(n_folds, m) each: coefficients of the active terms fitted without each fold, and of those that are stable alone.
+    """(coefficients of all active terms, coefficients of the stable terms alone), (n_folds, m) each, fitted without
+    each fold.
 
     columns : (m + 1,) of a factor, those of the active terms and of the target.  stable : (m,).
     """
@@ -216,11 +217,11 @@ def _fold_fits(
 
 
 def _with_left_out(problem: Problem, runs: FoldRuns, judged: Sequence[Judged]) -> tuple[float, float]:
-    """Loss of AESI I and II on what their fits have not seen: the left-out pieces, and as much the validation records.
+    """(loss of AESI I, loss of AESI II) on unseen data: left-out pieces and, with the same weight, validation records.
 
-    Free runs of the out-of-bag loss last a block, and beside each lie rows that were fitted; one short validation drive
-    bears out what fits it by chance. On ten made cells (40 candidates of one search each) the candidate that is picked
-    with the pieces takes 78.8 % off the test's squared error, 76.6 without, the mean of five 80.3 and 78.6.
+    Free runs of the out-of-bag loss last only a block, next to fitted rows, and a single short validation drive favours
+    candidates that fit it by chance. On ten virtual cells (40 candidates of one search each) the candidate that is
+    picked with the pieces takes 78.8 % off the test's squared error, 76.6 without, the mean of five 80.3 and 78.6.
     """
     one, stable = (
         0.5 * (each.loss + runs.judge(problem, Fit(column)).loss) for column, each in enumerate(judged)
@@ -237,7 +238,7 @@ def _out_of_fold(problem: Problem, runs: FoldRuns) -> tuple[OutOfFoldResiduals, 
 
 
 def faded(model: SparseModel, problem: Problem, amplitude: float) -> SparseModel:
-    """The model as it gives way to the physics, where the problem wants that and its terms allow it."""
+    """The model with a fade, where the problem's options ask for one and no term holds the error."""
     if model.has_feedback or not problem.options.fade:
         return model
     return replace(model, fade=Fade(amplitude, problem.region))
@@ -251,7 +252,7 @@ def sparse_model(
     name: str,
     ensemble: Ensemble | None = None,
 ) -> SparseModel:
-    """The model of the coefficients (m,) of the active terms that are not zero, with their spread if known."""
+    """The model of those active terms whose coefficients (m,) are not zero, with their spread if known."""
     kept = np.flatnonzero(coefficients)
     model = SparseModel(
         name, problem.library.take(active[kept]), coefficients[kept], problem.scaling, problem.dt_s, memory

@@ -1,4 +1,4 @@
-"""A plain evolutionary search by one number, for what needs no front: baselines and benchmarks of designs."""
+"""A plain evolutionary search by one objective, for baselines and benchmarks of designs, which need no Pareto front."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from aesi.sparse.search.genome_space import GenomeSpace
 
 
 class HasFitness(Protocol):
-    """How fit something is."""
+    """Something with a fitness."""
 
     @property
     def fitness(self) -> float:
-        """More is better."""
+        """The fitness; higher is better."""
         ...
 
 
 class Bred(HasFitness, Protocol):
-    """Result of an evaluation: its genome, and how fit it is."""
+    """Result of an evaluation: genome and fitness."""
 
     @property
     def genome(self) -> Genome:
@@ -36,7 +36,7 @@ T = TypeVar("T", bound=Bred)
 
 
 def ranked(tried: Iterable[R], admitted: Callable[[R], bool]) -> list[R]:
-    """The fittest first, those that are not `admitted` after all that are; equally fit ones stay in their order."""
+    """The results, fittest first; those that are not `admitted` come last, equally fit ones stay in their order."""
     return sorted(tried, key=lambda one: (not admitted(one), -one.fitness))
 
 

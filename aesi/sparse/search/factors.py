@@ -26,10 +26,10 @@ from aesi.sparse.search.rows import TrainingRows
 
 @dataclass(frozen=True, eq=False)
 class Factors:
-    """factors : (resamples, any, m + 1), and fold_factors likewise.  full_factor : (any, m + 1).
+    """factors : (resamples, any, m + 1).  fold_factors : (n_folds, any, m + 1).  full_factor : (any, m + 1).
 
-    A factor is an F with F' F = [Theta y]' W [Theta y]; W is what each row counts times how often the resample (or
-    all rows but the fold) holds it, y the target (or that of the fold).
+    A factor is an F with F' F = [Theta y]' W [Theta y]. W is the weight of each row times its count in the resample (or
+    in all rows except the fold), y the target (or that of the fold).
     """
 
     factors: Array
@@ -40,9 +40,10 @@ class Factors:
 def factored(
     rows: TrainingRows, own_targets: Array, row_weights: Array, counts: CountArray, folds: Sequence[Span]
 ) -> Factors:
-    """own_targets : (n_folds, n) of each fold, or (0, n) where the target of the rows is that of all.
+    """The factors of all resamples, folds and of all rows.
 
-    counts : (resamples, n).  Raises DataError for a term or target that is not a number.
+    own_targets : (n_folds, n) target of each fold, or (0, n) where all folds have the target of the rows.
+    row_weights : (n,).  counts : (resamples, n) of each row.  Raises DataError for a term or target that is not finite.
     """
     m = len(rows.library)
     columns = _columns(rows, (rows.target, *own_targets))
@@ -58,9 +59,9 @@ def factored(
 
 
 def _columns(rows: TrainingRows, targets: Sequence[Array]) -> Array:
-    """(n, m + n_targets), stored by columns: the terms along the training rows, and what they are fitted to.
+    """(n, m + n_targets), stored by columns: the terms along the training rows, then the targets.
 
-    Raises DataError for the first that is not a number.
+    Raises DataError for the first value that is not finite.
     """
     m = len(rows.library)
     columns = np.empty((rows.products.shape[1], m + len(targets)), order="F")

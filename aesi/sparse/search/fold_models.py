@@ -1,12 +1,12 @@
-"""Models behind free-run residuals: each is fitted to all training rows but one long piece, on which it is then tried.
+"""Models for free-run residuals: each is fitted to all training rows except one long piece, and judged on that piece.
 
 The search may judge candidates on shorter pieces (`Options.fold`); the drift of a free run shows only over a long one.
 
-Like the model that is served, they learn the error of physics that was fitted to all training drives; they are tried on
-the piece under physics that has not seen it. Had they learnt the error of physics that has not seen the piece, as the
-search does, they would come out better than on the drives of the test: over the development splits in `aesi bench
-splits` the bands of AESI I then covered 87 % of the NMC drive and 51 % of the LG M50T's, instead of 90 and 66 %, at
-Winkler scores of 51.1 and 40.8 instead of 50.8 and 29.0 mV.
+Like the final model, they learn the error of physics that was fitted to all training drives. They are judged on the
+piece with physics that was fitted without it. If they learnt the error of that physics, as in the search, their errors
+would be smaller than on test drives: over the development splits in `aesi bench splits` the bands of AESI I then
+covered 87 % of the NMC drive and 51 % of the LG M50T's, instead of 90 and 66 %, at Winkler scores of 51.1 and 40.8
+instead of 50.8 and 29.0 mV.
 """
 
 from __future__ import annotations
@@ -42,10 +42,10 @@ def fold_models(
     left_out: Sequence[HeldOutDrive] = (),
     cut: Sequence[Span] | None = None,
 ) -> Iterator[tuple[SparseModel, ErrorSeries, slice]]:
-    """For every piece of the training records: a model fitted without it, its record, and the samples that it holds.
+    """For every piece of the training records: (a model fitted without it, its record, its samples).
 
-    The model has the candidate's genome, or is the mean of models with its members' genomes. Pieces without which no
-    term survives are passed over.
+    The model has the candidate's genome, or is the mean of models with its members' genomes. A piece is skipped where
+    no term survives the fit without it.
 
     judged : AESI I (the default), or AESI II, whose terms alone are refitted then.
     left_out : for every piece, its record under physics that has not seen the piece either; by default the records as
@@ -88,7 +88,7 @@ def _factors_without(problem: Problem, active: IntArray, cut: Sequence[Span]) ->
 
 @dataclass(frozen=True, eq=False)
 class _Member:
-    """places : of its terms among all that enter the fits.  share : what it counts in the mean."""
+    """One model of a mean.  places : of its terms among all terms of the fits.  share : its weight in the mean."""
 
     solver: STRidge
     places: IntArray
@@ -105,7 +105,7 @@ class _Member:
 def _members(
     problem: Problem, candidate: Candidate, judged: SparseModel
 ) -> tuple[IntArray, tuple[_Member, ...]]:
-    """Numbers of all terms that enter the fits of a fold, and what is fitted with which of them."""
+    """(numbers of all terms in the fits of a fold, the members with their terms)."""
     candidates = candidate.members or (candidate,)
     stable = judged.name == candidate.stability.name
     terms = [_terms(problem, one, stable) for one in candidates]
@@ -128,8 +128,7 @@ def _terms(problem: Problem, candidate: Candidate, stable: bool) -> IntArray:
 
 
 def with_leverage(model: SparseModel, problem: Problem, lambda1: float) -> SparseModel:
-    """The model with the leverage of a fit of its terms to all training rows. If the model fades, it fades by that,
-    too."""
+    """The model with the leverage of a fit of its terms to all training rows, which its fade then uses too."""
     number = {term: j for j, term in enumerate(problem.library.terms)}
     which: IntArray = np.array([number[term] for term in model.library.terms])
     return replace(model, leverage=Leverage.of(problem.full_factor[:, which], lambda1, problem.theta(which)))

@@ -1,4 +1,4 @@
-"""What a candidate of the search is made of: the paper's P = {Theta_s, lambda1, lambda2, tau} with p_c and d.
+"""The genome of a candidate: the paper's P = {Theta_s, lambda1, lambda2, tau} with p_c and d.
 
 One gene is added: whether terms may hold the fed-back error at all. A model without feedback has no memory,
 cannot diverge, and is often the better simulator; single terms alone would hardly ever switch it off.
@@ -25,7 +25,7 @@ GENE_WORDS = {
     "d": "total degree (d)",
     "feedback": "feedback of the error",
 }
-"""Gene -> what a page calls it."""
+"""Gene -> its name in reports."""
 
 
 @dataclass(frozen=True)

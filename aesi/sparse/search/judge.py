@@ -1,4 +1,4 @@
-"""How a fit is judged: predictions along the training rows, along the left-out pieces, and on records."""
+"""The judgement of a fit: predictions along the training rows, along left-out pieces, and on records."""
 
 from __future__ import annotations
 
@@ -22,10 +22,12 @@ _MOST_MEMORY = 0.9999
 
 @dataclass(frozen=True)
 class Judged:
-    """loss : weighted squared error over that of the bare model, in the problem's regime; not finite if it diverges.
-    Of left-out pieces in free run, the mean of two runs: from the measured error, and from none.
+    """Scores of a fit.
 
-    pearson, mser_pct : in free run from the measured error, all samples alike.  one_step_rmse_v : V, likewise.
+    loss : weighted squared error over that of the bare model, in the problem's regime; not finite if it diverges. On
+    left-out pieces in free run it is the mean of two runs: from the measured error, and without one.
+    pearson, mser_pct : in free run from the measured error, all samples with the same weight.  one_step_rmse_v : V, one
+    step ahead, the same.
     """
 
     loss: float
@@ -35,7 +37,7 @@ class Judged:
 
 
 def drive_of(problem: Problem, active: IntArray, fits: Array, rows: slice) -> tuple[Array, IntArray]:
-    """(n_functions, rows, models) sums of the input parts of the terms of each function of e; these functions."""
+    """(sums of the input parts of the terms by function of e (n_functions, rows, models), these functions)."""
     feedbacks = problem.library.feedbacks[active]
     products = problem.which[active]
     functions = np.unique(feedbacks)
@@ -62,9 +64,9 @@ def one_step_predictions(problem: Problem, drive: Array, functions: IntArray, ro
 
 
 class Fit(IntEnum):
-    """Whose predictions a column of `FoldRuns` holds.
+    """The fit of a column of `FoldRuns`.
 
-    Both are of a fit without the fold: FOLD to all terms, STABLE to the stable ones. They stand for AESI I and II.
+    Both are fits without the fold: FOLD of all terms, STABLE of the stable ones. They represent AESI I and II.
     """
 
     FOLD = 0
@@ -73,12 +75,12 @@ class Fit(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class FoldRuns:
-    """(n, 2) scaled predictions in each regime, a column each `Fit`.
+    """Scaled predictions (n, 2) along the training rows in each regime, one column per `Fit`.
 
-    from_none : free run by the inputs alone, no measured error at its start; `free_run` for models with feedback.
+    from_none : free run without a measured error at its start; equal to `free_run` for models with feedback.
     Corrections fade in all of them by nearness and amplitude, not by leverage (fade.py).
-    amplitudes : (2,) of equation (2) there.  sums : (2, n_folds, 3), for both and each fold the sums of e**2, e p and
-    p**2, with p the prediction `from_none` before the amplitude; scaled.
+    amplitudes : (2,) a of (2) there.  sums : (2, n_folds, 3) for each fit and fold the scaled sums of e**2, e p and
+    p**2, with p the prediction `from_none` before the amplitude.
     """
 
     one_step: Array
@@ -88,7 +90,7 @@ class FoldRuns:
     amplitudes: tuple[float, float] = (1.0, 1.0)
 
     def judge(self, problem: Problem, column: Fit) -> Judged:
-        """How one of the fits did over all pieces."""
+        """The scores of one of the fits over all pieces."""
         run = self.free_run if problem.options.regime == "free_run" else self.one_step
         truth = problem.unseen_target
         with np.errstate(invalid="ignore"):
@@ -106,8 +108,7 @@ class FoldRuns:
 
 
 def fold_runs(problem: Problem, active: IntArray, fits: Array, refits: Array) -> tuple[FoldRuns, float]:
-    """Free and one-step runs over each piece by models fitted on the others; and the memory of the residual, for models
-    without feedback."""
+    """(runs over each piece by models fitted to the others, memory of the residual for models without feedback)."""
     drives = [
         drive_of(problem, active, np.stack([fit, refit]), slice(a, b))
         for (a, b), fit, refit in zip(problem.folds, fits, refits, strict=True)
@@ -158,9 +159,9 @@ def runs_without_feedback(problem: Problem, given: Array) -> tuple[FoldRuns, flo
 
 
 def memory_of(problem: Problem, given: Sequence[Array]) -> float:
-    """Lag-one autoregression coefficient of a residual that the fit has not seen, within [0, 1).
+    """Lag-one autoregression coefficient of a residual on unseen rows, within [0, 1).
 
-    The median over the folds: one in which the physics drifts away by volts would set it for all.
+    It is the median over the folds: a single fold in which the physics drifts away by volts would dominate a mean.
     """
     each = []
     for (a, b), prediction in zip(problem.folds, given, strict=True):
@@ -171,7 +172,7 @@ def memory_of(problem: Problem, given: Sequence[Array]) -> float:
 
 
 def on_records(model: ErrorModel, records: Sequence[ErrorSeries], problem: Problem) -> Judged:
-    """How a model does on whole records, each started from its first measured error."""
+    """The scores of a model on whole records, each started from its first measured error."""
     truth = [record.error_v[1:] for record in records]
     one_step = [model.one_step(record)[1:] for record in records]
     runs = [model.free_run(record) for record in records]
@@ -188,7 +189,7 @@ def on_records(model: ErrorModel, records: Sequence[ErrorSeries], problem: Probl
 
 
 def _relative_loss(truth: Sequence[Array], predictions: Sequence[Array], balance: bool) -> float:
-    """Squared error over that of the bare model; balanced, every record counts alike."""
+    """Squared error over that of the bare model.  balance : True gives every record the same weight."""
     spans = spans_of([len(record) for record in truth])
     joined = np.concatenate(truth)
     weights = balanced_weights(spans, joined) if balance else np.ones(len(joined))
@@ -197,9 +198,9 @@ def _relative_loss(truth: Sequence[Array], predictions: Sequence[Array], balance
 
 
 def on_validation(problem: Problem, runs: FoldRuns, models: Sequence[ErrorModel]) -> tuple[Judged, ...]:
-    """How each model did on the validation records, or where there are none on the left-out pieces.
+    """The scores of each model on the validation records, or on left-out pieces where there are none.
 
-    models : AESI I and II, or a single one; on pieces the fold's fit and its refit stand for them.
+    models : AESI I and II, or a single one; on pieces they are represented by the fold's fits.
     """
     if problem.split.valid:
         return tuple(on_records(model, problem.split.valid, problem) for model in models)

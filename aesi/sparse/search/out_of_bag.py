@@ -1,14 +1,14 @@
 """Out-of-bag errors of the members of an ensemble, made comparable.
 
-Every resample leaves out other rows, so a member whose rows happen to be easy would win. The rows are cut into
-pieces of a block; s[p, b] is the squared error of member b on the u[p, b] rows of piece p that it did not draw, each
-row counting as in the fits. A member's error is set against what the members typically leave on the same pieces:
+Every resample leaves out different rows, so that a member whose rows happen to be easy would win. The rows are cut into
+pieces of a block; s[p, b] is the squared error of member b on the u[p, b] rows of piece p that it did not draw, with
+the weights of the fits. A member's error is divided by the typical error of all members on the same pieces:
 
     L_b = [ sum_p s[p, b] / sum_p m_p u[p, b] ] [ sum_p m_p n_p / sum_p n_p ] / bare
     m_p = median over b of s[p, b] / u[p, b]                                                            (1)
 
-n_p is the number of rows of the piece and `bare` the mean squared error of the physics model: (1) estimates what the
-member would have left, relative to the physics, had it drawn none of the rows.
+n_p is the number of rows of the piece and `bare` the mean squared error of the physics model. (1) estimates the
+member's error relative to the physics on all rows, as if it had drawn none of them.
 """
 
 from __future__ import annotations

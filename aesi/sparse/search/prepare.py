@@ -1,4 +1,4 @@
-"""Training and validation records made ready for a search: checked, and without inputs that say nothing new."""
+"""Training and validation records prepared for a search: checked, and without constant or redundant inputs."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from aesi.sparse.terms.library import Library
 def prepared_series(
     split: Split, inputs: tuple[str, ...] | None, library: Library | None
 ) -> tuple[tuple[ErrorSeries, ...], tuple[ErrorSeries, ...], tuple[str, ...]]:
-    """Training and validation records with their inputs, and a sentence for each input that was left out.
+    """(training records, validation records, a sentence for each input that was left out).
 
-    inputs : names, by default those of the records; a library's own go first.
-    Raises DataError where there is nothing to learn, or to judge by, and for a record of either that no fit, or no
-    figure, can be of.
+    inputs : names; None takes those of the records. The inputs of a given `library` take precedence.
+    Raises DataError without a training record, where the training error or all inputs are constant, where the
+    validation error is zero, and for a record that is too short, sampled otherwise, or not finite.
     """
     if not split.train:
         raise DataError("there are no training records.")
@@ -39,7 +39,7 @@ def prepared_series(
     valid = [with_inputs(record, names) for record in split.valid]
     for record in valid:
         _check(record, train[0].dt_s)
-    # The first sample is given, and what is left of the others is told as a share of their squares.
+    # The first sample is given; the loss is a share of the squares of the others, so that these must not be zero.
     if valid and not any(record.error_v[1:].any() for record in valid):
         raise DataError(
             "the voltage error is zero over the validation records, so that no share of it can be told; validate on "
@@ -64,7 +64,7 @@ def _check(record: ErrorSeries, dt_s: float) -> None:
 
 
 def _useful_inputs(train: Sequence[ErrorSeries]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names of inputs that vary and do not repeat an earlier one up to scaling; notes on the others."""
+    """(names of inputs that vary and do not repeat an earlier one up to scaling, notes on the others)."""
     columns = np.vstack([record.inputs for record in train])
     kept: dict[str, Array] = {}
     notes = []
@@ -87,12 +87,12 @@ def _useful_inputs(train: Sequence[ErrorSeries]) -> tuple[tuple[str, ...], tuple
 
 
 def variables(record: ErrorSeries) -> Array:
-    """(n, 1 + n_inputs) the error first."""
+    """(n, 1 + n_inputs) error and inputs of a record, the error first."""
     return np.column_stack([record.error_v, record.inputs])
 
 
 def not_finite(library: Library, theta: Array) -> str:
-    """Which term, or the target, of (n, m + 1) is not a number, and where."""
+    """A sentence on the first value of (n, m + 1) that is not finite: which term, or the target, and where."""
     j = int(np.flatnonzero(~np.isfinite(theta).all(axis=0))[0])
     k = int(np.flatnonzero(~np.isfinite(theta[:, j]))[0])
     name = (*library.names, "the target")[j]

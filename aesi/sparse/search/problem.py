@@ -1,4 +1,4 @@
-"""Everything that a whole search shares, computed once: library, resamples, triangular factors.
+"""The data that all candidates of a search share, computed once: library, resamples, triangular factors.
 
 Out-of-bag and validation losses are taken in free run inside pieces of `horizon` rows, each started from its measured
 error (`regime="one_step"` for the loss as the paper prints it). One-step losses cannot tell a good simulator from one
@@ -37,19 +37,19 @@ Regime = Literal["free_run", "one_step"]
 
 @dataclass(frozen=True)
 class Options:
-    """How a problem is set up.
+    """Options of a problem.
 
     inputs : names of the inputs (default: those of the records).
     p_c, d, factors, special, mixed : extent of the library, see `Library.build`.
-    resamples, block : bootstrap resamples, and rows in a block (default: 500, or a tenth of the rows where
+    resamples, block : number of bootstrap resamples, and rows of a block (default: 500, or a tenth of the rows where
     there are fewer than 5,000).
     best : share of resamples that enters the ensemble.  horizon : rows of a free run (default: the block).
     fold : rows of a left-out piece (default: records, each cut into `cuts`, or an eighth of the rows of a single one).
-    regime : what the losses measure.  outside : what happens beyond the trained range.
-    feedback : whether terms may hold the error at all.
+    regime : of the losses, free run or one step ahead.  outside : treatment of inputs beyond the trained range.
+    feedback : whether terms may hold the error.
     fade : whether a correction without such terms is shrunk towards the physics (fade.py).
-    balance : let every record count alike, in fits and losses, whatever its length and, but for the smallest, its
-    error. Otherwise one near the end of discharge, where the error is largest, decides the model for all others.
+    balance : give every record the same weight in fits and losses, whatever its length and its error (very small errors
+    excepted). Otherwise a record near the end of discharge, where the error is largest, dominates the model.
     """
 
     inputs: tuple[str, ...] | None = None
@@ -74,16 +74,16 @@ class Options:
 
 @dataclass(frozen=True, eq=False)
 class Problem(TrainingRows, Factors):
-    """The training rows, what is left out in turn, and factors of both.
+    """The training rows, folds and resamples of a search, with their factors.
 
-    unseen_error, unseen_target : (n,) scaled e[k] and e[k + 1] by physics that has not seen the row's fold (unseen.py).
-    fold_targets : (n_folds, n) the target by the physics of each fold, which a fit without that fold learns.
-    counts : (resamples, n) how often each resample holds a row.
-    row_weights : (n,) mean 1, what a row counts in fits and losses (`Options.balance`).
-    restart : (n,) True where a free run of the losses starts anew.
-    folds : what is left out in turn.
-    nearness : (n,) what is left of a correction at each row that was fitted without its fold (trained_region.py).
-    notes : what was left out of the library, and why, one sentence each.
+    unseen_error, unseen_target : (n,) scaled e[k] and e[k + 1] by physics fitted without the row's fold (unseen.py).
+    fold_targets : (n_folds, n) target of a fit without each fold, by the physics of that fold.
+    counts : (resamples, n) number of times that each resample holds a row.
+    row_weights : (n,) weight of each row in fits and losses, mean 1 (`Options.balance`).
+    restart : (n,) True where a free run of the losses starts.
+    folds : row ranges that are left out in turn.
+    nearness : (n,) weight at each row of a correction that was fitted without its fold (trained_region.py).
+    notes : a sentence on each input that was left out of the library.
     """
 
     options: Options
@@ -107,12 +107,12 @@ class Problem(TrainingRows, Factors):
         library: Library | None = None,
         left_out: Sequence[HeldOutDrive] = (),
     ) -> Problem:
-        """Set up a search over the training records of `split`; `split.test` is not looked at.
+        """The problem of a search over the training records of `split`; `split.test` is not used.
 
-        left_out : the training records under physics that was fitted without each fold, where there is such a one:
-        then what is learnt without a fold, and judged on it, is the error of that physics.
-        Raises DataError where there is nothing to learn from: no records, records of different sampling, an
-        error or all inputs constant, NaN, or fewer rows than library terms; or where `left_out` is not of the folds.
+        left_out : the training records with physics fitted without each fold, or empty. A fit without a fold then
+        learns the error of that physics, and is judged by it on the fold.
+        Raises DataError for no records, records of different sampling, a constant error or only constant inputs, NaN,
+        or fewer rows than library terms; and where `left_out` does not match the folds.
         """
         options = options or Options()
         train, valid, notes = prepared_series(split, options.inputs, library)
@@ -152,12 +152,12 @@ class Problem(TrainingRows, Factors):
 
     @property
     def folds_are_drives(self) -> bool:
-        """True where folds are whole records, or the parts that `Options.cuts` asks of each, not pieces of rows."""
+        """True where folds are whole records or their `Options.cuts` parts, not pieces of `Options.fold` rows."""
         return self.options.fold is None and len(self.spans) > 1
 
     @cached_property
     def fold_drives(self) -> IntArray:
-        """(n_folds,) the number of the training record that each fold is of."""
+        """(n_folds,) number of the training record of each fold."""
         ends = [b for _, b in self.spans]
         return np.searchsorted(ends, [a for a, _ in self.folds], side="right")
 
@@ -189,7 +189,7 @@ class Problem(TrainingRows, Factors):
         return np.add.reduceat(self.unseen, first, axis=0, dtype=float)
 
     def weights(self, resample: int) -> Array:
-        """(n,) what each row counts in a resample."""
+        """(n,) weight of each row in a resample."""
         return self.counts[resample] * self.row_weights
 
 

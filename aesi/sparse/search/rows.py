@@ -1,4 +1,4 @@
-"""Training rows, numbered through over all records: which belong together, which are left out, what each counts."""
+"""Training rows, numbered over all records: their spans, left-out pieces and weights."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from aesi.sparse.trained_region import TrainedRegion
 class TrainingRows:
     """Training rows k -> k + 1 of all records, and the library along them.
 
-    spans : the rows of each record.
-    products : (n_products, n) the input parts of the terms; `which` (m,) tells the part of each term.
+    spans : row range of each record.
+    products : (n_products, n) distinct input parts of the terms.  which : (m,) number of each term's input part.
     error_functions : (12, n) the functions of the fed-back error.  inputs : (n, n_inputs) scaled.
-    error, target : (n,) scaled e[k] and e[k + 1].  soc : (n,).  temperature_degc : (n,), NaN where it
-    was not measured.  region : what a fit to all rows is fitted to.
+    error, target : (n,) scaled e[k] and e[k + 1].  soc : (n,).  temperature_degc : (n,) degC, NaN where it
+    was not measured.  region : range of all rows.
     """
 
     library: Library
@@ -82,18 +82,18 @@ def training_rows(train: Sequence[ErrorSeries], library: Library, outside: Outsi
 
 
 def spans_of(lengths: Sequence[int]) -> tuple[Span, ...]:
-    """Row ranges of records of these lengths, put one after the other."""
+    """Row ranges of records of these lengths, in sequence."""
     edges = np.concatenate([[0], np.cumsum(lengths)])
     return tuple((int(a), int(b)) for a, b in pairwise(edges))
 
 
 def default_block(n: int) -> int:
-    """Rows of a block where none is asked for: the paper's 500, or a tenth of fewer than 5,000 rows."""
+    """Default number of rows of a block: the paper's 500, or a tenth of fewer than 5,000 rows."""
     return min(500, max(10, n // 10))
 
 
 def left_out_pieces(spans: Sequence[Span], fold: int | None, cuts: int) -> tuple[Span, ...]:
-    """Pieces of about `fold` rows; where none is asked for, records cut into `cuts`, or eighths of a single one."""
+    """Pieces of about `fold` rows; for None, records cut into `cuts` each, or eighths of a single record."""
     if fold is None and len(spans) > 1:
         return tuple(piece for a, b in spans for piece in cut_evenly(a, b, cuts))
     return tuple(pieces(spans, fold or max(10, spans[-1][1] // 8)))
@@ -106,7 +106,7 @@ def cut_evenly(a: int, b: int, cuts: int) -> list[Span]:
 
 
 def nearness_of_left_out(inputs: Array, soc: Array, temperature_degc: Array, folds: Sequence[Span]) -> Array:
-    """(n,) what is left at each row (trained_region.py) of a correction fitted to the rows of the other folds."""
+    """(n,) nearness (trained_region.py) of each row to the rows of the other folds."""
     parts = []
     for a, b in folds:
         fold = np.s_[a:b]
@@ -118,12 +118,12 @@ def nearness_of_left_out(inputs: Array, soc: Array, temperature_degc: Array, fol
 
 
 LEAST_SHARE = 0.1
-"""A record whose mean squared error is smaller than this share of the mean over records counts as if it were this
-large: a record on which the physics is all but exact should not rule the fit."""
+"""Least mean squared error of a record in the weights, as a share of the mean over records: a record on which the
+physics is nearly exact must not dominate the fit."""
 
 
 def balanced_weights(spans: Sequence[Span], bare: Array) -> Array:
-    """(n,) mean 1: a weight a row, by which every record's bare error (n,) adds the same to a sum of squares."""
+    """(n,) weights of the rows, mean 1, with which the bare error (n,) of every record adds the same sum of squares."""
     sizes = np.array([b - a for a, b in spans])
     rows = np.maximum(sizes, 1)  # a record of a single sample has no row to judge
     squares = np.array([np.sum(bare[a:b] ** 2) for a, b in spans]) / rows

@@ -1,9 +1,8 @@
-"""The errors of physics that has not seen a fold: what a search is judged on where its physics was fitted too.
+"""Errors of physics that was fitted without a fold, for the judgement of a search whose physics was fitted too.
 
-A physics model fitted to the training drives errs less on them than on the next drive. A correction that is judged on
-what that model leaves of its own training data is judged on another error than it will meet, so for each fold the
-targets of the fit and of the judgement are those of physics fitted without it: the whole procedure is left out.
-Stone, J. R. Stat. Soc. B 36 (1974) 111.
+A physics model fitted to the training drives has smaller errors on them than on the next drive. A correction must not
+be judged on these errors. For each fold, the targets of fit and judgement are therefore those of physics fitted without
+it: the whole procedure is cross-validated. Stone, J. R. Stat. Soc. B 36 (1974) 111.
 """
 
 from __future__ import annotations
@@ -22,8 +21,8 @@ from aesi.sparse.terms.scaling import Scaling
 
 @dataclass(frozen=True, eq=False)
 class UnseenErrors:
-    """targets : (n_folds, n) scaled e[k + 1] by the physics of each fold, or (0, n) where one physics serves all.
-    error, target : (n,) scaled e[k] and e[k + 1] of each row by the physics that has not seen its fold."""
+    """targets : (n_folds, n) scaled e[k + 1] by the physics of each fold, or (0, n) with one physics for all folds.
+    error, target : (n,) scaled e[k] and e[k + 1] of each row by physics that was fitted without its fold."""
 
     targets: Array
     error: Array
@@ -33,10 +32,10 @@ class UnseenErrors:
 def refits_physics_per_fold(drives: bool, feedback: bool, parts: int, folds: int) -> bool:
     """Whether each fold is judged by the error of physics that was fitted without it.
 
-    drives : whether folds are whole records or parts of them; there is no such physics of pieces of rows.
-    feedback : whether terms may hold the error itself: then all is judged by the physics that is served.
-    parts : of how many folds there is such physics; none where one physics serves all.
-    Raises DataError where there are others than one for each of the folds.
+    drives : whether folds are whole records or parts of them; for pieces of rows there is no such physics.
+    feedback : whether terms may hold the error; all folds are then judged with the final physics.
+    parts : number of folds with physics of their own; 0 with one physics for all.  folds : number of folds.
+    Raises DataError where `parts` is neither 0 nor `folds`.
     """
     if not drives or feedback or not parts:
         return False

@@ -1,12 +1,12 @@
-"""Further inputs of the sparse model, derived from those a record has.
+"""Further inputs of the sparse model, derived from those that a record has.
 
-The paper's inputs at sample k are I, c_sp, c_sn, c_e0 and c_eL. Offered besides, by name:
+The paper's inputs at sample k are I, c_sp, c_sn, c_e0 and c_eL. In addition there are, by name:
 
     soc       the state of charge of the record
-    I_next    I[k + 1], the current that flows while the predicted error arises; a simulation knows it, and
-              at 1 Hz it differs a lot from I[k]
+    I_next    I[k + 1], the current at the predicted sample; a simulation knows it, and at 1 Hz it differs a lot
+              from I[k]
     I_60s     the current through a first-order low-pass of 60 s (any number of seconds), x' = (I - x) / tau,
-              starting at rest from the first current of the record: a memory that is not fed back
+              steady at the first current of the record: a memory without feedback
 """
 
 from __future__ import annotations

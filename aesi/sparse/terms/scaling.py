@@ -2,12 +2,12 @@
 
     x' = 2 (x - low) / (high - low) - 1
 
-The range of the error is taken on both sides alike, -max |e| to max |e|, so that a scaled error of zero is none: a
-ridge then shrinks a model towards the physics, and not towards the middle of the errors that were seen.
+The range of the error is symmetric, -max |e| to max |e|, so that a scaled error of zero is no error: a ridge then
+shrinks a model towards the physics, and not towards the middle of the training errors.
 
-Outside the trained range Chebyshev polynomials grow like a power and tan has poles, so a term there says
-nothing that was learned. Scaled values are therefore held at -1 or 1, and the samples are flagged. With
-`outside="extrapolate"` they are left as they are.
+Outside the trained range Chebyshev polynomials grow like a power and tan has poles, so that terms are meaningless
+there. Scaled values are therefore held at -1 or 1, and the samples are flagged. With `outside="extrapolate"` they are
+left as they are.
 """
 
 from __future__ import annotations

@@ -310,3 +310,7 @@ def test_the_band_of_a_whole_drive_allows_for_as_few_stretches_as_it_is_told_of(
     # Two cannot be told apart: their pieces stand for them. Short horizons forget within a stretch.
     assert two.horizons[-1].widening == pieces.horizons[-1].widening
     assert four.horizons[0].widening == pieces.horizons[0].widening
+
+
+def test_bands_of_97_5_percent_are_not_called_those_of_98():
+    assert repr(FreeRunBands(0.025, ())) == "FreeRunBands(97.5 %, 0 horizons)"

@@ -45,12 +45,15 @@ def test_a_drop_that_only_a_cold_cell_has_is_no_other_cells_in_the_cold(m50, rec
 
 
 def test_the_record_of_a_cell_with_its_leads_was_refused_by_its_own_file(m50, record):
-    leads = replace(m50, contact_resistance_ohm=0.09)
+    leads = replace(m50, contact_resistance_ohm=0.07)
     run = aesi.simulate(leads, record.time_s, record.current_a, soc0=0.95)
     through = replace(record, voltage_v=run.voltage_v)
     check_belongs(leads, [through])
-    with pytest.raises(DataError, match="Ah leave the cell"):
+    with pytest.raises(DataError, match=r"Ah leave the cell.*Or its voltage holds the drop of leads"):
         check_belongs(m50, [through])
+    with pytest.raises(DataError) as caught:
+        check_belongs(m50, [replace(record, current_a=1000 * record.current_a)])
+    assert "leads" not in str(caught.value)
 
 
 def test_a_voltage_a_row_behind_its_current_was_that_of_another_cell(m50):

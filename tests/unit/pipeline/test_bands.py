@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from aesi.conformal import WHOLE_DRIVE
-from aesi.pipeline.experiment.intervals.bands import WHOLE, OutOfSampleErrors
+from aesi.errors import FitError
+from aesi.pipeline.experiment.intervals.bands import WHOLE, OutOfSampleErrors, bands_of_horizons
 from aesi.records import ErrorSeries, FreeRun
 from aesi.sparse.yardsticks import Bare
 
@@ -139,3 +140,18 @@ def test_rows_hotter_than_those_of_the_fit_calibrate_no_band(drive, model) -> No
     assert not predicted.inside[0].any()
     unmeasured = replace(hot, temperature_degc=None)
     assert OutOfSampleErrors.of([(model, unmeasured, every)], (warm, unmeasured), (10.0,)).inside[0].all()
+
+
+def test_a_horizon_that_records_are_too_short_for_takes_no_band_from_the_others(drive) -> None:
+    rng = np.random.default_rng(0)
+    drives = [replace(drive, name=f"{i}", error_v=rng.normal(0.0, 1e-3, N)) for i in range(4)]
+    pairs = [(Held(), each, WHOLE) for each in drives]
+    alone, nothing = bands_of_horizons(OutOfSampleErrors.of(pairs, drives, (1.0,)), 0.1)
+    beside, told = bands_of_horizons(OutOfSampleErrors.of(pairs, drives, (1.0, 390.0)), 0.1)
+    assert [band.horizon_s for band in beside.horizons] == [1.0, WHOLE_DRIVE]
+    assert np.array_equal(beside.at(1.0, np.zeros(5)), alone.at(1.0, np.zeros(5)))
+    assert (len(told), nothing) == (1, ())
+    assert "0 pieces of 30 or more predictions 390 s ahead" in told[0]
+    assert "or a shorter horizon" in told[0]
+    with pytest.raises(FitError, match=r"over a whole drive cannot calibrate a band: .* give longer records"):
+        bands_of_horizons(OutOfSampleErrors.of([(Held(), drives[0], slice(1, 50))], drives, ()), 0.1)

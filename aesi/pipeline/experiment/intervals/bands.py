@@ -6,11 +6,11 @@ Nothing here looks at `Split.test`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aesi.conformal import WHOLE_DRIVE, FreeRunBands
+from aesi.conformal import WHOLE_DRIVE, FreeRunBands, TooFewPieces
 from aesi.conformal.parameter_spread import covariance_root, spread
 from aesi.numerics.typing import Array, BoolArray
 from aesi.numerics.visited import Visited
@@ -96,6 +96,26 @@ class OutOfSampleErrors:
             stretches=stretches,
             records=self.records,
         )
+
+
+def bands_of_horizons(
+    errors: OutOfSampleErrors, alpha: float, stretches: int | None = None
+) -> tuple[FreeRunBands, tuple[str, ...]]:
+    """The bands of those horizons that can be calibrated, and why each of the others cannot: the records may be too
+    short for one of them alone.  alpha, stretches : as in `OutOfSampleErrors.bands`.
+
+    Raises FitError where the band of the whole drive cannot, or for errors that are zero.
+    """
+    told: list[str] = []
+    while True:
+        try:
+            return errors.bands(alpha, stretches), tuple(told)
+        except TooFewPieces as error:
+            if error.horizon_s == WHOLE_DRIVE:
+                raise
+            told.append(str(error))
+            others = {h: each for h, each in errors.by_horizon.items() if h != error.horizon_s}
+            errors = replace(errors, by_horizon=others)
 
 
 def error_ahead(model: ErrorModel, series: ErrorSeries, horizon_s: float) -> Array:

@@ -16,7 +16,7 @@ from aesi.errors import FitError
 from aesi.pipeline.experiment.candidate import method
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.fit import Fitted
-from aesi.pipeline.experiment.intervals.bands import WHOLE, OutOfSampleErrors, Unseen
+from aesi.pipeline.experiment.intervals.bands import WHOLE, OutOfSampleErrors, Unseen, bands_of_horizons
 from aesi.pipeline.product.one_step import rows_ahead
 from aesi.records import ErrorModel, LeftOutDrives
 from aesi.records.horizons import in_whole_steps
@@ -93,7 +93,8 @@ def _calibrated(
         except FitError as error:
             notes.append(f"{one.model.name} has no intervals by {name} to compare with: {error}")
     try:
-        bands = _bands([*pairs, *drives], len(pairs), problem, config)
+        bands, too_long = _bands([*pairs, *drives], len(pairs), problem, config)
+        notes += [f"{one.model.name} has no band in free run at one horizon: {reason}" for reason in too_long]
         if any(band.extrapolated for band in bands.horizons):
             notes.append(
                 f"The bands of {one.model.name} in free run are calibrated on too few pieces inside the trained "
@@ -106,13 +107,14 @@ def _calibrated(
 
 def _bands(
     unseen: Sequence[Unseen], stretches: int, problem: Problem, config: ExperimentConfig
-) -> FreeRunBands:
-    """stretches : how many stretches err independently; whole drives are the same rows as their parts."""
+) -> tuple[FreeRunBands, tuple[str, ...]]:
+    """The bands, and why a horizon has none.  stretches : how many stretches err independently; whole drives are the
+    same rows as their parts."""
     train, horizons_s = problem.split.train, config.conformal.horizons_s
     errors = OutOfSampleErrors.of(
         unseen, train, in_whole_steps(train[0].dt_s) if horizons_s is None else horizons_s
     )
-    return errors.bands(config.conformal.alpha, stretches)
+    return bands_of_horizons(errors, config.conformal.alpha, stretches)
 
 
 @overload

@@ -1,1 +1,1 @@
-"""What the models of an experiment are worth: on each record, and on drives that chose nothing."""
+"""The scores of an experiment's models: on each record, and on drives that were left out of every choice."""

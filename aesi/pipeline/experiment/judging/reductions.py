@@ -1,4 +1,4 @@
-"""What a candidate takes off the squared error of each physics model that tables name, in free run.
+"""The reduction of the squared error by a candidate, for each physics model in the tables, in free run.
 
     r_p = 100 - (100 - r) E / E_p                                                                         (1)
 

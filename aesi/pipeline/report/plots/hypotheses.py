@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 MOST_HYPOTHESES = 30
 """Most rows: beyond, they are too narrow to read."""
 LEAST_NATS = 0.1
-"""Least distance behind the best hypothesis that is drawn, in nats, since a logarithmic axis has no nought."""
+"""Least distance behind the best hypothesis that is drawn, in nats, since a logarithmic axis has no zero."""
 
 
 def ranking_figure(candidates: Sequence[Row], titles: Mapping[str, str], chosen: Sequence[str]) -> Figure:
-    """How far each hypothesis, and the declared model, is behind the best; a star marks what was added."""
+    """Distance of each hypothesis, and of the declared model, behind the best; a star marks the added effects."""
     rows = sorted(candidates, key=lambda row: -row["score"])[:MOST_HYPOTHESES]
     best = max(rows[0]["score"], 0.0)
     caption = (

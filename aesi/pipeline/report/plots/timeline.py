@@ -1,4 +1,4 @@
-"""What figures over time share: records end to end on one axis, lines, bands and marks."""
+"""Common parts of figures over time: records end to end on one axis, lines, bands and marks."""
 
 from __future__ import annotations
 
@@ -141,7 +141,7 @@ def mark_outside(fig: Figure, placed: Sequence[Placed], model: str) -> None:
 
 
 def time_title(placed: Sequence[Placed], unit: str) -> str:
-    """Title of the time axis, which starts at nought; where a part of a record is shown, with the time at which it
+    """Title of the time axis, which starts at zero; where a part of a record is shown, with the time at which it
     starts there."""
     if len(placed) > 1:
         return f"time, records end to end, {unit}"

@@ -1,4 +1,4 @@
-"""What the sparse correction consists of: terms, their coefficients, and the search that found them."""
+"""The section on the sparse correction: terms, their coefficients, and the search that found them."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What a report says in sentences: of a run, of a discovery, of sizes, of what a refit moved."""
+"""The sentences of a report: on a run, on a discovery, on sizes, on parameters that a refit moved."""

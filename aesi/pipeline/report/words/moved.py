@@ -1,4 +1,4 @@
-"""What a refit moved of the parameters that a cell's file declares, in words, from the content of discovery.json."""
+"""Sentences on the declared parameters that a refit moved, from the content of discovery.json."""
 
 from __future__ import annotations
 

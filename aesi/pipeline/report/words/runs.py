@@ -221,7 +221,7 @@ def persistence_finding(model: Row) -> str:
 
 
 def outside_finding(model: Row) -> str:
-    """How much of the test data the model was not trained for, and what is left of it there, in words."""
+    """A sentence on the share of test data outside the training range, and on the share of the correction there."""
     share = _figure(model, "free_run", "outside_pct")
     records = model.get("test_records") or {}
     fading = {name: one for name, one in records.items() if one.get("kept_pct") is not None}

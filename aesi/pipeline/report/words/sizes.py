@@ -97,7 +97,7 @@ def _is_share(parameter: Parameter | None) -> bool:
 
 
 def _with_ends(value: Mapping[str, Any], times: float, plus: float, unit: str) -> dict[str, Any]:
-    """A value and its interval in another unit, from another nought."""
+    """A value and its interval in another unit with another zero."""
     return {**{end: plus + times * value[end] for end in ("value", "low", "high")}, "unit": unit}
 
 

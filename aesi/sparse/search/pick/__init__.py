@@ -1,1 +1,1 @@
-"""What is picked of all candidates: the mean of the fittest, and nested cross-validation of the pick."""
+"""The choice among the candidates: the mean of the fittest, and nested cross-validation of that choice."""

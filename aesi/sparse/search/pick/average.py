@@ -1,8 +1,8 @@
 """The fittest candidates of a search, averaged: one model with the mean of their coefficients over the union of terms.
 
-The losses of the fittest candidates differ by less than chance moves them, and what each adds of its own is mostly its
-own error. A map without feedback is linear in its coefficients, so that its free run is the mean of theirs; where terms
-hold the error it is the mean of the maps over one step.
+The losses of the fittest candidates differ by less than chance, and their differences are mostly errors. A map without
+feedback is linear in its coefficients, so that its free run is the mean of their free runs; where terms hold the error
+it is the mean of the maps over one step.
 Hoeting, Madigan, Raftery & Volinsky, Stat. Sci. 14 (1999) 382, with equal weights.
 """
 
@@ -20,9 +20,9 @@ from aesi.sparse.terms.library import Library, Term
 
 
 def averaged(candidates: Sequence[Candidate]) -> Candidate:
-    """One candidate with the mean of theirs as its ensembles, and them as its `members`.
+    """One candidate whose ensembles are the means over `candidates`, which become its `members`.
 
-    candidates : of one problem, the fittest first; what else is told of the result (genome, losses) is of that one.
+    candidates : of one problem, the fittest first; genome and losses of the result are those of the fittest.
     """
     if len(candidates) == 1:
         return candidates[0]
@@ -41,7 +41,7 @@ def averaged(candidates: Sequence[Candidate]) -> Candidate:
 
 
 def mean_model(models: Sequence[SparseModel]) -> SparseModel:
-    """The mean of models of one problem, none of which fades; a term that one of them lacks counts as nought there."""
+    """The mean of models of one problem, none of which fades; a term that a model lacks has coefficient 0 there."""
     terms = tuple(dict.fromkeys(term for model in models for term in model.library.terms))
     mean = replace(
         models[0],

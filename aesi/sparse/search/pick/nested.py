@@ -1,8 +1,8 @@
 """Nested cross-validation of a search: the whole selection repeated without each drive in turn.
 
 For each left-out drive the candidate and its amplitude are chosen by the other drives, with coefficients from fits
-without it; the error on that drive then estimates the error on a drive that nobody has seen. The validation loss that a
-search reports of its own pick is optimistic, since the pick is the best of many (selection bias).
+without it. The error on that drive then estimates the error on an unseen drive. The validation loss that a search
+reports of its own pick is optimistic, since the pick is the best of many (selection bias).
 Varma & Simon, BMC Bioinformatics 7 (2006) 91, doi:10.1186/1471-2105-7-91.
 """
 
@@ -30,10 +30,9 @@ class NestedPick:
 def picked(
     problem: Problem, candidates: Sequence[Candidate], ensemble: int, folds: BoolArray
 ) -> NestedPick | None:
-    """The choice of the given folds, (n_folds,), alone.  ensemble : 0 for AESI I, 1 for AESI II, as in
-    `Candidate.fold_sums`.
+    """The choice by some folds alone; None where no fold or no candidate is left.
 
-    None where no fold, or no candidate, is left to choose by.
+    folds : (n_folds,) True for the folds to use.  ensemble : 0 for AESI I, 1 for AESI II, as in `Candidate.fold_sums`.
     """
     known = [c for c in candidates if np.isfinite(c.fold_sums[ensemble]).all()]
     if not folds.any() or not known:
@@ -48,9 +47,10 @@ def picked(
 
 
 def nested_shares(problem: Problem, candidates: Sequence[Candidate], ensemble: int) -> Array:
-    """(n_folds,) the share of each fold's squared error that is left by what the other folds chose.
+    """(n_folds,) squared error on each fold with the choice of the other folds, over that of the bare physics; 1 where
+    there is no choice.
 
-    ensemble : as for `picked`.  1 where there is nothing to choose by.
+    ensemble : as for `picked`.
     """
     shares = np.ones(len(problem.folds))
     for d in range(len(problem.folds)):
