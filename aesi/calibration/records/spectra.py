@@ -153,9 +153,7 @@ class FittedSpectra:
     def _misfit(self, cell: Cell, spectrum: Spectrum) -> Array:
         seen = in_band(spectrum)
         measured = spectrum.z_ohm[seen]
-        soc = min(
-            max(state_of(cell, spectrum), 0.0), 1.0
-        )  # near empty, a change of the capacity may leave it
+        soc = min(max(state_of(cell, spectrum), 0.0), 1.0)  # a change of the capacity may move it out
         z = impedance(cell, spectrum.frequency_hz[seen], soc, degc_of(spectrum), model=self.model)
         off = (z - measured) / np.abs(measured)
         return np.concatenate([off.real, off.imag]) / (SPECTRUM_SHARE * _by_decade(spectrum) ** 0.5)

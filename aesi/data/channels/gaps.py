@@ -84,9 +84,7 @@ def find_gaps(columns: Columns) -> list[int]:
     step = np.diff(columns["time_s"])
     padded = np.pad(step, NEIGHBOURS, constant_values=np.nan)
     around = sliding_window_view(padded, 2 * NEIGHBOURS + 1)
-    beside = np.fmax(
-        around[:, NEIGHBOURS - 1], around[:, NEIGHBOURS + 1]
-    )  # NaN where there is only one interval
+    beside = np.fmax(around[:, NEIGHBOURS - 1], around[:, NEIGHBOURS + 1])  # NaN of a single interval
     long = np.flatnonzero((step > GAP_FLOOR_S) & (step > GAP_RATIO * beside))
     usual = [_longest_usual(np.delete(around[k], NEIGHBOURS)) for k in long]
     return long[step[long] > GAP_RATIO * np.asarray(usual)].tolist()
