@@ -135,6 +135,15 @@ def test_an_inadmissible_value_is_named(changes, words):
             {"discover": {"fit": ["a.csv"], "fit_until_s": {"a": 60}}},
             "fit_until_s cuts a, which is not in fit",
         ),
+        (
+            {"data": FILES | {"from_s": {"c.csv": 60}}},
+            "data.from_s cuts c.csv, which is no record here; there are: a",
+        ),
+        ({"data": {"kind": "virtual", "to_s": {"a.csv": 60}}}, "`to_s` is about files"),
+        (
+            {"data": FILES | {"from_s": {"a.csv": 60}, "to_s": {"a.csv": 60}}},
+            "a.csv: from_s, 60 s, has to be before",
+        ),
         ({"data": {"kind": "virtual"}, "discover": {"test": ["a"]}}, "leave out fit, test and good"),
         ({"fallback": {"data": {"kind": "virtual"}, "cell": {}}}, "fallback: it stands in for a data set"),
     ],
@@ -250,7 +259,7 @@ def test_who_computes_and_where_it_is_tracked_is_no_part_of_the_identity():
 def test_a_stated_temperature_needed_quotes():
     data = {**CONTENT["data"], "columns": {"temperature_degc": 40}}
     config = parse_experiment({**CONTENT, "data": data})
-    assert config.data.reading.columns == {"temperature_degc": "40"}
+    assert config.data.reading("a.csv").columns == {"temperature_degc": "40"}
 
 
 def test_a_config_survives_json():
