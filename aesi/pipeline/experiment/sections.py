@@ -6,7 +6,8 @@ made of these and of the fields.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any, Literal
 
 from pydantic import (
     AfterValidator,
@@ -14,6 +15,7 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    ValidatorFunctionWrapHandler,
     field_validator,
     model_validator,
 )
@@ -35,6 +37,28 @@ class Section(BaseModel):
     """Base of all sections: frozen, and unknown keys are refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @field_validator("*", mode="wrap")
+    @classmethod
+    def _true_is_no_number(cls, value: Any, validated: ValidatorFunctionWrapHandler) -> Any:
+        """Refuse true and false, which are 1 and 0 to Python, where numbers are asked for."""
+        taken = validated(value)
+        if (said := _taken_for_a_number(value, taken)) is not None:
+            raise ValueError(f"{str(said).lower()} is no number; give one")
+        return taken
+
+
+def _taken_for_a_number(given: object, taken: object) -> bool | None:
+    """The first truth value of what was given that was taken for something else; None without one."""
+    if isinstance(given, bool):
+        return None if isinstance(taken, bool) else given
+    pairs: Iterable[tuple[object, object]] = ()
+    if isinstance(given, Mapping) and isinstance(taken, Mapping):
+        pairs = ((value, taken.get(key)) for key, value in given.items())
+    elif isinstance(given, list | tuple) and isinstance(taken, tuple):
+        pairs = zip(given, taken, strict=True)
+    found = (_taken_for_a_number(*pair) for pair in pairs)
+    return next((said for said in found if said is not None), None)
 
 
 class RepeatsConfig(Section):

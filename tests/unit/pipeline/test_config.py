@@ -152,6 +152,23 @@ def test_what_an_experiment_says_and_nothing_reads_was_passed_over_in_silence(ch
     assert words in sentence(changes)
 
 
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"search": {"candidates": True}}, "search.candidates: true is no number; give one."),
+        ({"search": {"weights": [0.5, False, 0]}}, "search.weights: false is no number; give one."),
+        (
+            {"cell": {"effects": {"contact": {"resistance_ohm": True}}}},
+            "cell.effects: true is no number; give one.",
+        ),
+        ({"seed": False}, "seed: false is no number; give one."),
+    ],
+)
+def test_true_and_false_were_taken_for_1_and_0(changes, said):
+    assert sentence(changes).endswith(said)
+    assert parse_experiment({**CONTENT, "search": {"warm_start": False}}).search.warm_start is False
+
+
 @pytest.mark.parametrize("name", ["../escape", "a/b", "", ".hidden", "a" * 200, "x\n"])
 def test_a_name_cannot_leave_the_folder_of_runs(name):
     with pytest.raises(ConfigError):
