@@ -140,7 +140,7 @@ def _scored(case: BlindCase, content: Mapping[str, Any]) -> dict[str, Any]:
 
 def _parameters(case: BlindCase, content: Mapping[str, Any]) -> tuple[list[float], list[bool]]:
     """(relative errors of the parameters whose truth is known under the same name, True where the 90 % interval
-    contains the truth)."""
+    contains the truth; False without an interval)."""
     errors, covered = [], []
     for candidate in content["candidates"]:
         if candidate["effect"] not in content["effects"]:
@@ -149,8 +149,8 @@ def _parameters(case: BlindCase, content: Mapping[str, Any]) -> tuple[list[float
             truth = case.truth.get(f"{candidate['effect']}.{name}")
             if truth and estimate.get("value") is not None:
                 errors.append(abs(estimate["value"] - truth) / abs(truth))
-                if estimate.get("low") is not None and estimate.get("high") is not None:
-                    covered.append(bool(estimate["low"] <= truth <= estimate["high"]))
+                interval = estimate.get("low"), estimate.get("high")
+                covered.append(None not in interval and bool(interval[0] <= truth <= interval[1]))
     return errors, covered
 
 
@@ -164,7 +164,7 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     fitted = [{**r, "called_found": r["verdict"] == "found"} for r in effect if r["fitted"]]
     named = [r for r in effect if r["grouped"]]
     seen = [r for r in effect if r["seen_nats"] is not None and r["seen_nats"] > SEEN_NATS]
-    answered = [r for r in rows if r["verdict"] not in NO_ANSWER]
+    answered = _answered(rows)
     unknown = [r for r in answered if r["verdict"] == "unknown" and r["label"] not in ("none", "unknown")]
     claimed = [r for r in answered if r["verdict"] in ("found", "none")]
     covered = [{"covered": one} for r in named for one in r["parameters_covered"]]
@@ -184,10 +184,10 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
         **rate(seen, "grouped").named("seen_grouped"),
         **rate(several, "all_named").named("pair_both_named"),
         **rate(nothing, "right").named("none_lenient"),
-        **rate(nothing, "false_name").named("none_false_name"),
+        **rate(_answered(nothing), "false_name").named("none_false_name"),
         **rate(stranger, "right").named("stranger_unknown"),
-        **rate(stranger, "false_name").named("stranger_false_name"),
-        **rate(effect, "false_name").named("effect_false_name"),
+        **rate(_answered(stranger), "false_name").named("stranger_false_name"),
+        **rate(_answered(effect), "false_name").named("effect_false_name"),
         **rate(unknown, "false_name").named("false_name_beside_unknown"),
         **rate(fitted, "called_found").named("fitted_called_found"),
         **rate([r for r in claimed if r["exact"]], "contradicted").named("exact_contradicted"),
@@ -202,6 +202,11 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "processor_s_most": max((r["processor_s"] for r in rows), default=None),
         "confusion": _confusion(rows),
     }
+
+
+def _answered(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Those that can hold a name; of the others it is not known whether it had been a false one."""
+    return [r for r in rows if r["verdict"] not in NO_ANSWER]
 
 
 def _confusion(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, int]]:

@@ -16,8 +16,8 @@ MEANT = {"--model": "a saved model is given with --cell"}
 
 
 class Command(TyperCommand):
-    """A command that raises InputError, naming the option, for a value that is none and for an option that is there
-    twice and cannot be: of two the last would count, and nobody be told."""
+    """A command that raises InputError, naming the option or its environment variable, for a value that is none and for
+    an option that is there twice and cannot be: of two the last would count, and nobody be told."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """The arguments that are left."""
@@ -33,7 +33,11 @@ class Command(TyperCommand):
             faults = getattr(error.__cause__, "errors", list)()
             if not faults or error.param is None:
                 raise
-            raise InputError(_sentence(error.param.opts[0], faults[0])) from None
+            option, name = error.param.opts[0], str(error.param.name)
+            source = ctx.get_parameter_source(name)
+            if source is not None and source.name == "ENVIRONMENT":
+                option = f"the environment variable {error.param.envvar} ="
+            raise InputError(_sentence(option, faults[0])) from None
 
 
 class App(typer.Typer):

@@ -68,7 +68,7 @@ class PlainStages:
                 result = work()
         except Overdue:
             raise StageOverdue(
-                f"the stage {name!r} took longer than {duration(self._timeout_s or 0)} (runner.stage_timeout_s); "
+                f"the stage {name!r} took longer than {self._timeout_s:g} s (runner.stage_timeout_s); "
                 "what is finished is kept: allow more, and go on with --resume."
             ) from None
         self._say(f"{name}: done in {duration(time.monotonic() - started)}")

@@ -42,30 +42,42 @@ LEAST_ROWS = 300
 def run(
     cells: str = "experiments/cells", cuts: PositiveInt = 40, seed: NonNegativeInt = 0
 ) -> Iterator[dict[str, Any]]:
-    """A dict a record, and one with `summary`: true for the files fitted to the records (`fitted`) and for the others.
+    """A dict a record, and one with `summary`: true for the files fitted to the records (`fitted`) and for the others,
+    which counts the records that could not be read or cut (`failed`).
 
     cells : folder of the cell files.  cuts : rows at which each record is cut.
     """
     for fitted, records in ((True, FITTED), (False, PUBLISHED)):
         found: list[dict[str, Any]] = []
+        failed = 0
         for data, file, name in records:
             try:
                 record = read_measurement(locate(data, name))
                 rows = readings(cell_of(Path(cells), data, file), record, cuts, np.random.default_rng(seed))
             except AesiError as error:
+                failed += 1
                 yield {"cell": data, "record": name, "error": str(error)}
                 continue
             found += rows
             yield {"cell": data, "record": name, **figures(rows)}
-        yield {"summary": True, "fitted": fitted, **figures(found)}
+        yield {"summary": True, "fitted": fitted, "failed": failed, **figures(found)}
 
 
 def readings(cell: Cell, record: Measurement, cuts: int, rng: np.random.Generator) -> list[dict[str, Any]]:
-    """One dict a cut: on what its reading rests, how far it is off the reference, and what it contradicts."""
+    """One dict a cut: on what its reading rests, how far it is off the reference, and what it contradicts.
+
+    Raises DataError where the record has fewer rows than cuts to begin at.
+    """
+    places = len(record) - LEAST_ROWS
+    if places < cuts:
+        raise DataError(
+            f"{record.name}: its {len(record):,} rows leave {max(places, 0):,} places for {cuts:,} cuts, with "
+            f"{LEAST_ROWS} rows after each; ask for fewer (cuts)."
+        )
     truth = initial_state(cell, record).soc - record.discharged_ah("backward") / cell.capacity_ah
     return [
         _read(cell, record.take(slice(int(row), None)), float(truth[row]))
-        for row in np.sort(rng.choice(len(record) - LEAST_ROWS, cuts, replace=False))
+        for row in np.sort(rng.choice(places, cuts, replace=False))
     ]
 
 

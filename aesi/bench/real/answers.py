@@ -49,7 +49,7 @@ def _size(truth: Mapping[str, float], content: Mapping[str, Any]) -> dict[str, A
                 continue
             true, value = truth[key], float(estimate["value"])
             neutral = CATALOGUE[candidate["effect"]].parameters[name].neutral or 0.0
-            known = estimate["low"] is not None and estimate["high"] is not None
+            interval = estimate["low"], estimate["high"]
             return {
                 "parameter": key,
                 "size_true": true,
@@ -58,7 +58,7 @@ def _size(truth: Mapping[str, float], content: Mapping[str, Any]) -> dict[str, A
                 "size_high": estimate["high"],
                 "size_neutral": neutral,
                 "size_error": abs(value - true) / abs(true - neutral),
-                "size_covered": bool(estimate["low"] <= true <= estimate["high"]) if known else None,
+                "size_covered": None not in interval and bool(interval[0] <= true <= interval[1]),
             }
     return {}
 

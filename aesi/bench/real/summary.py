@@ -115,13 +115,16 @@ def _initial_state(rows: Sequence[CaseRow]) -> CaseRow:
 
 
 def _controls(controls: Sequence[CaseRow], rows: Sequence[CaseRow]) -> CaseRow:
-    """Silence of the controls, and how often one shows a name that a case matched to it has as its answer."""
+    """Silence of the controls, and how often one shows a name that a case matched to it has as its answer, of
+    those that gave an answer."""
     expected: dict[str, set[str]] = {}
     for row in rows:
         if row.get("matched"):
             expected.setdefault(row["matched"], set()).update(row["answer"])
     matched = [
-        {"false": bool(expected[r["case"]] & set(r["effects"]))} for r in controls if r["case"] in expected
+        {"false": bool(expected[r["case"]] & set(r["effects"]))}
+        for r in controls
+        if r["case"] in expected and r["verdict"] not in NO_ANSWER
     ]
     return {
         **rate(controls, "named").named("control_silent"),

@@ -104,8 +104,21 @@ class ExperimentConfig(Section):
                 f"fallback: it stands in for a data set that cannot be had, and data are of kind: {self.data.kind}; "
                 "leave it out"
             )
-        if self.data.kind == "virtual" and self.discover is not None and self.discover.names_records:
+        if self.data.kind == "virtual" and self.discover is not None and self.discover.listed:
             raise ValueError("discover: kind: virtual brings its own records; leave out fit, test and good")
+        return self
+
+    @model_validator(mode="after")
+    def _cuts_named_records(self) -> ExperimentConfig:
+        wanted = self.discover.listed if self.discover is not None else ()
+        for where, data in (("", self.data), *([("fallback.", self.fallback.data)] if self.fallback else [])):
+            named = (*data.listed, *wanted)
+            for key, cuts in (("from_s", data.from_s), ("to_s", data.to_s)):
+                if unknown := [name for name in cuts if name not in named]:
+                    raise ValueError(
+                        f"{where}data.{key} cuts {unknown[0]}, which is no record here; there are: "
+                        f"{', '.join(dict.fromkeys(named)) or 'none'}"
+                    )
         return self
 
     @model_validator(mode="after")

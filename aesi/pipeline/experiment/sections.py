@@ -6,7 +6,8 @@ made of these and of the fields.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any, Literal
 
 from pydantic import (
     AfterValidator,
@@ -14,6 +15,7 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    ValidatorFunctionWrapHandler,
     field_validator,
     model_validator,
 )
@@ -35,6 +37,28 @@ class Section(BaseModel):
     """Base of all sections: frozen, and unknown keys are refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @field_validator("*", mode="wrap")
+    @classmethod
+    def _true_is_no_number(cls, value: Any, validated: ValidatorFunctionWrapHandler) -> Any:
+        """Refuse true and false, which are 1 and 0 to Python, where numbers are asked for."""
+        taken = validated(value)
+        if (said := _taken_for_a_number(value, taken)) is not None:
+            raise ValueError(f"{str(said).lower()} is no number; give one")
+        return taken
+
+
+def _taken_for_a_number(given: object, taken: object) -> bool | None:
+    """The first truth value of what was given that was taken for something else; None without one."""
+    if isinstance(given, bool):
+        return None if isinstance(taken, bool) else given
+    pairs: Iterable[tuple[object, object]] = ()
+    if isinstance(given, Mapping) and isinstance(taken, Mapping):
+        pairs = ((value, taken.get(key)) for key, value in given.items())
+    elif isinstance(given, list | tuple) and isinstance(taken, tuple):
+        pairs = zip(given, taken, strict=True)
+    found = (_taken_for_a_number(*pair) for pair in pairs)
+    return next((said for said in found if said is not None), None)
 
 
 class RepeatsConfig(Section):
@@ -87,7 +111,7 @@ class VirtualConfig(Section):
     seed: Annotated[int, Field(ge=0)] = 0
 
 
-READING_KEYS = ("columns", "units", "sign", "state_words", "duplicates")
+READING_KEYS = ("columns", "units", "sign", "state_words", "duplicates", "from_s", "to_s")
 """Keys of a data section that say how its files are read."""
 
 
@@ -112,6 +136,8 @@ class DataConfig(Section):
     state_words : words of the state column that are not known, and what each means.
     duplicates : which of several rows with one stamp is kept; None takes the first in a known export and refuses
     others.
+    from_s : s, rows from this time on, by record (`{drive.csv: 600}`), as `--from-s` takes them.
+    to_s : s, rows up to this time, by record, as `--to-s` takes them.
     virtual : the virtual cell, of kind `virtual`.
     """
 
@@ -129,6 +155,8 @@ class DataConfig(Section):
     sign: Literal["discharge-positive", "charge-positive"] | None = None
     state_words: dict[str, Literal["charge", "discharge", "rest"]] = {}
     duplicates: Literal["refuse", "first", "last"] | None = None
+    from_s: dict[str, float] = {}
+    to_s: dict[str, float] = {}
     virtual: VirtualConfig = VirtualConfig()
 
     @model_validator(mode="after")
@@ -141,6 +169,11 @@ class DataConfig(Section):
             if unread := [name for name in READING_KEYS if getattr(self, name)]:
                 raise ValueError(f"`{unread[0]}` is about files, and kind: virtual reads none; leave it out")
             return self
+        for name in sorted(set(self.from_s) & set(self.to_s)):
+            if not self.from_s[name] < self.to_s[name]:
+                raise ValueError(
+                    f"{name}: from_s, {self.from_s[name]:g} s, has to be before to_s, {self.to_s[name]:g} s"
+                )
         if self.virtual != VirtualConfig():
             raise ValueError(f"`virtual` is of kind: virtual, and this is kind: {self.kind}; leave it out")
         if self.kind == "files" and self.set:
@@ -160,10 +193,22 @@ class DataConfig(Section):
             raise ValueError(f"{both} is in train and in valid; what is fitted cannot validate")
         return self
 
+    def reading(self, name: str) -> Reading:
+        """How the file of a record is read."""
+        return Reading(
+            self.columns,
+            self.units,
+            self.sign,
+            self.state_words,
+            start_s=self.from_s.get(name),
+            stop_s=self.to_s.get(name),
+            duplicates=self.duplicates,
+        )
+
     @property
-    def reading(self) -> Reading:
-        """How the files are read."""
-        return Reading(self.columns, self.units, self.sign, self.state_words, duplicates=self.duplicates)
+    def listed(self) -> tuple[str, ...]:
+        """The records that it names, of whatever role."""
+        return (self.record,) if self.record else (*self.train, *self.valid, *self.test)
 
     @property
     def declared_hold(self) -> Hold | None:
@@ -418,9 +463,9 @@ class DiscoverConfig(Section):
     max_effects: Annotated[int, Field(ge=0, le=10)] = 3
 
     @property
-    def names_records(self) -> bool:
-        """Whether it names a record of any role."""
-        return bool(self.fit or self.test or self.good)
+    def listed(self) -> tuple[str, ...]:
+        """The records that it names, of whatever role."""
+        return *self.fit, *self.test, *self.good
 
     @model_validator(mode="after")
     def _cuts_what_is_there(self) -> DiscoverConfig:

@@ -14,7 +14,7 @@ from aesi.data.virtual import DEFAULT_MIX
 from aesi.errors import ConfigError, DataError, did_you_mean
 from aesi.pipeline.distinct import check_distinct
 from aesi.pipeline.experiment.config import NO_ROLES, ExperimentConfig
-from aesi.pipeline.experiment.sections import DataConfig, DiscoverConfig, FallbackConfig
+from aesi.pipeline.experiment.sections import DiscoverConfig, FallbackConfig
 from aesi.records import ROLES, Measurement, Role
 
 if TYPE_CHECKING:
@@ -29,8 +29,8 @@ KEYS = {
     "--duplicates": "data.duplicates",
     "--soc0": "cell.soc0",
     "--step": "a file of its own, by `aesi data convert --step`",
-    "--to-s": "a file of its own, by `aesi data convert --to-s`",
-    "--from-s": "a file of its own, by `aesi data convert --from-s`",
+    "--to-s": "data.to_s",
+    "--from-s": "data.from_s",
     "--soh": "cell.soh",
 }
 """Option of a command that reads files -> the key of an experiment file that says the same."""
@@ -55,8 +55,8 @@ def sources_of(config: ExperimentConfig, cell: Path) -> Sources:
     where = _locator(config)
     roles: dict[Role, tuple[str, ...]] = {role: getattr(data, role) for role in ROLES}
     records: dict[str, tuple[Measurement, float | None]] = {
-        name: (_record(path, data.reading, called), None)
-        for name, (path, called) in _placed(where, _listed(data)).items()
+        name: (_record(path, data.reading(name), called), None)
+        for name, (path, called) in _placed(where, data.listed).items()
     }
     train, valid, test = ([records[name][0] for name in roles[role]] for role in ROLES)
     check_distinct(train, test)
@@ -86,13 +86,8 @@ def _named(sections: ExperimentConfig | FallbackConfig) -> dict[str, str]:
     names = {} if cell.bpx == "catalogue" else {"cell": cell.bpx}
     names |= {f"cell: effect_files: {name}": name for name in cell.effect_files}
     if data.kind == "files":
-        names |= {f"data: {name}": name for name in _listed(data)}
+        names |= {f"data: {name}": name for name in data.listed}
     return names
-
-
-def _listed(data: DataConfig) -> tuple[str, ...]:
-    """The records that a data section names, of whatever role."""
-    return (data.record,) if data.record else tuple(name for role in ROLES for name in getattr(data, role))
 
 
 def check_had(config: ExperimentConfig) -> None:
@@ -105,7 +100,7 @@ def catalogue_files(config: ExperimentConfig) -> list[Path]:
     """The files of the catalogue that an experiment works on: records, then the cell; fetched where they are not on
     this machine.  Raises ConfigError or DataError where one cannot be had."""
     where = _locator(config)
-    records = _listed(config.data) if config.data.kind == "catalogue" else ()
+    records = config.data.listed if config.data.kind == "catalogue" else ()
     cell = [cell_path(config)] if config.cell.bpx == "catalogue" else []
     return [*(where(name) for name in records), *cell]
 
@@ -138,9 +133,15 @@ def discovery_records(
     hold = wanted.hold or config.data.declared_hold
 
     def until(names: Sequence[str], stop_s: Mapping[str, float | None]) -> tuple[Measurement, ...]:
-        reading = config.data.reading
+        read_as = {name: config.data.reading(name) for name in names}
+        ends = {
+            name: [end for end in (read_as[name].stop_s, stop_s.get(name)) if end is not None]
+            for name in names
+        }
         return tuple(
-            _record(placed[name][0], reading.but(stop_s=stop_s.get(name)), placed[name][1]).held(hold)
+            _record(
+                placed[name][0], read_as[name].but(stop_s=min(ends[name], default=None)), placed[name][1]
+            ).held(hold)
             for name in names
         )
 

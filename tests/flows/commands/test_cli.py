@@ -131,6 +131,13 @@ def test_bad_input_is_one_sentence_and_exit_code_2(call, tracked, arguments, wor
     assert err.count("\n") == 1
 
 
+def test_a_bad_environment_variable_was_blamed_on_an_option_that_nobody_gave(call, monkeypatch):
+    monkeypatch.setenv("AESI_PREFECT", "foo")
+    code, _, err = call("run", "x.yaml")
+    assert code == 2
+    assert err == "aesi: the environment variable AESI_PREFECT = foo: it has to be true or false.\n"
+
+
 @pytest.mark.parametrize("name", ["deep.yaml", "deep.json"])
 def test_a_file_nested_without_end_is_one_sentence(call, tmp_path, current, name):
     path = tmp_path / name

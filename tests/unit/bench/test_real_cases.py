@@ -147,6 +147,13 @@ def test_sizes_count_from_where_there_is_no_effect():
     )
     assert row["size_error"] == pytest.approx(0.1)
     assert row["size_covered"]
+    estimate["gain"] |= {"low": None}
+    without = scored(
+        ("current_sensor_gain",),
+        {"current_sensor_gain.gain": 1.02},
+        content("current_sensor_gain", parameters=estimate),
+    )
+    assert without["size_covered"] is False
 
 
 def test_data_that_cannot_be_had_is_not_run_and_not_passed(monkeypatch, tmp_path):
@@ -273,6 +280,8 @@ def test_a_control_that_shows_the_name_of_its_matched_case_is_counted():
     assert last["control_matched_false_pct"] == 100.0
     assert last["control_matched_false_cases"] == 1
     assert last["control_false_names"] == {"given": ["ambient_temperature"], "other": ["ocp_shape"]}
+    silent = control("given") | {"verdict": "out of time", "effects": [], "named": False}
+    assert summary([fault, silent])["control_matched_false_cases"] == 0
     assert last["withheld_within_2k_pct"] == 0.0
     sized = fault | {"named": True, "size_found": -13.0, "size_true": -14.1}
     assert summary([sized])["withheld_within_2k_pct"] == 100.0

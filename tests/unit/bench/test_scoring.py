@@ -152,3 +152,26 @@ def test_a_case_that_the_tracer_refused_ended_all(monkeypatch):
 def test_cases_that_somebody_has_seen_are_left_out():
     names = [spec.name for spec in blind.chosen(cases=5)]
     assert [spec.name for spec in blind.chosen(cases=3, after=2)] == names[2:]
+
+
+def test_a_case_without_an_answer_counted_as_one_without_a_false_name():
+    row = {"label": "none", "kind": "none", "seen_nats": None, "processor_s": 1.0, "confidence": None}
+    row |= {
+        "exact": False,
+        "grouped": False,
+        "right": False,
+        "fitted": False,
+        "effects": [],
+        "contradicted": False,
+    }
+    named = row | {"verdict": "found", "effects": ["ocp_shape"], "false_name": True}
+    summary = blind.summary([named, row | {"verdict": "error", "false_name": False}])
+    assert (summary["none_false_name_pct"], summary["none_false_name_cases"]) == (100.0, 1)
+    assert (summary["none_lenient_cases"], summary["no_answer"]) == (2, 1)
+
+
+def test_a_size_without_an_interval_was_left_out_of_how_many_intervals_hold_the_truth():
+    size = {"value": 2.0, "low": None, "high": None}
+    case = BlindCase(None, (), "gain", (), (), 0.5, CELLS, {"gain.gain": 2.0})
+    found = {"effects": ["gain"], "candidates": [{"effect": "gain", "parameters": {"gain": size}}]}
+    assert blind._parameters(case, found) == ([0.0], [False])

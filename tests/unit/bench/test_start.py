@@ -4,8 +4,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
+from aesi.bench.physics import start
 from aesi.bench.physics.start import figures, readings
+from aesi.errors import DataError
 from aesi.physics import Cell, simulate
 from aesi.records import Measurement
 
@@ -39,3 +42,13 @@ def test_a_voltage_that_is_off_shows_in_points_of_charge():
         figures(readings(CELL, later, 6, np.random.default_rng(0)))["load_rms_points"]
         > 1.0 + (right["load_rms_points"])
     )
+
+
+def test_more_cuts_than_rows_ended_the_benchmark_and_its_sum_told_no_record_that_failed(monkeypatch):
+    with pytest.raises(DataError, match="its 900 rows leave 600 places for 601 cuts"):
+        readings(CELL, discharge(), 601, np.random.default_rng(0))
+    monkeypatch.setattr(start, "locate", lambda data, name: name)
+    monkeypatch.setattr(start, "cell_of", lambda *_: CELL)
+    monkeypatch.setattr(start, "read_measurement", lambda name: discharge())
+    sums = [row for row in start.run(cuts=601) if row.get("summary")]
+    assert [(row["failed"], row["readings"]) for row in sums] == [(3, 0), (3, 0)]

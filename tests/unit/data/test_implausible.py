@@ -195,3 +195,30 @@ def test_five_minutes_of_a_drive_at_ten_rows_a_second_were_in_another_unit(tmp_p
     volts = 3.8 - 0.18 * np.cumsum(current) * 0.1 / 3600.0 - np.array(drop)
     assert len(read_measurement(written(tmp_path, time, current, volts))) == len(time)
     assert "--unit time_s=h" in refusal(tmp_path, TIME / 3600, CYCLE, voltage(CYCLE))
+
+
+def resting(kind, rows=60):
+    """A rest of a row in 10 s, whose current is what its sensor errs by."""
+    time, rng = 10.0 * np.arange(rows), np.random.default_rng(2)
+    noise = 5e-5 * rng.standard_normal(rows)
+    if kind == "relaxing at 1 uA":
+        return time, np.full(rows, 1e-6), 3.6 - 0.08 * np.exp(-time / 200.0) + noise
+    if kind == "2 mA and noise":
+        return time, 2e-3 + 5e-4 * rng.standard_normal(rows), 3.6 + noise
+    current = np.zeros(rows)
+    current[0], current[3::9] = 8e-6, 1e-6
+    noise[[0, 3]] = 1.6e-4, 1e-4
+    return time, current, 3.6 + noise
+
+
+@pytest.mark.parametrize(
+    ("kind", "rows"),
+    [
+        ("single steps of 1 uA", 19),
+        ("single steps of 1 uA", 400),
+        ("2 mA and noise", 60),
+        ("relaxing at 1 uA", 60),
+    ],
+)
+def test_a_rest_whose_current_is_noise_was_of_the_wrong_sign_or_magnitudes(tmp_path, kind, rows):
+    assert len(read_measurement(written(tmp_path, *resting(kind, rows)))) == rows

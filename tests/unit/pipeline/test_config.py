@@ -135,12 +135,38 @@ def test_an_inadmissible_value_is_named(changes, words):
             {"discover": {"fit": ["a.csv"], "fit_until_s": {"a": 60}}},
             "fit_until_s cuts a, which is not in fit",
         ),
+        (
+            {"data": FILES | {"from_s": {"c.csv": 60}}},
+            "data.from_s cuts c.csv, which is no record here; there are: a",
+        ),
+        ({"data": {"kind": "virtual", "to_s": {"a.csv": 60}}}, "`to_s` is about files"),
+        (
+            {"data": FILES | {"from_s": {"a.csv": 60}, "to_s": {"a.csv": 60}}},
+            "a.csv: from_s, 60 s, has to be before",
+        ),
         ({"data": {"kind": "virtual"}, "discover": {"test": ["a"]}}, "leave out fit, test and good"),
         ({"fallback": {"data": {"kind": "virtual"}, "cell": {}}}, "fallback: it stands in for a data set"),
     ],
 )
 def test_what_an_experiment_says_and_nothing_reads_was_passed_over_in_silence(changes, words):
     assert words in sentence(changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"search": {"candidates": True}}, "search.candidates: true is no number; give one."),
+        ({"search": {"weights": [0.5, False, 0]}}, "search.weights: false is no number; give one."),
+        (
+            {"cell": {"effects": {"contact": {"resistance_ohm": True}}}},
+            "cell.effects: true is no number; give one.",
+        ),
+        ({"seed": False}, "seed: false is no number; give one."),
+    ],
+)
+def test_true_and_false_were_taken_for_1_and_0(changes, said):
+    assert sentence(changes).endswith(said)
+    assert parse_experiment({**CONTENT, "search": {"warm_start": False}}).search.warm_start is False
 
 
 @pytest.mark.parametrize("name", ["../escape", "a/b", "", ".hidden", "a" * 200, "x\n"])
@@ -250,7 +276,7 @@ def test_who_computes_and_where_it_is_tracked_is_no_part_of_the_identity():
 def test_a_stated_temperature_needed_quotes():
     data = {**CONTENT["data"], "columns": {"temperature_degc": 40}}
     config = parse_experiment({**CONTENT, "data": data})
-    assert config.data.reading.columns == {"temperature_degc": "40"}
+    assert config.data.reading("a.csv").columns == {"temperature_degc": "40"}
 
 
 def test_a_config_survives_json():

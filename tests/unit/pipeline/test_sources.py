@@ -7,6 +7,7 @@ import pytest
 from small_experiment import BPX, PERIOD_S, SOC0, experiment, write_record
 
 from aesi.constants import SECONDS_PER_HOUR
+from aesi.data.read import read
 from aesi.data.reading import Reading
 from aesi.errors import DataError, SimulationError
 from aesi.physics import Cell, simulate
@@ -80,6 +81,20 @@ def test_a_discovery_takes_records_of_one_name_apart_and_knows_one_of_two_parts(
     fit, test, _ = discovery_records(config, config.discover, Path("unread.bpx.json"))
     assert [record.name for record in fit] == ["day0 drive", "day1 drive"]
     assert [record.name for record in test] == ["day0 drive"]
+
+
+def test_the_rows_of_a_record_were_cut_for_commands_alone(tmp_path):
+    """A run takes the rows that a command takes; what a discovery keeps from its fits comes on top."""
+    path = written(tmp_path, "time_s,current_a,voltage_v")
+    taken = read(path, Reading(start_s=20.0, stop_s=120.0))
+    data = {"kind": "files", "train": [str(path)], "from_s": {str(path): 20}, "to_s": {str(path): 120}}
+    asked = {"fit": [str(path)], "fit_until_s": {str(path): 60}, "good": [str(path)]}
+    config = parse_experiment({"name": "cut", "data": data, "discover": asked})
+    records = sources_of(config, Path("unread.bpx.json")).records
+    np.testing.assert_array_equal(records[str(path)][0].time_s, taken.time_s)
+    (fit,), _, (good,) = discovery_records(config, config.discover, Path("unread.bpx.json"))
+    assert (fit.time_s[0], fit.time_s[-1]) == (20.0, 60.0)
+    np.testing.assert_array_equal(good.current_a, taken.current_a)
 
 
 def test_records_of_one_name_in_one_folder_keep_their_suffix(tmp_path):
