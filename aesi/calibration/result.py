@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
@@ -28,6 +28,8 @@ BOUND_SHARE = 0.02
 NOTABLY = 1.05
 """Ratio of a file's error to the start file's above which it counts as larger. A fit to a record of the start file
 itself, with 1 mV of noise, ends at 1.02: it begins with films and double layers, and the priors hold it there."""
+NAMED_APART = 5
+"""Parameters that a sentence on several ends of a fit names at most."""
 FAR_SD = 3.0
 """Distance from a prior of the literature, in standard deviations, beyond which no cell is expected: a fit that ends
 there indicates a fault of the model. A convention. The double layers of the calibrated files of the repository ended
@@ -43,6 +45,34 @@ class Interval:
     high: float
     unit: str
     source: str
+
+
+def told_of_ends(costs: Sequence[float], ends: Sequence[Mapping[str, Interval]]) -> tuple[str, ...]:
+    """A sentence on how far apart the fits from several starts end; none for a single one.
+
+    costs : of each end, nats, the end that is taken first.  ends : the parameters there, with the intervals of that
+    end.
+    """
+    if len(costs) == 1:
+        return ()
+    taken, *others = ends
+    apart = [
+        name
+        for name, interval in taken.items()
+        if any(not interval.low <= other[name].value <= interval.high for other in others)
+    ]
+    lower = ", ".join(f"{cost - costs[0]:.1f}" for cost in costs[1:])
+    named = ", ".join(apart[:NAMED_APART]) + (" and others" if len(apart) > NAMED_APART else "")
+    return (
+        f"the fit was repeated from {len(others)} drawn start{'s' if len(others) > 1 else ''}: the best end is taken, "
+        f"the others are {lower} nats less likely. "
+        + (
+            f"There {len(apart)} of {len(taken)} parameters lie outside their 95 % intervals ({named}), which hold for "
+            "the end that is taken alone."
+            if apart
+            else "All parameters there lie within their 95 % intervals."
+        ),
+    )
 
 
 @dataclass(frozen=True)

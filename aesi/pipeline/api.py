@@ -125,6 +125,8 @@ def calibrate(
     spectra: Spectra = (),
     hold: Hold | None = None,
     model: ModelName | None = None,
+    starts: int = 1,
+    seed: int = 0,
 ) -> Calibration:
     """Fit the parameters that a cell's file declares to measurements; the fitted cell is `.cell` of the result.
 
@@ -139,9 +141,13 @@ def calibrate(
     spectra : impedance spectra of this very cell, fitted together with the records, as with `--fit-impedance`: files or
     `aesi.records.Spectrum`s, one or several.
     model : "espm" or "dfn"; None takes that of a saved model, or the one that the file was fitted with, else "espm".
+    starts : number of fits: one from the file, the others from cells drawn from the priors with `seed`; the best end is
+    taken, and a note says how far apart they are.
     Raises AesiError, one sentence, for arguments or data that cannot be used.
     """
     check_soc(soc0)
+    if starts < 1:
+        raise InputError(f"starts = {starts}: give the number of fits, at least 1.")
     _check_by_name("temperatures_degc", temperatures_degc)
     _check_by_name("dates", dates)
     _check_priors(priors)
@@ -162,7 +168,7 @@ def calibrate(
     )
     check_distinct_spectra(conditions.spectra, ())
     check_spectra(scaled, conditions.spectra)
-    found = fit_cell(declared, measurements, conditions)
+    found = fit_cell(declared, measurements, conditions, starts=starts, seed=seed)
     return replace(found, notes=(*effects_left(given), *found.notes))
 
 

@@ -52,7 +52,8 @@ class Request:
     file was fitted with, else "espm".
     impedance : spectra to hold the result against, beside those among the conditions, which are fitted.
     cut_offs_v : (lower, upper) V between which the records' cell is cycled; None takes those of the file.
-    posterior : steps of each walker, 0 for none; seed : of these.
+    posterior : steps of each walker, 0 for none.  starts : number of fits, see `aesi.calibration.calibrate`.
+    seed : of the posterior's samples and of the drawn starts.
     title : name of the cell that is written.
     """
 
@@ -60,6 +61,7 @@ class Request:
     impedance: tuple[Spectrum, ...] = ()
     cut_offs_v: tuple[float, float] | None = None
     posterior: int = 0
+    starts: int = 1
     seed: int = 0
     title: str | None = None
 
@@ -101,7 +103,10 @@ def calibrate_files(
     declared, model = start_cell(given.cell, asked.cut_offs_v), conditions.model or given.model
     start = scaled_to(declared, measurements, conditions.temperatures_degc)
     check_spectra(start, (*conditions.spectra, *asked.impedance))
-    found = calibrate(declared, measurements, replace(conditions, model=model), on_step=on_step)
+    conditions = replace(conditions, model=model)
+    found = calibrate(
+        declared, measurements, conditions, starts=asked.starts, seed=asked.seed, on_step=on_step
+    )
     name = declared.name if asked.title is None else asked.title
     found = replace(found, cell=replace(found.cell, name=name, description=_made_from(found)))
     posterior = sampled(found, asked.posterior, asked.seed) if asked.posterior else None

@@ -226,6 +226,7 @@ def parameter_values(soc0: float = 1.0) -> pybamm.ParameterValues:
         warnings.simplefilter("ignore")  # about open-circuit voltages that the file does not repeat
         values = pybamm.ParameterValues.create_from_bpx(BPX)
     values.update(VALUES, check_already_exists=False)
+    values["Ambient temperature [K]"] = values["Initial temperature [K]"]  # its isothermal model is at the ambient one
     parts = json.loads(BPX.read_text(encoding="utf-8"))["Parameterisation"]
     for name, full in (("negative", "Maximum stoichiometry"), ("positive", "Minimum stoichiometry")):
         part = parts[name.capitalize() + " electrode"]

@@ -147,8 +147,16 @@ def calibrate(
         int,
         typer.Option("--posterior", min=0, help="Samples of each walker to draw from the posterior (emcee)."),
     ] = 0,
+    starts: Annotated[
+        int,
+        typer.Option(
+            "--starts",
+            min=1,
+            help="Number of fits: from the start file, and from cells drawn from the priors. The best is taken.",
+        ),
+    ] = 1,
     title: Annotated[str | None, typer.Option(help="Name of the cell in the file that is written.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the posterior's samples.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of the posterior's samples and of the drawn starts.")] = 0,
     model: options.ModelOption = None,
 ) -> None:
     """Fit the physics model's own parameters to measurements of any temperatures together."""
@@ -166,7 +174,7 @@ def calibrate(
     from flows.jobs.calibration import calibrate as flow
 
     conditions = Conditions(soc0, temperatures, days, day, model, spectra=spectra, priors=priors)
-    request = Request(conditions, witnesses, limits, posterior, seed, title)
+    request = Request(conditions, witnesses, limits, posterior, starts, seed, title)
     check_request(cell, request)
     records = options.measurements(data, reading, hold, ends)
     flow(cell, records, out, request)

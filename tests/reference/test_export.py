@@ -5,6 +5,7 @@ solves for the surface where this package averages over the electrode (20 mV is 
 """
 
 import runpy
+from dataclasses import replace
 from pathlib import Path
 
 import bpx
@@ -85,6 +86,17 @@ def test_pybamm_runs_the_script_and_agrees(cell, tmp_path, effects):
     assert error_mv < (3.0 if effects == OPTIONAL else 2.0)
     if effects:
         assert error_mv < 0.5 * 1e3 * np.sqrt(np.mean((ours - plain) ** 2))
+
+
+def test_pybamm_ran_the_script_at_the_temperature_of_the_surroundings(cell, tmp_path):
+    cold = replace(cell, initial_temperature_k=273.15)
+    done = export(saved(cold, (), tmp_path), tmp_path / "cold.py", "pybamm")
+    script = runpy.run_path(str(done.files[0]))
+    solution = script["simulation"](TIME[:31], np.full(31, 2.0), soc0=0.8).solve(
+        t_eval=[0.0, 300.0], t_interp=TIME[:31]
+    )
+    ours = aesi.simulate(cold, TIME[:31], np.full(31, 2.0), soc0=0.8).voltage_v
+    np.testing.assert_allclose(np.asarray(solution["Voltage [V]"](TIME[:31])), ours, atol=2e-3)
 
 
 def test_what_a_target_cannot_hold_is_said(cell, tmp_path):

@@ -86,6 +86,43 @@ def test_finer_numerics_left_rows_shorter_than_their_longest_step_whole():
     assert np.abs(finer - half).max() < 1e-5  # a double layer is met in other steps
 
 
+def test_the_heat_of_a_held_current_hung_on_the_last_digit_of_it_over_the_area():
+    cell = Cell.from_bpx(CELLS / "panasonic_ncr18650pf.bpx.json")
+    size = 3.7  # (I/A) A is I to the last digit for most of these currents at an area, and for few at another
+    larger = replace(
+        cell,
+        electrode_area_m2=size * cell.electrode_area_m2,
+        nominal_capacity_ah=size * cell.nominal_capacity_ah,
+        contact_resistance_ohm=cell.contact_resistance_ohm / size,
+        volume_m3=size * cell.volume_m3,
+        surface_area_m2=size * cell.surface_area_m2,
+    )
+    time = np.arange(0.0, 600.0, 10.0)
+    current = np.where((time // 60) % 2, 5.8, 0.0)
+    runs = [
+        simulate(one, time, times * current, 0.9, (), 17.0, "backward", model="dfn")
+        for one, times in ((cell, 1.0), (larger, size))
+    ]
+    kelvin, scaled = (run.series["temperature_k"] for run in runs)
+    assert np.ptp(kelvin) > 0.5
+    np.testing.assert_allclose(scaled, kelvin, rtol=0, atol=1e-9)
+
+
+def test_a_double_layer_hung_on_the_rounding_of_rows_on_a_straight_line():
+    layers = CATALOGUE["double_layer"].activate(negative_f_m2=1.0, positive_f_m2=3.0)
+    time = np.arange(0.0, 40.0)
+    current = np.interp(time, [0.0, 8.0, 16.0, 24.0, 32.0, 39.0], [0.0, 45.0, -30.0, 60.0, -60.0, 10.0])
+    lags_s = 0.3 + 1e-4 * np.arange(6)
+    voltages = [
+        simulate(
+            CELL, time, current, 0.6, [layers, CATALOGUE["clock_skew"].activate(lag_s=lag)], 10.0, model="dfn"
+        )
+        for lag in lags_s.tolist()
+    ]
+    bends = np.diff([run.voltage_v for run in voltages], n=2, axis=0)
+    assert np.abs(bends).max() < 1e-4
+
+
 def test_a_saved_model_keeps_which_one_it_is(tmp_path):
     HybridModel(CELL, soc0=0.7, model="dfn").save(tmp_path / "model")
     current = tmp_path / "current.csv"

@@ -1,0 +1,43 @@
+"""Fits from several starts: the best end is taken, and a note says how far the others are from it."""
+
+import numpy as np
+import pytest
+
+from aesi.calibration import calibrate
+from aesi.calibration.result import Interval, told_of_ends
+
+
+def interval(value):
+    return Interval(value, value - 0.1, value + 0.1, "factor", "")
+
+
+def test_the_best_of_several_ends_is_taken_and_the_others_are_told(start, records):
+    once = calibrate(start, records[:1], evaluations=3)
+    several = calibrate(start, records[:1], evaluations=3, starts=3, seed=1)
+    again = calibrate(start, records[:1], evaluations=3, starts=3, seed=1)
+    cost = [float(np.sum(found.model.residual(found.x) ** 2)) for found in (once, several)]
+    assert cost[1] <= cost[0]
+    assert np.array_equal(several.x, again.x)
+    assert not [note for note in once.notes if "drawn start" in note]
+    assert len([note for note in several.notes if "repeated from 2 drawn starts" in note]) == 1
+
+
+def test_parameters_beyond_their_intervals_at_another_end_are_named():
+    here = {"rate": interval(1.0), "radius": interval(2.0)}
+    near, far = {**here, "rate": interval(1.05)}, {**here, "radius": interval(2.5)}
+    assert told_of_ends([3.0], [here]) == ()
+    (agree,) = told_of_ends([3.0, 3.5], [here, near])
+    assert "1 drawn start: the best end is taken, the others are 0.5 nats less likely" in agree
+    assert "All parameters there lie within their 95 % intervals." in agree
+    (differ,) = told_of_ends([3.0, 3.5, 9.0], [here, near, far])
+    assert "the others are 0.5, 6.0 nats less likely" in differ
+    assert "There 1 of 2 parameters lie outside their 95 % intervals (radius)" in differ
+
+
+@pytest.mark.parametrize("starts", [0, -1])
+def test_a_number_of_starts_below_one_is_refused(start, records, starts):
+    import aesi
+    from aesi.errors import InputError
+
+    with pytest.raises(InputError, match="give the number of fits, at least 1"):
+        aesi.calibrate(start, records[0], starts=starts)
