@@ -184,7 +184,7 @@ def _ends(model: Model, starts: int, seed: int, evaluations: int, on_step: OnSte
     Raises FitError where the start file itself cannot be simulated on the records.
     """
     drawn = np.random.default_rng(seed).standard_normal((starts - 1, model.layout.size))
-    ends = []
+    ends: list[_End] = []
     for start in (np.zeros(model.layout.size), *np.clip(drawn, model.low, model.high)):
         one = copy(model)  # which takes thermal data of its own
         if ends and not np.isfinite(one.residual(start)).all():
