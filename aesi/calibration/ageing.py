@@ -122,7 +122,7 @@ class Ageing:
         """Sentences on the file's state."""
         if self.day is None:
             return ()
-        return (f"the file is in the state of {self.day}.",)
+        return (f"the file describes the cell as of {self.day}.",)
 
 
 def _file_day(records: Sequence[Prepared], days: Sequence[date | None], as_of: date | None) -> date | None:

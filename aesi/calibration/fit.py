@@ -385,7 +385,7 @@ def _of_priors(model: Model, x: Array) -> tuple[str, ...]:
         if free.given and abs(z) > NOTED_DEVIATIONS:
             out.append(
                 f"{free.name} ends at {free.value(float(z)):.4g} {free.unit}, {abs(z):.1f} standard deviations "
-                f"{'above' if z > 0.0 else 'below'} what was given ({free.start:g}): the records say otherwise."
+                f"{'above' if z > 0.0 else 'below'} what was given ({free.start:g}): the records contradict it."
             )
     return tuple(out)
 
@@ -398,13 +398,15 @@ def _of_own(model: Model, x: Array) -> tuple[str, ...]:
         typical = float(np.median(np.abs(record.rows.current_a[record.flows > 0.0])))
         if record.slow and abs(zero_a) > NOTED_ZERO * typical:
             out.append(
-                f"{record.name}: its charge fits if its current reads {1e3 * abs(zero_a):.2g} mA too "
-                f"{'high' if zero_a > 0 else 'low'} ({100 * abs(zero_a) / typical:.1f} % of it); that is taken out."
+                f"{record.name}: by the fit its current reads {1e3 * abs(zero_a):.2g} mA too "
+                f"{'high' if zero_a > 0 else 'low'} ({100 * abs(zero_a) / typical:.1f} % of it); the fit corrects that."
             )
         material, silicon = model.material(i, x) - 1.0, model.silicon(i, x)
         if abs(material) > NOTED_AGE:
             out.append(
-                f"{record.name}: fits with {100 * material:+.1f} % of active material; its cell may be of another age."
+                f"{record.name}: in the fit the cell has {100 * abs(material):.1f} % "
+                f"{'more' if material > 0.0 else 'less'} active material in this record than in the file; the record "
+                "may be of another age."
             )
         if abs(silicon - 1.0) > NOTED_SILICON:
             how = "fits with" if record.slow else "has, by the slow records before and after it,"

@@ -59,8 +59,9 @@ class HeatFit:
     def sentence(self) -> str:
         """The fit as a sentence."""
         return (
-            f"heat: {self.heat_capacity_j_k:.3g} J/K and {self.conductance_w_k:.3g} W/K from the case follow the "
-            f"measured temperature of {', '.join(self.records)} within {self.rmse_k:.2f} K; they are in the file."
+            f"heat: a heat capacity of {self.heat_capacity_j_k:.3g} J/K and a conductance from case to surroundings of "
+            f"{self.conductance_w_k:.3g} W/K reproduce the measured temperature of {', '.join(self.records)} within "
+            f"{self.rmse_k:.2f} K RMS; they are in the file."
         )
 
 
@@ -76,7 +77,9 @@ def with_heat(cell: Cell, records: Sequence[Prepared]) -> tuple[Cell, tuple[str,
     )
     mute = [r.name for r in warming if r not in telling]
     notes = (
-        (f"heat: losses do not explain the temperature of {', '.join(mute)}; it tells nothing.",)
+        (
+            f"heat: the losses of the cell do not explain the temperature of {', '.join(mute)}; it is not used.",
+        )
         if mute
         else ()
     )

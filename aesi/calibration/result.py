@@ -104,8 +104,9 @@ class Open:
     @property
     def sentence(self) -> str:
         """The combination as a sentence."""
-        names = " with ".join(f"{name} ({weight:+.2f})" for name, weight in self.weights)
-        return f"the data do not determine {names}: {100 * self.narrowed:.0f} % of the prior's width is left"
+        names = ", ".join(f"{name} ({weight:+.2f})" for name, weight in self.weights)
+        together = " the combination of" if len(self.weights) > 1 else ""
+        return f"the data do not determine{together} {names}: {100 * self.narrowed:.0f} % of the prior's width is left"
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +144,7 @@ class Calibration:
         return (
             *self.against_temperature,
             *(
-                f"{start.sentence[:-1]}: the fit bends the cell's parameters to make up for the difference; leave out "
+                f"{start.sentence[:-1]}: the fit distorts the cell's parameters to compensate; leave out "
                 "--soc0, or correct it, unless the charge was counted and the start file is another cell's."
                 for start in against
             ),
@@ -155,9 +156,9 @@ class Calibration:
                 if e.after_v > NOTABLY * e.before_v
             ),
             *(
-                f"{e.name}: the file that is written errs by {MV_PER_V * e.simulated_v:.2f} mV there, the start file "
-                f"by {MV_PER_V * e.before_v:.2f} mV: what the fit has of this record alone (its capacity, its start, "
-                "its current sensor's offset) is not in the file."
+                f"{e.name}: the RMSE is {MV_PER_V * e.simulated_v:.2f} mV with the written file and "
+                f"{MV_PER_V * e.before_v:.2f} mV with the start file: the capacity, initial state and offset of the "
+                "current sensor that were fitted to this record alone are not in the file."
                 for e in self.errors
                 if e.after_v <= NOTABLY * e.before_v < e.simulated_v
             ),
@@ -200,10 +201,10 @@ def _stand_ins(model: Model, x: Array) -> tuple[str, ...]:
     ]
     if not far:
         return ()
-    subject, verb = ("it", "stands") if len(far) == 1 else ("they", "stand")
+    stands = "this value probably compensates" if len(far) == 1 else "these values probably compensate"
     return (
-        f"{', '.join(far)}: the records contradict what is known of such cells, so that {subject} rather {verb} in for "
-        "something that the model lacks; aesi discover lets missing effects compete, and --prior holds what you know.",
+        f"{', '.join(far)}: the records contradict what is known of such cells, and {stands} for something that the "
+        "model lacks; search for missing effects with aesi discover, or state what you know with --prior.",
     )
 
 

@@ -49,8 +49,8 @@ def sized(cell: Cell, measurements: Sequence[Measurement]) -> tuple[Cell, tuple[
         return cell, (size_assumed(cell, measurements),)
     factor = known / cell.capacity_ah
     return of_area(cell, factor, known), (
-        f"a full discharge took {known:.3f} Ah, and {cell.capacity_ah:.3f} Ah are declared: the fit starts from an "
-        f"electrode area scaled by {factor:.3f}; what the cell holds is its state of health.",
+        f"a full discharge took {known:.3f} Ah, and the start file declares {cell.capacity_ah:.3f} Ah: the fit starts "
+        f"from an electrode area scaled by {factor:.3f}; the fitted capacity is given with the state of health.",
     )
 
 
@@ -148,8 +148,8 @@ def of_activation(
         said.append(f"no activation energy is declared for these, {begin}: {', '.join(missing)}.")
     if replaced:
         said.append(
-            "activation energies that are declared often hold more than they are named for, and the fit starts from "
-            f"those of kinetics and films by themselves: {', '.join(replaced)}."
+            "declared activation energies often include those of other processes; the fit starts from typical ones of "
+            f"kinetics and films alone: {', '.join(replaced)}."
         )
     return tuple(said)
 
@@ -175,8 +175,8 @@ def one_branch(cell: Cell, data: Measurement) -> tuple[Measurement, tuple[str, .
     first = int(before[rows[0] - 1]) + 1 if rows[0] else 0  # the rest before it shows where it starts from
     kept = data.take(slice(min(first, max(int(rows[0]) - 1, 0)), int(rows[-1]) + 1))
     note = (
-        f"{data.name}: only {stamp(kept.time_s[0])} to {stamp(kept.time_s[-1])} s are fitted; the charge "
-        "beside it runs on the other branch of a hysteresis that this model does not have."
+        f"{data.name}: only {stamp(kept.time_s[0])} to {stamp(kept.time_s[-1])} s are fitted; the long charge in the "
+        "rest follows the other branch of the open-circuit voltage, and this model has no hysteresis."
     )
     return kept, (note,)
 

@@ -187,10 +187,10 @@ def unlike(cell: Cell, record: Measurement) -> str:
     more = bounds.low_ah > TOO_SMALL * known
     wanted = f"{bounds.low_ah:.3g} Ah or more" if more else f"{bounds.high_ah:.3g} Ah or less"
     return (
-        f"{record.name}: by the open-circuit potentials of the start file its voltages are those of a cell of "
-        f"{wanted}, where a full discharge shows {known:.3g} Ah: these potentials are of other materials, and the fit "
-        "has to bend them. Start from a file of the same materials, where there is one, and see what is left over the "
-        "state of charge."
+        f"{record.name}: with the open-circuit potentials of the start file its voltages are those of a cell of "
+        f"{wanted}, but a full discharge shows {known:.3g} Ah: the start file is of other electrode materials, and the "
+        "fit has to distort its potentials. Start from a file of the same materials, where there is one, and check the "
+        "residual over the state of charge."
     )
 
 

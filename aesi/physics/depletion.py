@@ -116,8 +116,9 @@ def ran_out(name: str, at_s: Mapping[str, float]) -> str:
     where = ", ".join(f"in {model} at {stamp(when)} s" for model, when in at_s.items())
     return (
         f"{name}: a particle's surface or the electrolyte runs empty or full {where}. From then on kinetics "
-        f"are held at the edge, open-circuit potentials go on at {BEYOND_RANGE_V:g} V per unit of stoichiometry and "
-        "concentrations beyond what there is: an error says that it ran out, not by how much the model is off."
+        f"are held at the limit, open-circuit potentials are extrapolated by {BEYOND_RANGE_V:g} V per unit of "
+        "stoichiometry and concentrations leave their physical range: the error from there on shows only that the "
+        "model ran out, not how accurate it is."
     )
 
 

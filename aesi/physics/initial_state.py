@@ -212,7 +212,7 @@ class _Start:
             # How far it is from settled is the greater doubt: the load may tell more.
             _, first_v = self._first_voltages()
             by_minutes = self._by_first_minutes(
-                first_v, f"rests at {begins_v:.3f} V, too short to tell by itself"
+                first_v, f"rests at {begins_v:.3f} V, too briefly to read the state from that alone"
             )
             if by_minutes.sd < sd:
                 return by_minutes

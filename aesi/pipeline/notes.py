@@ -74,8 +74,8 @@ def without_energies(cell: Cell, temperatures_degc: Iterable[Array | float | Non
     if not missing or farthest <= TELLING_K:
         return ()
     return (
-        f"the cell's file declares no activation energy for {', '.join(missing)}: taken as at "
-        f"{reference_k - ZERO_CELSIUS_K:.4g} degC, which is up to {farthest:.0f} K off.",
+        f"the cell's file declares no activation energy for {', '.join(missing)}: their values at "
+        f"{reference_k - ZERO_CELSIUS_K:.4g} degC are used at temperatures up to {farthest:.0f} K away.",
     )
 
 
@@ -190,8 +190,8 @@ def of_another_model(declared: HybridModel, asked: ModelName | None) -> tuple[st
         return ()
     source = "what the saved model adds to its cell was found" if found else "the cell's file was fitted"
     return (
-        f"{source} with {MODEL_WORDS[declared.model]}, and {MODEL_WORDS[asked]} is simulated, as asked: its values may "
-        "make up for what the two differ in; leave out --model to take the one that it belongs to.",
+        f"{source} with {MODEL_WORDS[declared.model]}, and {MODEL_WORDS[asked]} is simulated, as asked: its parameters "
+        "may compensate for the difference of the two; leave out --model to use the model that they belong to.",
     )
 
 

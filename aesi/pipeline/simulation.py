@@ -367,7 +367,7 @@ def _of_first(record: Measurement, prediction: Prediction, model: HybridModel, m
             f"{record.name}: its first voltage is {MV_PER_V * abs(error_v):.1f} mV {side} the model's; the prediction "
             "starts with that error."
         ]
-    words = "begins with what the correction says of it, since no voltage is measured there"
+    words = "the prediction starts with the error that the correction predicts, since no voltage is measured there"
     return [f"{record.name}: {words}; the band is that of a whole drive from its first row on."]
 
 
@@ -375,9 +375,9 @@ def _of_exact(record: Measurement, prediction: Prediction, model: HybridModel, s
     """A sentence that a band around a given start does not include an error of the start."""
     worth_v = model.start_worth_v(record, soc0, TOLD_SD, prediction.physics_v)
     return (
-        f"{record.name}: the band takes the start at {soc0:.4g} as exact; {TOLD_SD:g} of charge more or less is worth "
-        f"{MV_PER_V * rms(worth_v):.1f} mV RMS along this record, and --soc0-sd widens the band by how far the start "
-        "may be off."
+        f"{record.name}: the band takes the initial state of charge of {soc0:.4g} as exact; an error of {TOLD_SD:g} in "
+        f"it changes the voltage by {MV_PER_V * rms(worth_v):.1f} mV RMS along this record. --soc0-sd widens the band "
+        "by the uncertainty of the initial state."
     )
 
 
@@ -396,9 +396,7 @@ def _of_band(record: Measurement, prediction: Prediction, model: HybridModel, me
         )
         said = [trained_sentence(record.name, figures, one_step=measured)]
         if model.correction.fade is not None and model.correction.fade.amplitude == 0.0:
-            said.append(
-                "no drive that was left out bore the correction out, so that it adds nothing anywhere."
-            )
+            said.append("the correction improved no left-out training drive, so that it is applied nowhere.")
     banded = np.isfinite(prediction.lower_v)
     if prediction.nominal is not None and np.all(np.isfinite(record.voltage_v)):
         low, high = prediction.lower_v[banded], prediction.upper_v[banded]

@@ -38,7 +38,7 @@ def hold_sentence(
 
     option : how a user sets another hold, with {} in its place.  saved : whether the hold is that of a saved model.
     """
-    words = {"linear": "in straight lines between rows", "backward": "constant since the row before"}
+    words = {"linear": "as linear between rows", "backward": "constant since the row before"}
     if declared:
         return f"{name}: the current is taken {words[hold]}, as declared."
     writer, other = {"linear": ("", "backward"), "backward": (", as loggers write", "linear")}[hold]

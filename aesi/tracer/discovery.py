@@ -331,7 +331,7 @@ def _test_error_v(
 def _notes(evidence: Evidence, tested: Sequence[PreparedRecord], left: ResidualStructure) -> tuple[str, ...]:
     records = evidence.path.problem.records
     known = [
-        f"{r.name} is known to be good: what was found is what the others have beside it."
+        f"{r.name} is a known-good record: the verdict is on how the other records differ from it."
         for r in records
         if r.good
     ]

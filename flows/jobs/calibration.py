@@ -50,7 +50,7 @@ def calibrate(
     if left := open_line(content):
         console.say(f"  {left} (each with its weights in the report)")
     if content["at_bounds"]:
-        console.say(f"  on a bound, so not to be believed: {', '.join(content['at_bounds'])}")
+        console.say(f"  on a bound, so not determined by the data: {', '.join(content['at_bounds'])}")
     for warning in content["warnings"]:
         console.say(f"  WARNING: {warning}")
     *_, page = calibration_files(out)

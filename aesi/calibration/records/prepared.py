@@ -119,14 +119,16 @@ def hold_told(record: Prepared) -> str:
     step_s = float(np.median(np.diff(record.rows.time_s)))
     by_steps = isinstance(record.rows, Averaged) and isinstance(record.rows.window, Runs)
     averages = (
-        "averages the longer the further a step lies back" if by_steps else f"averages over {step_s:.3g} s"
+        "averages over intervals that grow with the time since the last current step"
+        if by_steps
+        else f"averages over {step_s:.3g} s"
     )
-    between = {"linear": "in straight lines between them", "backward": "constant since the row before"}
+    between = {"linear": "linear between them", "backward": "constant since the row before"}
     taken = f"{averages}, with the current {between[record.hold]}"
     against = (
         "" if declared in (None, record.hold) else f"; --hold {declared} holds for rows that are not thinned"
     )
-    return f"{record.name}: fitted to {len(record.rows):,} of {len(record.data):,} rows, {taken}{against}."
+    return f"{record.name}: {len(record.data):,} rows are thinned to {len(record.rows):,} to fit: {taken}{against}."
 
 
 def with_temperatures(

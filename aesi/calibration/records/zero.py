@@ -99,14 +99,14 @@ def zero_of(cell: Cell, records: Sequence[Measurement]) -> Zero:
         told = _of_cycle(cell, record)
         if isinstance(told, str):
             sentences.append(
-                f"{record.name}: the charge that it takes and gives does not tell the zero of its current: {told}."
+                f"{record.name}: its charge balance does not determine the offset of its current: {told}."
             )
             continue
         mean, sd = told
         means.append(mean)
         sds.append(sd)
         sentences.append(
-            f"{record.name}: nearly full at both ends; by the charge that it took and gave its current reads "
+            f"{record.name}: nearly full at both ends; by its charge balance its current reads "
             f"{1e3 * abs(mean):.1f} +/- {1e3 * sd:.1f} mA too {'high' if mean > 0.0 else 'low'}."
         )
     if not means:

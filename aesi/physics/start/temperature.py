@@ -73,9 +73,9 @@ class OtherTemperature:
             "(--column temperature_degc= leaves it out)"
         )
         return (
-            f"{name}: its voltage contradicts its temperature. At {self.degc:.4g} degC, which it is taken at, "
-            f"{model} leaves {MV_PER_V * self.left_v:.1f} mV, at {self.there_degc:.4g} degC "
-            f"{MV_PER_V * self.there_v:.1f} mV: {wrong}, or {otherwise}."
+            f"{name}: its voltage contradicts its temperature. The error of {model} is {MV_PER_V * self.left_v:.1f} mV "
+            f"at {self.degc:.4g} degC, which it is taken at, and {MV_PER_V * self.there_v:.1f} mV at "
+            f"{self.there_degc:.4g} degC: {wrong}, or {otherwise}."
         )
 
 

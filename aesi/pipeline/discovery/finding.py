@@ -28,7 +28,7 @@ class Finding:
     def __repr__(self) -> str:
         kept_back = bool(self.content["before"]["test"])
         part: Literal["fit", "test"] = "test" if kept_back else "fit"
-        where = "on data that chose nothing" if kept_back else "on the data that were fitted"
+        where = "on held-out data" if kept_back else "on the fitted data"
         named = f" {', '.join(self.effects)}" if self.effects else ""
         errors = (
             f"{self.rmse_mv('before', part):.2f} mV as declared, {self.rmse_mv('after', part):.2f} mV after"

@@ -75,8 +75,7 @@ def trained_sentence(name: str, figures: Mapping[str, Any], *, one_step: bool = 
     if kept >= ALL_PCT:
         return f"{head}."
     if kept >= NONE_PCT:
-        applied = f"{_share(kept)} of the correction are applied on average"
-        return f"{head}; {where}{applied}, the rest is left to the physics."
+        return f"{head}; {where}the correction fades towards the physics, to {_share(kept)} of its size on average."
     alone = "the physics model and its last measured error" if one_step else "the physics model"
     return f"{head}; {where}none of the correction is applied: this is {alone}."
 

@@ -81,11 +81,11 @@ def finding(content: Mapping[str, Any]) -> str:
         for row in files
         if max(row["after_rmse_mv"], row["as_simulated_rmse_mv"]) > NOTABLY * row["before_rmse_mv"]
     ]
-    against = f" On {', '.join(worse)} the start file errs by less." if worse else ""
+    against = f" On {', '.join(worse)} the start file has the lower error." if worse else ""
     return (
         f"In free run the calibrated model errs by {after} mV RMSE on {on}, where the start file erred by {before} mV. "
-        "With the file as it is written, without a record's own start, capacity and current offset, the error is "
-        f"{simulated} mV.{against}"
+        "With the written file alone, without each record's own initial state, capacity and current offset, the error "
+        f"is {simulated} mV.{against}"
     )
 
 
@@ -149,14 +149,14 @@ def courses(parameters: Sequence[Row]) -> dict[str, Figure]:
             col=1 + shown.index(what),
         )
     for column, what in enumerate(shown, start=1):
-        fig.update_xaxes(title_text="place in the window, %", row=1, col=column)
+        fig.update_xaxes(title_text="place in the stoichiometry window, %", row=1, col=column)
         fig.update_yaxes(title_text=f"{COURSES[what]}, factor", type="log", dtick=1, row=1, col=column)
     caption = (
-        "Factors over stoichiometry with 95 % intervals, on top of the factor of the whole electrode in the table. "
-        "0 % is the least stoichiometry of the electrode's window. Where an interval spans a decade, the records say "
-        "little."
+        "Factors over stoichiometry with 95 % intervals; each multiplies the factor of the whole electrode in the "
+        "table. 0 % is the lowest stoichiometry of the electrode's window. Where an interval spans a decade, the "
+        "records hardly determine the factor."
     )
-    return {"courses": style.framed(fig, "Courses over stoichiometry", caption, 340)}
+    return {"courses": style.framed(fig, "Dependence on stoichiometry", caption, 340)}
 
 
 def _knots(parameters: Sequence[Row]) -> dict[tuple[str, str], list[tuple[float, Row]]]:

@@ -41,6 +41,7 @@ def nyquist(spectra: Sequence[SpectrumError], title: str) -> Figure:
             x=MILLI * spectrum.z_ohm.real, y=-MILLI * spectrum.z_ohm.imag, mode="lines", name=f"{name}, model",
             line={"color": colour}, legendgroup=name, text=text,
         )  # fmt: skip
+    figure.update_layout(margin_t=2 * style.HEADROOM)  # the legend has two lines or three
     figure.update_xaxes(title_text="real part, mOhm", constrain="domain")
     figure.update_yaxes(title_text="negative imaginary part, mOhm", scaleanchor="x", constrain="domain")
     return figure

@@ -27,6 +27,9 @@ KIND_SYMBOLS = {"physics": "circle", "parameter": "diamond", "instrument": "squa
 DIVERGING = "PuOr_r"
 SEQUENTIAL = "Cividis"
 
+HEADROOM = 58
+"""Margin above a plot, px: a line of the legend below the buttons, which cover the uppermost 30."""
+
 
 def figure(title: str, caption: str, height: int = 380, **layout: Any) -> Figure:
     """An empty figure; title and caption travel in its `meta` for the page to set."""
@@ -41,7 +44,7 @@ def framed(fig: Figure, title: str, caption: str, height: int = 380, **layout: A
         template="none",
         meta={"title": title, "caption": caption},
         height=height,
-        margin={"l": 64, "r": 16, "t": 36, "b": 48},
+        margin={"l": 64, "r": 16, "t": HEADROOM, "b": 48},
         legend={"orientation": "h", "x": 0, "y": 1.02, "yanchor": "bottom"},
         **layout,
     )

@@ -88,8 +88,8 @@ def of_one_age(verdict: Verdict, believed: Explanation, aged: Sequence[Explanati
         nats = better[0].score.total - believed.score.total
         instead = verdict.effects[0] if verdict.effects else "no effect"
         reason = (
-            f"{better[0].hypothesis[0]} says {nats:.1f} nats more of unseen data than {instead} does, and records of "
-            "one age do not differ by it: the good records seem to be of another age; leave out --good to ask what the "
+            f"{better[0].hypothesis[0]} scores {nats:.1f} nats higher on unseen data than {instead}, and records of "
+            "one age cannot differ by it: the good records seem to be of another age; leave out --good to ask what the "
             "cell has lost since its file"
         )
         names = tuple(one.hypothesis[0] for one in better)
@@ -106,9 +106,7 @@ def of_one_age(verdict: Verdict, believed: Explanation, aged: Sequence[Explanati
     known = (
         verdict.confidence_sets[0] if verdict.confidence_sets else verdict.effects
     )  # one name is the most here
-    reason = (
-        f"{verdict.reason}; {' or '.join(as_well)} would say as much if the good records are of another age"
-    )
+    reason = f"{verdict.reason}; {' or '.join(as_well)} scores as high if the good records are of another age"
     return replace(verdict, confidence_sets=((*known, *as_well),), reason=reason)
 
 
@@ -150,13 +148,15 @@ def judged_beside(path: Path, thresholds: Thresholds) -> Verdict:
     allowed = usual.allowed_v
     groups, margin = look_alikes(path, thresholds, max(allowed, left)) if named else ((), -best_gain(path))
     others = ", ".join(r.name for r in problem.records if not r.good)
-    after = f" before, {1e3 * left:.1f} mV after" if named else ""
+    after = f" without the finding, {1e3 * left:.1f} mV with it" if named else ""
     reason = (
-        f"{1e3 * before:.1f} mV beyond the noise on unseen data of {others}{after}; "
+        f"the error on unseen data of {others} is {1e3 * before:.1f} mV beyond the noise{after}; it is "
         f"{1e3 * usual.good_v:.1f} mV on the good records"
     )
     if left > allowed:
-        reason += f", beyond {1e3 * allowed:.1f} mV no chance: not all of what is different is explained"
+        reason += (
+            f", and chance makes it at most {1e3 * allowed:.1f} mV: a part of the difference is not explained"
+        )
         if not named:
             margin = float(np.log(left / allowed))
         return Verdict("unknown", named, groups, 0.0, left, allowed, reason, max(margin, 0.0))

@@ -228,8 +228,8 @@ def consistent(path: Path, verdict: Verdict) -> Verdict:
         return verdict
     names = " + ".join(path.chosen.hypothesis) or "no effect"
     reason = (
-        f"{names} explains the data only with {', '.join(beyond)} further from what the cell file declares than cell "
-        "files are off by"
+        f"{names} explains the data only if {', '.join(beyond)} {'is' if len(beyond) == 1 else 'are'} further from the "
+        "declared value than cell files are usually wrong by"
     )
     return replace(verdict, word="unknown", effects=(), confidence_sets=(), reason=reason, margin=0.0)
 

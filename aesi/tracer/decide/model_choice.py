@@ -82,7 +82,7 @@ def with_model(
     single = _Single(reduced, archive_of(reduced, None), search, max_effects, declared)
     if problem.has_good:
         return _chosen(
-            single.whole(), "espm", declared, ", since the good records share what it approximates"
+            single.whole(), "espm", declared, ", since its approximations act on the good records, too"
         )
     return _asked_by_records(single, problem, archive_of)
 
@@ -145,7 +145,12 @@ def _asked_by_records(
     if not _notable(reduction):
         return _chosen(look.answer, "espm", reduction)
     if not explained:
-        return _chosen(look.answer, "espm", reduction, ", which leaves far more than the two differ by")
+        return _chosen(
+            look.answer,
+            "espm",
+            reduction,
+            ", whose error is far larger than the difference of the two models",
+        )
     full = _fine(problem, "dfn")
     return _weighed(single, look, full, archive_of(full, single.archive), reduction)
 
@@ -187,10 +192,8 @@ def _chosen(
 def _likelier(answer: Answer) -> str:
     """Why the single particle is believed where both models were searched, a clause."""
     if answer.verdict.word == "unknown":  # the porous electrode's is unknown too, or it would be believed
-        return (
-            ", because it says as much with fewer or likelier names, though neither model explains the data"
-        )
-    return ", because it explains these data with fewer or likelier names"
+        return ", because it scores as high with fewer or likelier effects, though neither model explains the data"
+    return ", because it explains these data with fewer or likelier effects"
 
 
 def _notable(reduction: Reduction | None) -> TypeGuard[Reduction]:

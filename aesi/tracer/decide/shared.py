@@ -59,9 +59,9 @@ def _with_shared(found: Unshared, name: str, most: int, report: Report) -> Unsha
         return None
     shared, named = base.score.total - found.path.base.score.total, found.path.gain(alone)
     told = (
-        f"{name} in all records says {shared:.1f} nats more of unseen data than none, in those beside the good ones "
-        f"alone {named:.1f}: it is taken as what all share, and what is told is what the others have beyond that; "
-        "leave out --good to ask what the file lacks."
+        f"{name} gains {shared:.1f} nats on unseen data if it acts in all records, and {named:.1f} if only in those "
+        "that are compared with the good ones: it is taken as common to all, and the verdict is on what these have "
+        "beyond it; leave out --good to ask what the file lacks."
     )
     path = searched(problem, most, archive, report)
     return Unshared(path, archive, (*found.shared, told))

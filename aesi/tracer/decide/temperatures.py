@@ -96,8 +96,8 @@ def fitted_at_fault(written: ModelState, others: Mapping[int, OtherTemperature])
         left_v = _left_by_v(written, record, index)
         if left_v > LEAVES_TIMES * other.there_v:
             return (
-                f"what was fitted at {other.degc:.4g} degC leaves {MV_PER_V * left_v:.1f} mV of {record.name}, the "
-                f"declared model at {other.there_degc:.4g} degC {MV_PER_V * other.there_v:.1f}: it makes up for a "
-                "temperature that the record contradicts"
+                f"the error on {record.name} is {MV_PER_V * left_v:.1f} mV with the fit at {other.degc:.4g} degC and "
+                f"{MV_PER_V * other.there_v:.1f} mV with the declared model at {other.there_degc:.4g} degC: the fit "
+                "compensates for a temperature that the record contradicts"
             )
     return None

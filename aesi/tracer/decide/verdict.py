@@ -88,8 +88,8 @@ class Verdict:
     def alike_too(self) -> tuple[str, ...]:
         """A sentence for each confidence set that has more members than are shown."""
         return tuple(
-            f"the data do not tell {one[0]} from {', '.join(one[1:])}: {len(one)} effects explain them about as well, "
-            f"of which the first {GROUP_SIZE} are shown as look-alikes."
+            f"the data do not distinguish {one[0]} from {', '.join(one[1:])}: these {len(one)} effects explain them "
+            f"about equally well, and the first {GROUP_SIZE} are shown as look-alikes."
             for one in self.confidence_sets
             if len(one) > GROUP_SIZE
         )
@@ -161,14 +161,14 @@ def judged(path: Path, thresholds: Thresholds) -> Verdict:
     if left > allowed:
         margin = float(np.log(left / allowed))
         reason = (
-            f"{1e3 * left:.2f} mV beyond the noise are left on data that the fit has not seen, {_with_what(path)} "
-            f"({1e3 * allowed:.2f} mV would be within what a right model leaves)"
+            f"the error on unseen data is {1e3 * left:.2f} mV beyond the noise, {_with_what(path)} (a right model "
+            f"leaves at most {1e3 * allowed:.2f} mV)"
         )
         return Verdict("unknown", (), (), 0.0, left, allowed, reason, margin)
     if not path.chosen.hypothesis:
         reason = (
-            f"{1e3 * left:.2f} mV beyond the noise on data that the fit has not seen, {1e3 * allowed:.2f} mV are "
-            "within what a right model leaves"
+            f"the error on unseen data is {1e3 * left:.2f} mV beyond the noise, and a right model leaves at most "
+            f"{1e3 * allowed:.2f} mV"
         )
         return Verdict("none", (), (), 0.0, left, allowed, reason, -best_gain(path))
     conditions = [name for name in ("rate", "charge") if name in path.blocks.folds]
@@ -177,20 +177,23 @@ def judged(path: Path, thresholds: Thresholds) -> Verdict:
     )
     if tested < thresholds.foretold_share:
         reason = (
-            f"{' + '.join(path.chosen.hypothesis)} fits the data to {1e3 * left:.2f} mV beyond the noise, and so would "
-            f"much else: of a range of {RANGE_OF[by]} that the fit has not seen it foretells {100 * tested:.0f} % of "
-            "the rows; a record with other currents would put it to the test"
+            f"{' + '.join(path.chosen.hypothesis)} fits the data to {1e3 * left:.2f} mV beyond the noise, but these "
+            f"data hardly test it: where a range of {RANGE_OF[by]} is left out of the fit, it predicts only "
+            f"{100 * tested:.0f} % of the rows there; add a record with other currents"
         )
         return Verdict("unknown", (), (), 0.0, left, allowed, reason, 0.0)
     groups, margin = look_alikes(path, thresholds, allowed)
     before = structured_v(path, path.base)
-    reason = f"{1e3 * before:.2f} mV beyond the noise on unseen data before, {1e3 * left:.2f} mV after"
+    reason = (
+        f"the error on unseen data is {1e3 * before:.2f} mV beyond the noise without the finding, "
+        f"{1e3 * left:.2f} mV with it"
+    )
     return Verdict("found", path.chosen.hypothesis, groups, 0.0, left, allowed, reason, margin)
 
 
 def _with_what(path: Path) -> str:
     tried = path.beyond_reach_v is not None or any(step.grown or step.fitted for step in path.steps)
-    return "whichever effects that were tried are added" if tried else "with no effect added"
+    return "whichever of the tried effects are added" if tried else "with no effect added"
 
 
 def partly(path: Path, verdict: Verdict, thresholds: Thresholds) -> Verdict:
@@ -201,9 +204,9 @@ def partly(path: Path, verdict: Verdict, thresholds: Thresholds) -> Verdict:
     before, left = structured_v(path, path.base), structured_v(path, path.chosen)
     groups, margin = look_alikes(path, thresholds, max(left, MEASURED_V))
     reason = (
-        f"what is named takes the error on data that the fit has not seen from {1e3 * before:.1f} to "
-        f"{1e3 * left:.1f} mV beyond the noise, by more than a model of a measured cell is usually off; the rest is "
-        "not explained by any effect that was tried"
+        f"{' + '.join(path.chosen.hypothesis)} reduces the error on unseen data from {1e3 * before:.1f} to "
+        f"{1e3 * left:.1f} mV beyond the noise, by more than the usual error of models of measured cells; no effect "
+        "that was tried explains the rest"
     )
     return replace(
         verdict,

@@ -20,9 +20,9 @@ from aesi.tracer.likelihood.model_state import ModelState
 AS_GOOD = 1.05
 """The model with the named effects, or else the declared one, is preferred where its `worst_ratio` is at most this many
 times the smallest one. A convention."""
-HARM = "on data left out it is worse than the declared model in a range of charge"
-UNTESTED = "these data cannot bear it out, at other states of charge or currents it could be anything"
-LESS_ELSEWHERE = "another model leaves less on records left out"
+HARM = "its error on left-out data is larger than that of the declared model in a range of charge"
+UNTESTED = "these data do not test it, and at other states of charge or currents its error is unknown"
+LESS_ELSEWHERE = "another model has a smaller error on left-out records"
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,8 +133,8 @@ def of_refit(
         return why
     left_mv, before_mv = 1e3 * other.left_out.pooled_v, 1e3 * declared.left_out.pooled_v
     return (
-        f"{why}; written is another fit of its parameters, which leaves {left_mv:.1f} mV of data left out, the "
-        f"declared model {before_mv:.1f}"
+        f"{why}; model/ holds another fit of its parameters, whose error on left-out data is {left_mv:.1f} mV "
+        f"({before_mv:.1f} mV with the declared model)"
     )
 
 
@@ -144,15 +144,15 @@ def stand_ins(state: ModelState, named: Sequence[str]) -> tuple[str, ...]:
     if not beside:
         return ()
     return (
-        f"the model that is written is recalibrated with {' + '.join(beside)}, which leaves least on records left out; "
-        "that the cell lacks this is not shown: it stands in for what no hypothesis explains.",
+        f"the written model is recalibrated with {' + '.join(beside)}, since that has the smallest error on left-out "
+        "records; this does not show that the cell lacks it: it stands in for an error that no hypothesis explains.",
     )
 
 
 def limits_of(state: ModelState) -> tuple[str, ...]:
     """Sentences on fast full discharges and charges that the declared model can run and the written one cannot."""
     fast = range_fault(state, FAST_C)
-    return () if fast is None else (f"with what was found, {fast}; the declared model does not.",)
+    return () if fast is None else (f"with the finding, {fast}; the declared model does not.",)
 
 
 def _fault(one: Option, declared: Option, rates_c: Sequence[float]) -> str | None:
@@ -166,6 +166,6 @@ def _instead(taken: Option, declared: Option) -> str:
     names = " + ".join(taken.state.hypothesis)
     beside = f" with {names}" if names else ""
     return (
-        f"written is the recalibrated model{beside}, which leaves {left_mv:.1f} mV there, the declared one "
-        f"{before_mv:.1f}"
+        f"model/ holds the recalibrated model{beside}, whose error on left-out data is {left_mv:.1f} mV "
+        f"({before_mv:.1f} mV with the declared model)"
     )

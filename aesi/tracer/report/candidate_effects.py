@@ -90,23 +90,24 @@ def refused(path: Path, one: Explanation) -> str:
     if isinstance(one, FittedHypothesis) and one.at_bounds:
         return f"ends on a bound: {', '.join(one.at_bounds)}"
     gained = one.score.total - rest
-    chosen = "what was chosen" if path.chosen.hypothesis else "the declared model"
-    remark = f"{abs(gained):.1f} nats {'better' if gained > 0.0 else 'worse'} on unseen data than {chosen}"
+    chosen = "the chosen hypothesis" if path.chosen.hypothesis else "the declared model"
+    higher = "higher" if gained > 0.0 else "lower"
+    remark = f"scores {abs(gained):.1f} nats {higher} on unseen data than {chosen}"
     return f"{remark}, {_why_not(path, one)}" if gained > 0.0 else remark
 
 
 def _why_not(path: Path, better: Explanation) -> str:
     """The rule by which a hypothesis with a higher score on unseen data was not chosen, a clause."""
     if not isinstance(better, FittedHypothesis):
-        return "to first order: it was not among the best that were fitted with the whole model"
+        return "but only linearised: it was not among the best, which were fitted with the nonlinear model"
     chosen, competing = path.chosen, len(path.problem.competing())
     gained = better.score.total - chosen.score.total
     if set(chosen.hypothesis) < set(better.hypothesis) and gained <= path.admission_nats:
-        return f"no more than the {path.admission_nats:.1f} that chance may give one more effect"
+        return f"but not by more than the {path.admission_nats:.1f} nats that chance may give one more effect"
     less = plausibility(chosen, competing) - plausibility(better, competing)
     if less > 0.0:
-        return f"but {less:.1f} nats less plausible by its marginal likelihood, with a price for each name"
-    return "but not admitted, or not reached, by adding and exchanging one effect at a time"
+        return f"but {less:.1f} nats lower in marginal likelihood, which has a penalty for each effect"
+    return "but the search, which adds or exchanges one effect at a time, did not admit or did not reach it"
 
 
 def estimates(path: Path, one: Explanation, effect: str) -> dict[str, Estimate]:

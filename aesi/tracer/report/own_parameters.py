@@ -56,8 +56,8 @@ def ages_told(states: Sequence[ModelState]) -> str:
             records = state.problem.records
             told = ", ".join(f"{shares[str(i)]:.3f} in {record.name}" for i, record in enumerate(records))
             return (
-                f"the records say more where they may be of several ages: fitted, the cell had {told} of the file's "
-                "capacity; the model that is written has the file's, and errors are told of that."
+                f"the records are explained better if they may be of several ages: the fitted capacity is {told} of "
+                "the file's; the written model has the file's capacity, and the errors are those with it."
             )
     return ""
 

@@ -3,7 +3,7 @@ neither."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -53,7 +53,7 @@ def _of_unsimulated(files: Sequence[FileOutcome]) -> Iterator[str]:
         for state, why in f.unsimulated.items():
             models.setdefault(why, []).append(NAMES[state])
         for why, names in models.items():
-            part = "the test part" if f.part == "test" else "what was fitted"
+            part = "the test part" if f.part == "test" else "the fitted part"
             have = "has no figure" if len(names) == 1 else "have no figures"
             yield f"{' and '.join(names)} {have} on {part} of {f.name}, where it cannot be simulated: {why}"
 
@@ -62,10 +62,10 @@ def _of_contradiction(files: Sequence[FileOutcome], verdict: Verdict) -> str | N
     over_v = contradicted_by_v(files, verdict)
     if over_v is None:
         return None
-    said = "what was found" if verdict.effects else "that nothing is missing"
+    said = "the finding" if verdict.effects else "that nothing is missing"
     return (
-        f"the test part contradicts {said}: {MV_PER_V * over_v:.2f} mV beyond the noise are left there, and "
-        f"{MV_PER_V * verdict.tolerance_v:.2f} mV would be within what a right model leaves. {_advice(files)}"
+        f"the test part contradicts {said}: the error there is {MV_PER_V * over_v:.2f} mV beyond the noise, and a "
+        f"right model leaves at most {MV_PER_V * verdict.tolerance_v:.2f} mV. {_advice(files)}"
     )
 
 
@@ -79,13 +79,12 @@ def _of_worse_on_tests(tests: Sequence[FileOutcome], named: bool) -> str | None:
     if not less:
         return None
     same = next((state for state in OTHERS if _same(tests, state)), None)
-    model = "the model with what was found" if named else NAMES["after"]
+    model = "the finding added" if named else NAMES["after"]
     if same is not None:
-        model = f"{NAMES[same]}, which is what is written,"
-    others = " and ".join(f"{words} {left_mv:.2f} mV" for words, left_mv in less.items())
+        model = f"{NAMES[same]}, which model/ holds,"
     harms = same != "before" and after_mv > AS_GOOD * min(less.values())
-    advice = ": do not use it there." if harms else "."
-    return f"on the test part {model} leaves {after_mv:.2f} mV, {others}{advice}"
+    advice = ": do not use the model in model/ on such data." if harms else "."
+    return f"the RMSE on the test part is {after_mv:.2f} mV with {model} {_others(less)}{advice}"
 
 
 def _of_worse_on_fitted(fitted: Sequence[FileOutcome]) -> str | None:
@@ -95,16 +94,23 @@ def _of_worse_on_fitted(fitted: Sequence[FileOutcome]) -> str | None:
         less.pop(NAMES["recalibrated"], None)
     if not less or _same(fitted, "before"):
         return None
-    others = " and ".join(f"{words} {left_mv:.2f} mV" for words, left_mv in less.items())
-    return f"on the part that was fitted {NAMES['after']} leaves {after_mv:.2f} mV of the rows as measured, {others}."
+    return (
+        f"the RMSE on the fitted part, of the rows as measured, is {after_mv:.2f} mV with {NAMES['after']} "
+        f"{_others(less)}."
+    )
+
+
+def _others(less: Mapping[str, float]) -> str:
+    """Clause with the models of smaller errors, RMS mV: 'and 8.00 mV with the declared model'."""
+    return " ".join(f"and {left_mv:.2f} mV with {words}" for words, left_mv in less.items())
 
 
 def _of_rest(tests: Sequence[FileOutcome], rest_a: float) -> str | None:
     if not tests or max(float(np.max(np.abs(f.current_a))) for f in tests) >= rest_a:
         return None
     return (
-        "the cell rests throughout the test part, which says nothing of a load: keep back more (--holdout), or give a "
-        "test record (--test)."
+        "the cell rests throughout the test part, which does not test the model under load: hold out more "
+        "(--holdout), or give a test record (--test)."
     )
 
 
@@ -114,7 +120,7 @@ def _advice(files: Sequence[FileOutcome]) -> str:
     if ran_out:
         where = ", ".join(ran_out)
         return f"The model runs empty or full on {where}: check capacity (soh), soc0 and temperature first."
-    return "Something else is missing, or more; look again with the test part among the data."
+    return "Another effect is missing, or a further one: search again with the test part among the data (--data)."
 
 
 def _tests(files: Sequence[FileOutcome]) -> list[FileOutcome]:

@@ -476,8 +476,10 @@ def test_a_record_that_the_model_cannot_follow_left_the_command_line_with_nothin
     table = pd.read_csv(tmp_path / "o.csv")
     ran_out_s = table.time_s[table.depleted.to_numpy().argmax()]
     assert 0.0 < ran_out_s < table.time_s.iloc[-1]
-    words = f"runs empty or full in this model at {ran_out_s:g} s. From then on kinetics are held at the edge"
-    assert f"{words}, open-circuit potentials go on at 10 V per unit of stoichiometry" in err
+    words = (
+        f"runs empty or full in this model at {ran_out_s:g} s. From then on kinetics are held at the limit"
+    )
+    assert f"{words}, open-circuit potentials are extrapolated by 10 V per unit of stoichiometry" in err
     whole = table.voltage_v[table.depleted == 0.0]
     assert f"{whole.min():.3f} to {whole.max():.3f} V until it ran out at {ran_out_s:g} s, " in err
 

@@ -19,7 +19,12 @@ STATES = ("before", "recalibrated", "after")
 def done(folder, job, ohm):
     """A check-up as an earlier run of the batch left it."""
     row = {"name": job.name, "specimen": job.specimen, "at": job.at, "status": "done", "verdict": "none"}
-    row |= {"effects": "", "finding": "none: nothing is missing", "seconds": 3.0, "report": "report.html"}
+    row |= {
+        "effects": "",
+        "finding": "none: these data show nothing",
+        "seconds": 3.0,
+        "report": "report.html",
+    }
     row |= {f"{state}_test_mv": 2.0 for state in STATES}
     row |= {f"{key}{end}": ohm for key in HEALTH_WORDS for end in ("", "_low", "_high")}
     folder.mkdir(parents=True)

@@ -160,7 +160,7 @@ def test_a_prior_that_the_records_contradict_is_told(start, records, found):
     told = [note for note in far.notes if "what was given" in note]
     assert len(told) == 1
     assert f"contact.resistance ends at {value:.4g} ohm" in told[0]
-    assert "standard deviations below what was given (0.1): the records say otherwise" in told[0]
+    assert "standard deviations below what was given (0.1): the records contradict it" in told[0]
     assert not any("what was given" in note for note in found.notes)
 
 
@@ -302,7 +302,7 @@ def test_a_file_that_is_worse_than_the_start_file_as_it_is_simulated_was_not_war
     worse = replace(first, before_v=20e-3, after_v=10e-3, simulated_v=40e-3)
     (warning,) = replace(found, errors=(worse,)).warnings
     assert warning.startswith(
-        f"{first.name}: the file that is written errs by 40.00 mV there, the start file by 20.00"
+        f"{first.name}: the RMSE is 40.00 mV with the written file and 20.00 mV with the start file"
     )
     assert replace(found, errors=(replace(worse, simulated_v=20e-3),)).warnings == ()
 
@@ -373,7 +373,7 @@ def test_a_start_given_against_the_voltage_bent_the_file_with_no_more_than_a_not
     alone = calibrate(start, records[:1], Conditions(soc0=0.8), evaluations=1)
     (warning,) = (words for words in alone.warnings if "--soc0" in words)
     assert warning.startswith("at_25 starts at a state of charge of 0.8, as given; its first voltage (4.")
-    assert re.search(r"rather says 1.000 \+/- 0.\d+: the fit bends the cell's parameters", warning)
+    assert re.search(r"rather says 1.000 \+/- 0.\d+: the fit distorts the cell's parameters", warning)
     assert not any("starts at a state of charge" in note for note in alone.notes)  # it is told once
 
     believed = calibrate(start, records[:1], Conditions(soc0=0.98), evaluations=1)

@@ -97,7 +97,9 @@ def test_a_chamber_or_a_noisy_sensor_was_written_into_the_file_as_heat(what):
     """Twelve times the heat capacity of noise; of a swing 9e5 W/K, which left all 2.8 K of it."""
     cell, notes = with_heat(NMC, prepared(NMC, [in_a_chamber(CHAMBERS[what])], 0.9))
     assert cell is NMC
-    assert notes == ("heat: losses do not explain the temperature of chamber; it tells nothing.",)
+    assert notes == (
+        "heat: the losses of the cell do not explain the temperature of chamber; it is not used.",
+    )
 
 
 def test_a_record_in_a_chamber_does_not_take_part_in_what_another_tells_of_heat(warming):

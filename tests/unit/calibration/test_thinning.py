@@ -82,17 +82,17 @@ def drive(step_s: float, hold: str | None = None) -> Measurement:
 @pytest.mark.parametrize(
     ("data", "taken"),
     [
-        (drive(2.0), "in straight lines between rows; --hold backward takes it otherwise."),
+        (drive(2.0), "as linear between rows; --hold backward takes it otherwise."),
         (drive(2.0, "backward"), "constant since the row before, as declared."),
         (drive(8.0), "constant since the row before, as loggers write; --hold linear takes it otherwise."),
-        (drive(0.1), "averages over 1 s, with the current in straight lines between them."),
+        (drive(0.1), "averages over 1 s, with the current linear between them."),
         (
             drive(0.1, "backward"),
-            "straight lines between them; --hold backward holds for rows that are not thinned.",
+            "linear between them; --hold backward holds for rows that are not thinned.",
         ),
         (
             replace(pulses(), hold="linear"),
-            "a step lies back, with the current in straight lines between them.",
+            "since the last current step, with the current linear between them.",
         ),
     ],
 )

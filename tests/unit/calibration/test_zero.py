@@ -64,7 +64,7 @@ def test_a_charge_that_stops_a_little_short_does_not_pass_for_a_zero(start, cycl
 def test_a_cycle_that_stops_before_full_tells_nothing_and_says_so(start, cycle):
     zero = zero_of(start, [stopped(start, cycle, 200)])
     assert zero.mean_a == 0.0
-    assert zero.sentences[0].startswith("cycle: the charge that it takes and gives does not tell the zero")
+    assert zero.sentences[0].startswith("cycle: its charge balance does not determine the offset")
     assert "has to be nearly full at both ends" in zero.sentences[0]
 
 

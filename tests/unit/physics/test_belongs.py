@@ -253,7 +253,7 @@ def test_a_calibration_could_not_start_from_a_file_of_other_materials(of_mangane
     with pytest.raises(DataError, match="the cell file is another cell's"):
         check_measured(cell, [warm])
     check_measured(cell, [warm], known=[0])
-    assert "of other materials" in unlike(cell, warm)
+    assert "of other electrode materials" in unlike(cell, warm)
     again = replace(warm.between(3000.0, 9000.0), name="again")  # of the same cell, and no full discharge
     with pytest.raises(DataError, match="the cell file is another cell's"):
         check_measured(cell, [again])

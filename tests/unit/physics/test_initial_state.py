@@ -703,7 +703,7 @@ def test_a_few_rows_of_rest_before_a_load_left_doubts_of_a_tenth_and_more(rows):
     truth = float(run.series["soc"][1500])
     assert abs(found.soc - truth) < min(2.0 * found.sd, 0.02)
     assert found.sd < 0.03
-    assert "too short to tell by itself" in found.sentence
+    assert "too briefly to read the state from that alone" in found.sentence
 
 
 def test_a_third_of_the_uncertainty_was_told_without_a_word_where_the_potentials_are_fitted():

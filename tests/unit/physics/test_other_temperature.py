@@ -17,8 +17,9 @@ def test_a_dead_column_is_told_with_the_temperature_that_the_record_shows():
     found = other_temperature(COLUMN_DEGC, 25.0, error_of(25.0))
     assert (found.degc, found.there_degc) == (0.0, 25.0)
     assert (found.left_v, found.there_v) == pytest.approx((0.11, 0.01))
-    assert "At 0 degC, which it is taken at, the declared model leaves 110.0 mV, at 25 degC 10.0 mV" in (
-        found.sentence("drive")
+    assert (
+        "error of the declared model is 110.0 mV at 0 degC, which it is taken at, and 10.0 mV at 25 degC"
+        in (found.sentence("drive"))
     )
     assert "--column temperature_degc= leaves it out" in found.sentence("drive")
 

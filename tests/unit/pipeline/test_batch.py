@@ -221,7 +221,12 @@ def test_health_shows_what_was_lost():
 def test_the_summary_has_every_cell_and_the_trend_in_order(tmp_path):
     def row(name, at, resistance):
         health = {f"{key}{end}": 5.0 for key in HEALTH_WORDS for end in ("", "_low", "_high")}
-        done = {"status": "done", "verdict": "none", "effects": "", "finding": "none: nothing is missing"}
+        done = {
+            "status": "done",
+            "verdict": "none",
+            "effects": "",
+            "finding": "none: these data show nothing",
+        }
         return {"name": name, "specimen": "cell 1", "at": at, **done, **health, "resistance_mohm": resistance}
 
     failed = {"name": "x", "specimen": "", "at": None, "status": "failed", "reason": "x.csv is empty & <odd>"}

@@ -94,7 +94,7 @@ def test_the_finding_comes_first_and_the_best_known_parameter_before_the_others(
         < html.index("These tell 1 of 5.")
     )
     assert html.index("<code>positive.rate</code>") < html.index("<code>negative.rate</code>")
-    assert html.index("<code>negative.rate</code>") < html.index("The 3 knots of the courses")
+    assert html.index("<code>negative.rate</code>") < html.index("The 3 knots over stoichiometry")
     assert "25.0, as declared" in html
     assert html.count("sampled [") == 1
     assert 'data-figure="nyquist_0"' not in html
@@ -134,19 +134,19 @@ def test_one_record_is_named_and_its_error_is_no_range(content):
     content["files"] = content["files"][:1]
     assert finding(content) == (
         "In free run the calibrated model errs by 2.0 mV RMSE on pulses, where the start file erred by 30.0 mV. "
-        "With the file as it is written, without a record's own start, capacity and current offset, the error is "
-        "4.0 mV."
+        "With the written file alone, without each record's own initial state, capacity and current offset, the error "
+        "is 4.0 mV."
     )
 
 
 def test_a_record_that_the_fit_made_worse_is_named_first(content):
     content["files"][0]["before_rmse_mv"] = 1.0
-    assert finding(content).endswith(" On pulses the start file errs by less.")
+    assert finding(content).endswith(" On pulses the start file has the lower error.")
 
 
 def test_a_record_that_the_written_file_is_worse_on_was_not_named(content):
     content["files"][1] |= {"before_rmse_mv": 5.0, "after_rmse_mv": 2.0, "as_simulated_rmse_mv": 6.0}
-    assert finding(content).endswith(" On slow the start file errs by less.")
+    assert finding(content).endswith(" On slow the start file has the lower error.")
 
 
 def test_no_knots_are_no_figure():

@@ -13,7 +13,7 @@ def content(weights: list[dict[str, float]], total: int) -> dict[str, object]:
 def test_many_open_combinations_are_one_sentence_that_names_the_heaviest():
     many = [{"p0": 0.9, "p1": 0.4}, {"p2": -0.8, "p0": 0.6}, {"p3": 1.0}, {"p4": 1.0}, {"p0": 1.0}]
     assert open_line(content(many, 9)) == (
-        "these records tell 4 of 9 combinations of parameters better than their priors do; "
+        "these records determine 4 of 9 combinations of parameters better than their priors do; "
         "the others (p0, p2, p3 and others) stay near the priors"
     )
 

@@ -157,8 +157,13 @@ def test_a_start_that_is_given_wrongly_was_taken_as_exact_without_a_word(model, 
     worth_mv = 1e3 * np.sqrt(np.mean(np.max(np.abs(np.array(moved) - moved[1]), axis=0) ** 2))
     for asked in ({"soc0": SOC0}, {}):  # given now, or when the model was made
         (sentence,) = told(**asked)
-        assert sentence.startswith(f"drive: the band takes the start at {SOC0:g} as exact; 0.01 of charge")
-        assert f" is worth {worth_mv:.1f} mV RMS along this record" in sentence
+        assert sentence.startswith(
+            f"drive: the band takes the initial state of charge of {SOC0:g} as exact; "
+        )
+        assert (
+            f"an error of 0.01 in it changes the voltage by {worth_mv:.1f} mV RMS along this record"
+            in sentence
+        )
     assert not told(soc0=SOC0, soc0_sd=0.01)
     for wrong in ({"soc0_sd": 0.01}, {"soc0": SOC0, "soc0_sd": 0.01, "measured": True}):
         with pytest.raises(InputError, match="give it with --soc0 and without --measured"):
@@ -337,10 +342,8 @@ def test_a_cold_record_had_no_correction_and_nothing_said_so(fading, data, tmp_p
     assert table["outside"].all()
     assert 0.2 < table["weight"].mean() < 0.7
     share = f"{100 * table['weight'].mean():.2g} %"
-    assert (
-        f"at 18.0 degC, 6 K below what it was trained at, {share} of the correction are applied on average"
-        in said
-    )
+    fades = f"the correction fades towards the physics, to {share} of its size on average"
+    assert f"at 18.0 degC, 6 K below what it was trained at, {fades}" in said
 
     table, said = predicted(24.0)
     assert table["outside"].mean() < 0.05  # simulated a kelvin colder than it was trained
@@ -423,7 +426,7 @@ def test_a_dead_temperature_was_simulated_at_without_a_word(model, data, tmp_pat
     use(physics.save(tmp_path / "physics"), record, tmp_path / "out.csv", asked, say_notes=said.extend)
     found = [note for note in said if "its voltage contradicts its temperature" in note]
     assert bool(found) == told
-    assert not found or found[0].startswith("drive: its voltage contradicts its temperature. At 0 degC")
+    assert not found or found[0].startswith("drive: its voltage contradicts its temperature. The error of ")
 
 
 def test_physics_with_effects_alone_is_a_model_too(model, data, tmp_path):

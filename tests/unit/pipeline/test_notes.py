@@ -54,8 +54,8 @@ def test_a_cold_record_of_a_cell_without_activation_energies_was_simulated_in_si
     assert without_energies(silent, [None, np.full(3, 27.0)]) == ()
     (sentence,) = without_energies(silent, [None, cold])
     assert sentence == (
-        "the cell's file declares no activation energy for electrolyte diffusivity: taken as at 25 degC, which is "
-        "up to 15 K off."
+        "the cell's file declares no activation energy for electrolyte diffusivity: their values at 25 degC are "
+        "used at temperatures up to 15 K away."
     )
 
 
@@ -83,7 +83,7 @@ def test_a_shift_of_the_temperature_was_no_temperature_that_energies_are_missing
     silent = Cell.from_bpx(NMC).with_electrolyte(diffusivity_ea_j_mol=0.0)
     shifted = [CATALOGUE["ambient_temperature"].activate(shift_k=-20.0)]
     (sentence,) = on_temperatures(silent, [None], shifted)
-    assert sentence.endswith("taken as at 25 degC, which is up to 20 K off.")
+    assert sentence.endswith("their values at 25 degC are used at temperatures up to 20 K away.")
     assert on_temperatures(silent, [np.full(3, 25.0)], shifted) == ()  # a measured temperature is as it is
 
 

@@ -31,9 +31,8 @@ def test_what_moved_is_named_with_how_far_and_what_ended_on_its_limit_is_said_so
         REFIT | {"effects": [], "own_parameters": {"recalibrated": [FAR, STAYED], "after": [FAR]}}
     )
     assert text == (
-        "Recalibrating moves solid diffusivity (negative) to 0.18 times declared (4.0 standard deviations, one of "
-        "which is 35 % in this fit). Solid diffusivity (negative) stopped at its limit, so that its value is the "
-        "limit's, not the data's."
+        "Recalibration moves solid diffusivity (negative) to 0.18 times declared (4.0 standard deviations of 35 % "
+        "each). Solid diffusivity (negative) ended on its bound, and its value is not determined by the data."
     )
 
 
@@ -52,9 +51,9 @@ def test_what_was_put_on_top_of_the_file_was_told_as_all_of_it():
     lower = row("a2_v", -5.6e-3, -1.3, True, "ocp_shape") | {"declared": 0.0, "unit": "V", "one_sd": 4.3e-3}
     (text,) = moved_findings(REFIT | {"effects": [], "own_parameters": {"recalibrated": [lower, added]}})
     assert text == (
-        "Recalibrating moves ocp shape (a2) by -5.6 mV (1.3 standard deviations, one of which is 4.3 mV in this fit); "
-        "series resistance by +4.1 mohm (1.2 standard deviations, one of which is 3.4 mohm in this fit). Ocp shape "
-        "(a2) and series resistance stopped at their limits, so that their values are the limits', not the data's."
+        "Recalibration moves ocp shape (a2) by -5.6 mV (1.3 standard deviations of 4.3 mV each); series resistance by "
+        "+4.1 mohm (1.2 standard deviations of 3.4 mohm each). Ocp shape (a2) and series resistance ended on their "
+        "bounds, and their values are not determined by the data."
     )
 
 
@@ -63,7 +62,8 @@ def test_with_a_finding_the_fit_beside_it_is_told_too():
         OTHER | {"effects": ["self_heating"], "own_parameters": {"recalibrated": [FAR], "after": [STAYED]}}
     )
     assert texts[1] == (
-        "Beside the finding the fit moves no declared parameter by more than a standard deviation of what it allows it."
+        "The fit with the finding moves no declared parameter by more than one standard deviation of its prior in this "
+        "fit."
     )
 
 
@@ -132,8 +132,8 @@ def colder(written_k):
 def test_a_written_model_with_what_was_found_at_another_size_is_told_as_such():
     """The cold drive of a Panasonic: the finding was 11.8 degC, the model beside it ran at 13.3 degC."""
     assert moved_findings(colder(-11.7)) == [
-        "Two fits, two sizes: the finding, with the file's parameters as declared, is ambient temperature 11.8 degC; "
-        "model/, with them refitted as well, has ambient temperature 13.3 degC."
+        "The finding and model/ differ in size: ambient temperature 11.8 degC in the finding, where the file's "
+        "parameters are as declared; ambient temperature 13.3 degC in model/, where they are refitted as well."
     ]
     assert moved_findings(colder(-13.21)) == []  # the same as it is shown
     assert moved_findings(colder(-11.7) | {"written_parameters": {}}) == []  # something else is written
@@ -160,6 +160,7 @@ def test_another_size_is_told_in_the_units_of_the_finding():
     }
     (text,) = moved_findings(discovery)
     assert text.endswith(
-        "is lithium inventory loss 5.0 % and series resistance 8.00 mohm; model/, with them refitted as well, has "
-        "lithium inventory loss 9.0 % and series resistance 6.00 mohm."
+        ": lithium inventory loss 5.0 % and series resistance 8.00 mohm in the finding, where the file's parameters "
+        "are as declared; lithium inventory loss 9.0 % and series resistance 6.00 mohm in model/, where they are "
+        "refitted as well."
     )

@@ -219,4 +219,4 @@ def test_one_hypothesis_was_told_as_all_1_hypotheses(views, tmp_path):
     one = {**view.discovery, "candidates": rows, "own_parameters": {"recalibrated": [moved]}}
     text = write_discovery_report(tmp_path / "r.html", replace(view, discovery=one)).read_text()
     assert "<summary>The hypothesis with its parameters</summary>" in text
-    assert "<summary>What the refit made of the declared parameter</summary>" in text
+    assert "<summary>How the refit changed the declared parameter</summary>" in text

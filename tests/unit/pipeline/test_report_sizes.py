@@ -87,13 +87,15 @@ def test_the_line_of_a_verdict():
     assert finding_line(found) == "found: 8.00 mohm [7.90, 8.10] more series resistance"
     same = discovery("series_resistance", "physics", ohms, recalibrated=1.0)
     assert finding_line(same).startswith("one of two explanations: 8.00 mohm")
-    assert finding_line({**found, "verdict": "none", "effects": []}).startswith("none: nothing is missing")
+    assert finding_line({**found, "verdict": "none", "effects": []}).startswith(
+        "none: these data show nothing"
+    )
     partly = finding_line({**found, "verdict": "unknown"})
     assert partly.startswith(
-        "unknown: 8.00 mohm [7.90, 8.10] more series resistance explains a part; something real"
+        "unknown: 8.00 mohm [7.90, 8.10] more series resistance explains a part of the error; a systematic error"
     )
     unknown = finding_line({**found, "verdict": "unknown", "effects": []})
-    assert unknown.startswith("unknown: something real is left")
+    assert unknown.startswith("unknown: a systematic error remains")
     assert "%" not in unknown
 
 

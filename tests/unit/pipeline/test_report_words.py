@@ -35,12 +35,12 @@ def test_an_error_of_661_mv_did_not_say_that_the_model_ran_empty(views):
     chosen |= {"test_records": {"a": {"ran_out_s": 7976.0}, "b": {}}}
     emptied = replace(view, models=(physics, chosen, other))
     assert runs.run_finding(emptied) == runs.run_finding(view).removesuffix(".") + (
-        "; a simulation runs empty or full on a at 7976 s, from where on an error says that it ran out, not by how "
-        f"much the model is off: before that the error is 240.1 mV by ESPM and 234.8 mV by {view.chosen}."
+        "; a simulation runs empty or full on a at 7976 s, from where on its error shows only that it ran out, not "
+        f"how accurate it is: before that the error is 240.1 mV by ESPM and 234.8 mV by {view.chosen}."
     )
     assert runs.run_finding(
         replace(emptied, models=(view.models[0], chosen | {"free_run": view.models[1]["free_run"]}))
-    ).endswith("not by how much the model is off.")
+    ).endswith("not how accurate it is.")
 
 
 def test_a_correction_that_does_not_beat_the_physics_it_was_learned_on_is_told_so(views):
@@ -99,7 +99,7 @@ def test_what_a_mere_refit_and_a_constant_leave_stands_beside_the_gain(views):
     assert runs.refit_finding(beside).endswith(
         "errs by 5.0 mV there: the correction leaves 36.0 % less mean squared error than that."
     )
-    assert "as a constant, leaves 4.8 mV there" in runs.constant_finding(beside)
+    assert "as a constant, gives an RMSE of 4.8 mV there" in runs.constant_finding(beside)
     assert runs.constant_finding(replace(beside, chosen="ESPM + constant")) == ""
 
 
@@ -186,8 +186,8 @@ def test_a_correction_that_had_faded_to_nothing_was_told_as_held_at_the_edge():
     assert runs.outside_finding(model) == (
         "cold: 100 % of the rows lie outside the range the correction was trained on; at -0.2 degC, 24 K below what it "
         "was trained at, none of the correction is applied: this is the physics model. near: 41 % of the rows lie "
-        "outside the range the correction was trained on; 93 % of the correction are applied on average, the rest is "
-        "left to the physics."
+        "outside the range the correction was trained on; the correction fades towards the physics, to "
+        "93 % of its size on average."
     )
 
 
@@ -210,7 +210,7 @@ def test_one_step_that_loses_to_persistence_is_said_to_lose():
     ("verdict", "phrase"),
     [
         ("found", "lacks 1.25 mohm [1.10, 1.40] of self-heating"),
-        ("none", "Nothing is missing"),
+        ("none", "These data show nothing"),
         ("unknown", "no effect"),
     ],
 )
@@ -248,17 +248,20 @@ def test_a_finding_that_the_test_part_contradicts_says_so_at_once(views):
 def test_a_written_model_that_does_worse_on_the_test_part_is_told_in_the_first_lines(views):
     view = views.discovery_view(200)
     worse = replace(view, discovery={**view.discovery, "after": {"test": {"rmse_mv": 9.3}}})
-    advice = "o not use the written model: a refit alone errs less on the test part"
+    advice = "o not use the written model: recalibration alone has a lower error on the test part"
     assert discoveries.discovery_finding(worse).endswith(f". D{advice}.")
     assert discoveries.short_finding(worse.discovery).endswith(f"; d{advice}")
     worst = replace(view, discovery={**view.discovery, "after": {"test": {"rmse_mv": 9.5}}})
-    assert "the declared model and a refit alone err less on" in discoveries.discovery_finding(worst)
+    assert (
+        "the declared model and recalibration alone have a lower error on"
+        in discoveries.discovery_finding(worst)
+    )
     hardly = replace(view, discovery={**view.discovery, "after": {"test": {"rmse_mv": 6.21}}})
     assert discoveries.discovery_finding(hardly).endswith(
-        ". A refit alone errs less on the test part than the written model."
+        ". Recalibration alone has a lower error on the test part than the written model."
     )
     same = replace(view, discovery={**view.discovery, "after": {"test": {"rmse_mv": 6.2004}}})
-    assert "errs less" not in discoveries.discovery_finding(same)
+    assert "lower error" not in discoveries.discovery_finding(same)
 
 
 def test_a_written_model_that_leaves_more_of_what_it_was_fitted_to_than_a_refit_was_told_without_a_word(
@@ -267,9 +270,9 @@ def test_a_written_model_that_leaves_more_of_what_it_was_fitted_to_than_a_refit_
     view = views.discovery_view(200, verdict="unknown")
     states = {name: {"fit": {"rmse_mv": left}} for name, left in (("recalibrated", 5.05), ("after", 28.46))}
     text = discoveries.short_finding(view.discovery | states)
-    assert text.endswith("; a refit alone has the lower error on what was fitted")
+    assert text.endswith("; recalibration alone has a lower error on the fitted part")
     as_good = states | {"after": {"fit": {"rmse_mv": 5.2}}}
-    assert "what was fitted" not in discoveries.short_finding(view.discovery | as_good)
+    assert "the fitted part" not in discoveries.short_finding(view.discovery | as_good)
 
 
 def test_a_contradicted_temperature_is_told_in_the_first_sentence(views):
@@ -281,22 +284,23 @@ def test_a_contradicted_temperature_is_told_in_the_first_sentence(views):
 def test_the_first_sentence_buried_the_verdict_under_figures_that_the_lines_below_repeat(views, tmp_path):
     """Of a cold drive it had seven lines on the page."""
     view = views.discovery_view(200, verdict="unknown")
-    warning = "on the test part the written model leaves 9.30 mV, the recalibrated model 6.20 mV: do not use it there."
+    warning = (
+        "the RMSE on the test part is 9.30 mV with the written model and 6.20 mV with the recalibrated model."
+    )
     left = {"after": {"fit": {"rmse_mv": 9.0}, "test": {"rmse_mv": 9.3}}, "warnings": [warning]}
     named = {"effects": ["self_heating"], "written": ["self_heating"]}
     told = replace(view, discovery=view.discovery | left | named)
     assert discoveries.discovery_finding(told) == (
-        "Named in part: 1.25 mohm [1.10, 1.40] of self-heating. Something real is left that no effect of the catalogue "
-        "explains. Do not use the written model: a refit alone errs less on the test part."
+        "1.25 mohm [1.10, 1.40] of self-heating explains a part of the error. A systematic error remains that no "
+        "effect of the catalogue explains. Do not use the written model: recalibration alone has a lower error on the "
+        "test part."
     )
     text = write_discovery_report(tmp_path / "r.html", told).read_text().replace("\xa0", " ")
     header = text[text.index("<h1>") : text.index("</header>")]
-    assert header.count("on the test part the written model leaves") == 1
+    assert header.count("he RMSE on the test part is") == 1
     assert "9.30" not in header[: header.index("</h1>")]
     second = header[header.index("</h1>") : header.index('role="alert"')]
-    assert (
-        "model/ holds the model with the finding added. RMSE on data that chose nothing: 9.4 mV as" in second
-    )
+    assert "model/ holds the model with the finding added. RMSE on held-out data: 9.4 mV as" in second
 
 
 def test_a_declared_model_that_is_written_unchanged_was_shown_as_a_third_one(views, tmp_path):
@@ -306,13 +310,13 @@ def test_a_declared_model_that_is_written_unchanged_was_shown_as_a_third_one(vie
     content = view.discovery | {"after": view.discovery["before"], "written": []}
     assert list(discoveries.states_of(content)) == ["before", "recalibrated"]
     assert discoveries.written_finding(content).startswith("model/ holds the declared model, unchanged: no")
-    refused = content | {"not_adopted": "the recalibrated model: these data cannot bear it out"}
+    refused = content | {"not_adopted": "the recalibrated model: these data do not test it"}
     assert discoveries.written_finding(refused) == (
-        "model/ holds the declared model, unchanged. Not adopted: the recalibrated model: these data cannot bear it "
-        "out."
+        "model/ holds the declared model, unchanged. Not adopted: the recalibrated model: these data do not test "
+        "it."
     )
     assert discoveries.short_finding(content).endswith(
-        "; a refit alone errs less on the test part than the declared model, which is what is written"
+        "; recalibration alone has a lower error on the test part than the declared model, which model/ holds"
     )
     text = write_discovery_report(tmp_path / "r.html", replace(view, discovery=content)).read_text()
     assert "as written" not in text
@@ -320,7 +324,7 @@ def test_a_declared_model_that_is_written_unchanged_was_shown_as_a_third_one(vie
     assert discoveries.written_finding(view.discovery) == "model/ holds the recalibrated model."
     other = view.discovery | {"after": {"test": {"rmse_mv": 1.0}}, "effects": [], "written": ["porosity"]}
     assert discoveries.written_finding(other) == (
-        "model/ holds a recalibrated model with porosity, in place of what no hypothesis explains."
+        "model/ holds a recalibrated model with porosity, in place of an error that no hypothesis explains."
     )
 
 
@@ -347,7 +351,7 @@ def test_a_partial_find_says_that_something_is_left(views):
     partial = replace(view, discovery={**view.discovery, "effects": ["self_heating"]})
     text = discoveries.discovery_finding(partial)
     assert "self-heating" in text
-    assert "Something real is left" in text
+    assert "A systematic error remains" in text
 
 
 def test_the_refit_stands_apart_from_the_finding(views):
@@ -363,7 +367,7 @@ def test_a_refit_that_does_as_well_is_said_to(views):
     same = {**view.discovery, "recalibrated": {"test": {"rmse_mv": 1.1}}}
     text = discoveries.discovery_finding(replace(view, discovery=same))
     assert text.startswith("One of two explanations: the declared model")
-    assert "a refit of them does as well" in text
+    assert "recalibrating them gives as low an error on the held-out data" in text
 
 
 @pytest.mark.parametrize(
@@ -372,13 +376,16 @@ def test_a_refit_that_does_as_well_is_said_to(views):
         (
             "none",
             (
-                "0.30 mV of voltage error beyond the noise of the sensors are left on pieces",
-                "Up to 0.80 mV",
+                "the voltage error beyond sensor noise is 0.30 mV in cross-validation",
+                "account for up to 0.80 mV",
                 "no reason to change",
             ),
         ),
-        ("found", ("with the finding added 0.30 mV", "up to 0.80 mV count as explained")),
-        ("unknown", ("4.00 mV of voltage error", "no more than 0.80 mV", "an unknown of a measured cell")),
+        ("found", ("with the finding added, the voltage", "is 0.30 mV", "up to 0.80 mV count as explained")),
+        (
+            "unknown",
+            ("is 4.00 mV in", "only up to 0.80 mV would", "A measured cell nearly always ends as unknown"),
+        ),
     ],
 )
 def test_the_verdict_says_what_it_rests_on(views, verdict, phrases):
@@ -393,12 +400,16 @@ def test_a_rest_that_several_hypotheses_explain_names_the_best(views):
 
 def test_a_rest_that_follows_nothing_is_not_called_little(views):
     unknown = views.discovery_view(200, verdict="unknown").discovery
-    assert "follows none of the model's variables" in discoveries.rest_finding(unknown)
+    assert "no function of the model's variables predicts it on unseen data" in discoveries.rest_finding(
+        unknown
+    )
     assert "is not known" in discoveries.rest_finding({**unknown, "explainable_mv": None})
-    assert "much structure" in discoveries.rest_finding({**unknown, "explainable_mv": 4.5})
-    assert "little structure" in discoveries.rest_finding(views.discovery_view(200).discovery)
+    assert "much of the remaining error is systematic" in discoveries.rest_finding(
+        {**unknown, "explainable_mv": 4.5}
+    )
+    assert "little systematic error remains" in discoveries.rest_finding(views.discovery_view(200).discovery)
     easier = {**unknown, "explainable_mv": 7.2, "after": {"fit": {"rmse_mv": 9.4}, "test": {"rmse_mv": 4.8}}}
-    assert "7.2 mV of the 9.4 mV on the data that were fitted" in discoveries.rest_finding(easier)
+    assert "7.2 mV of the 9.4 mV on the fitted data" in discoveries.rest_finding(easier)
 
 
 def test_no_verdict_is_called_certain():
@@ -493,7 +504,7 @@ def test_an_error_is_said_to_be_with_the_finding_only_where_that_is_what_is_writ
 @pytest.mark.parametrize(
     ("tried", "phrase"),
     [
-        ([], "misses something real; no effect was tried on it."),
+        ([], "has a systematic error; no effect was tried."),
         (["clock_skew"], "that clock skew, which alone was tried, does not explain."),
         (["clock_skew", "film_growth"], "that none of the 2 effects that were tried explains."),
         (list(CATALOGUE), "that no effect of the catalogue explains."),
@@ -503,10 +514,10 @@ def test_an_unknown_says_which_effects_were_tried(views, tried, phrase):
     view = views.discovery_view(200, verdict="unknown")
     view = replace(view, discovery={**view.discovery, "tried": tried})
     assert discoveries.discovery_finding(view).endswith(phrase)
-    rest = phrase.removeprefix("misses something real").removesuffix(".")
+    rest = phrase.removeprefix("has a systematic error").removesuffix(".")
     assert finding_line(view.discovery).endswith(rest.strip())
     told = (discoveries.reason_finding(view.discovery), discoveries.next_finding(view.discovery))
-    assert ("of a measured cell by itself" in told[0], "Next: data of another kind" in told[1]) == (
+    assert ("A measured cell nearly always" in told[0], "Next: add data of another kind" in told[1]) == (
         bool(tried),
         bool(tried),
     )
@@ -515,13 +526,15 @@ def test_an_unknown_says_which_effects_were_tried(views, tried, phrase):
 def test_an_unknown_says_what_came_nearest_and_what_to_do_next(views):
     view = views.discovery_view(200, verdict="unknown")
     said = discoveries.next_finding(view.discovery, view.titles)
-    assert said.startswith("Nearest, but not named: self-heating (ends on a bound: ")
-    assert said.endswith("aesi run learns what is left, best from the declared file.")
+    assert said.startswith("Best candidate, not named: self-heating (ends on a bound: ")
+    assert said.endswith(
+        "aesi run learns a correction of the remaining error; start it from the declared file."
+    )
     named = discoveries.next_finding(view.discovery | {"effects": ["self_heating"]})
     assert named.startswith("Next: ")
-    assert named.endswith("aesi run learns what is left.")
+    assert named.endswith("aesi run learns a correction of the remaining error.")
     assert discoveries.next_finding(views.discovery_view(200).discovery) == ""
-    assert "models of measured cells have an error of some 9 mV" in discoveries.reason_finding(view.discovery)
+    assert "models of measured cells have errors of some 9 mV" in discoveries.reason_finding(view.discovery)
 
 
 def test_the_closest_rival_of_a_finding_is_named_with_its_distance(views):

@@ -195,5 +195,5 @@ def test_a_run_took_a_dead_temperature_without_a_word(tmp_path, column_degc, tol
     ]
     assert bool(said) == told
     for note in said:
-        assert note.startswith("drive: its voltage contradicts its temperature. At 0 degC")
+        assert note.startswith("drive: its voltage contradicts its temperature. The error of ")
         assert note.endswith("(in an experiment file: data.columns, data.units).")

@@ -72,8 +72,8 @@ def test_a_contact_that_good_records_have_too_was_found_as_a_difference(cell, tr
     good, other = erring("good", 1, effects=in_both), erring("other", 2, effects=in_both)
     found = discover(cell, [other], soc0=0.9, effects=tried, good=[good])
     assert (found.verdict.word, found.verdict.effects) == ("none", ())
-    (note,) = (note for note in found.notes if "taken as what all share" in note)
-    assert note.startswith("series_resistance in all records says")
+    (note,) = (note for note in found.notes if "taken as common to all" in note)
+    assert note.startswith("series_resistance gains ")
 
 
 def test_a_contact_beyond_that_of_the_good_records_has_the_size_of_the_difference(cell, tried, erring):
@@ -232,7 +232,7 @@ def test_what_leaves_more_than_the_good_records_has_to_say_it_at_that_error(monk
     verdict = judged_beside(path, Thresholds())
     assert (verdict.word, verdict.effects) == ("unknown", named)
     assert verdict.structured_v == (8e-3 if named else 16e-3)
-    assert ("8.0 mV after" in verdict.reason) == bool(named)
+    assert ("8.0 mV with it" in verdict.reason) == bool(named)
     # Without a name the confidence of `unknown` is read off the logarithm of what is left over what may be, 16 over
     # 4 mV with 0.6 that right hypotheses leave anyway, and what two records of a million rows each differ by.
     may_be = np.hypot(4.0, np.hypot(0.45, 0.4))
@@ -261,7 +261,7 @@ def test_what_an_age_says_as_well_is_a_look_alike_and_what_it_says_better_takes_
     other = of_one_age(named, gain, [worse, better])
     assert (other.word, other.effects, other.confidence_sets) == ("unknown", (), ())
     assert other.aged == ("lithium_inventory_loss",)
-    assert "30.0 nats more" in other.reason
+    assert "30.0 nats higher" in other.reason
     assert "leave out --good" in other.reason
 
 
@@ -278,7 +278,7 @@ def test_where_nothing_is_named_an_age_that_says_enough_is_told():
     left = Verdict("unknown", (), (), 0.0, 8e-3, 4e-3, "left", margin=0.7)
     told = of_one_age(left, said("nothing", 0.0), [said("lithium_inventory_loss", 30.0)])
     assert (told.word, told.effects, told.aged) == ("unknown", (), ("lithium_inventory_loss",))
-    assert "than no effect does" in told.reason
+    assert "than no effect, and" in told.reason
     assert of_one_age(left, said("nothing", 0.0), []) == left
 
 

@@ -86,15 +86,16 @@ def test_what_said_more_of_unseen_data_and_was_not_taken_had_no_reason():
     )
     more = fitted(("series_resistance", "porosity"), 103.9, 91.0)
     assert refused(path, more) == (
-        "3.9 nats better on unseen data than what was chosen, no more than the 5.0 that chance may give one more effect"
+        "scores 3.9 nats higher on unseen data than the chosen hypothesis, but not by more than the 5.0 nats that "
+        "chance may give one more effect"
     )
     other = fitted(("porosity", "electrolyte_transport"), 100.7, 88.0)
     assert refused(path, other) == (
-        "0.7 nats better on unseen data than what was chosen, but 5.0 nats less plausible by its marginal likelihood, "
-        "with a price for each name"
+        "scores 0.7 nats higher on unseen data than the chosen hypothesis, but 5.0 nats lower in marginal likelihood, "
+        "which has a penalty for each effect"
     )
     assert refused(path, fitted(("porosity",), 99.0, 95.0)) == (
-        "1.0 nats worse on unseen data than what was chosen"
+        "scores 1.0 nats lower on unseen data than the chosen hypothesis"
     )
 
 

@@ -106,7 +106,7 @@ def test_what_needs_declared_parameters_that_no_cell_has_is_unknown(path):
     far = replace(path, chosen=replace(path.chosen, point=point, score=score))
     told = consistent(far, verdict)
     assert (told.word, told.effects, told.groups, told.margin) == ("unknown", (), (), 0.0)
-    assert "ocv_hysteresis explains the data only with solid_diffusivity further" in told.reason
+    assert "ocv_hysteresis explains the data only if solid_diffusivity is further" in told.reason
     covariance[place, place] = 2.0**2  # may as well be as declared
     assert consistent(far, verdict) == verdict
 
@@ -245,8 +245,8 @@ def test_at_one_current_there_are_no_ranges_of_it_and_own_parameters_are_not_wri
     assert of_refit(declared, [moved], [moved], moved.state) is None
     third = replace(declared, state=replace(declared.state), left_out=LeftOut((0.5,), (0.5,)))
     why = of_refit(declared, [moved], [moved, third], third.state)  # it was written without a reason
-    assert why.startswith(f"the recalibrated model: {UNTESTED}; written is another fit of its parameters")
-    assert "leaves 500.0 mV of data left out, the declared model 1000.0" in why
+    assert why.startswith(f"the recalibrated model: {UNTESTED}; model/ holds another fit of its parameters")
+    assert "left-out data is 500.0 mV (1000.0 mV with the declared model)" in why
     named = replace(moved, state=replace(moved.state, hypothesis=("ambient_temperature",)))
     assert written(declared, [moved], [named]) == (declared.state, f"ambient_temperature: {UNTESTED}")
 
@@ -355,7 +355,7 @@ def test_what_is_written_is_never_far_worse_than_another_model_on_a_record_left_
     assert written(nearly, [cold, both])[0] is nearly.state
     state, why = written(declared, [both], [cold])
     assert state is both.state
-    assert "another model leaves less on records left out" in str(why)
+    assert "another model has a smaller error on left-out records" in str(why)
     named = option(5.2, 38.5)  # within 5 % of the best on either
     assert written(declared, [option(5.4, 38.0)], [named]) == (named.state, None)
     refined = option(4.0, 20.0)  # what was named, with the own parameters open
@@ -387,10 +387,10 @@ def test_effects_that_stand_in_are_written_where_they_leave_less_and_are_said_to
     assert written(declared, [plain, option(16.0, "series_resistance")])[0] is plain.state
     (said,) = stand_ins(more.state, ())
     assert "series_resistance" in said
-    assert "is not shown" in said
+    assert "does not show that the cell lacks it" in said
     assert stand_ins(more.state, ("series_resistance",)) == stand_ins(plain.state, ()) == ()
     _, why = written(declared, [more], [option(19.9, "ocv_hysteresis")])
-    assert "recalibrated model with series_resistance, which leaves 9.0 mV there" in str(why)
+    assert "recalibrated model with series_resistance, whose error on left-out data is 9.0 mV" in str(why)
 
 
 def test_what_does_harm_in_a_range_of_charge_is_not_written(path):
@@ -406,7 +406,9 @@ def test_what_does_harm_in_a_range_of_charge_is_not_written(path):
     assert written(declared, [option(21.5, 9.0, 29.0)])[0] is declared.state  # as good
     assert written(declared, [harmful, may_err])[0] is may_err.state
     assert written(declared, [chance])[0] is chance.state
-    assert "worse than the declared model in a range of charge" in str(written(declared, [], [harmful])[1])
+    assert "larger than that of the declared model in a range of charge" in str(
+        written(declared, [], [harmful])[1]
+    )
     assert written(declared, [], [harmful, may_err]) == (may_err.state, None)
 
 

@@ -65,7 +65,7 @@ def test_a_model_was_written_that_made_up_for_a_dead_temperature(cell, make):
     moved = ModelState(problem, {"soc0": {"0": 0.91}})
     fault = fitted_at_fault(moved, others)
     assert fault.startswith("what was fitted at 0 degC leaves")
-    assert fault.endswith("it makes up for a temperature that the record contradicts")
+    assert fault.endswith("the fit compensates for a temperature that the record contradicts")
     assert fitted_at_fault(ModelState(problem), others) is None  # nothing was fitted
     as_good = {0: replace(others[0], there_v=others[0].left_v)}
     assert fitted_at_fault(moved, as_good) is None
@@ -77,7 +77,7 @@ def test_a_model_was_written_that_made_up_for_a_dead_temperature(cell, make):
 def test_a_temperature_that_the_record_contradicts_is_told(cell, make):
     found = discover(cell, [warm_record(cell, make, 0.0)], soc0=0.9, effects=TRIED)
     assert found.other_temperature == ("made",)
-    assert found.warnings[0].startswith("made: its voltage contradicts its temperature. At 0 degC")
+    assert found.warnings[0].startswith("made: its voltage contradicts its temperature. The error of ")
     fitted = next(f for f in found.files if f.part == "fit")
     assert np.array_equal(fitted.voltages["after"], fitted.voltages["before"])
     assert "the voltage of made contradicts its temperature" in short_finding(discovery_content(found))
@@ -105,7 +105,7 @@ def test_a_dead_temperature_of_a_record_that_judges_was_taken_without_a_word(cel
     dead = replace(right, temperature_degc=np.zeros(len(right)), name="judge", time_s=right.time_s + 1e6)
     found = discover(cell, [right], [dead], soc0=0.9, effects=TRIED)
     assert found.other_temperature == ("judge",)
-    assert found.warnings[0].startswith("judge: its voltage contradicts its temperature. At 0 degC")
+    assert found.warnings[0].startswith("judge: its voltage contradicts its temperature. The error of ")
     well = discover(
         cell, [right], [replace(dead, temperature_degc=right.temperature_degc)], soc0=0.9, effects=TRIED
     )

@@ -107,7 +107,7 @@ def test_a_difference_far_above_the_noise_was_told_as_a_power_of_ten():
 
 
 def test_a_model_of_an_unknown_was_said_to_explain_the_data():
-    assert _likelier(explained(("a",), 100.0)).endswith(" explains these data with fewer or likelier names")
+    assert _likelier(explained(("a",), 100.0)).endswith(" explains these data with fewer or likelier effects")
     assert "neither model explains the data" in _likelier(explained(("a",), 100.0, word="unknown"))
 
 
@@ -152,4 +152,4 @@ def test_the_porous_electrode_is_not_searched_where_the_single_particle_ends_far
         _, choice = with_model(problem, None, search, lambda problem, other: None, 3)
     assert asked == [("espm", 0.0), ("espm", 2e-3)]
     assert choice.model == "espm"
-    assert "which leaves far more than the two differ by" in choice.sentence
+    assert "whose error is far larger than the difference of the two models" in choice.sentence

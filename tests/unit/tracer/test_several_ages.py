@@ -83,7 +83,9 @@ def test_errors_were_told_of_a_model_of_several_ages_that_nobody_can_write(cell,
     records = [discharge(0.9, name="later"), discharge(name="first")]
     own = {name: few[name] for name in ("voltage_sensor_offset", "solid_diffusivity")}
     found = discover(cell, records, soc0=1.0, holdout=0.0, effects=own, model="espm", max_effects=0)
-    assert any("later" in note and "the model that is written has the file's" in note for note in found.notes)
+    assert any(
+        "later" in note and "the written model has the file's capacity" in note for note in found.notes
+    )
     values = {(one.owner, one.name): one.value for one in found.own["recalibrated"]}
     assert values[CAPACITY_SHARE, "later"] == pytest.approx(0.9, abs=0.03)
     effects = [

@@ -36,7 +36,7 @@ def test_what_explains_the_data_and_not_the_test_part_is_contradicted(word, effe
     (sentence,) = warnings([outcome(wrong)], said)
     assert "2.00 mV" in sentence
     assert "0.60 mV" in sentence
-    assert ("what was found" in sentence) == bool(effects)
+    assert ("the finding" in sentence) == bool(effects)
 
 
 def test_nothing_contradicts_an_unknown_or_a_discovery_without_a_test_part():
@@ -64,28 +64,33 @@ def test_a_test_part_on_which_the_model_runs_empty_is_not_said_to_lack_physics()
     emptied = replace(outcome(0.9), emptied_s={"after": 320.0})
     first, *_ = warnings([emptied], verdict("found", "series_resistance"))
     assert "The model runs empty or full on drive at 320 s: check capacity" in first
-    assert "Something else" not in first
+    assert "Another effect" not in first
 
 
 def test_a_written_model_that_does_worse_than_others_is_told_with_each_of_them():
     (one,) = warnings([outcome(7e-3)], verdict("unknown"))
-    assert "leaves 7.00 mV, the recalibrated model 5.00 mV: do not use it there." in one
+    assert (
+        "is 7.00 mV with the written model and 5.00 mV with the recalibrated model: do not use the model in model/ on"
+        in one
+    )
     (both,) = warnings([outcome(12e-3)], verdict("unknown"))
-    assert "the declared model 9.00 mV and the recalibrated model 5.00 mV" in both
+    assert "and 9.00 mV with the declared model and 5.00 mV with the recalibrated model" in both
     assert warnings([outcome(5e-3)], verdict("unknown")) == ()
     (hardly,) = warnings([outcome(5.02e-3)], verdict("unknown"))
-    assert hardly == "on the test part the written model leaves 5.02 mV, the recalibrated model 5.00 mV."
+    assert hardly == (
+        "the RMSE on the test part is 5.02 mV with the written model and 5.00 mV with the recalibrated model."
+    )
 
 
 def test_a_written_model_that_is_worse_than_declared_on_what_was_fitted_was_not_told_of():
     fitted = outcome(9.4e-3, part="fit")
     (sentence,) = warnings([fitted, outcome(4e-3)], verdict("unknown"))
     assert sentence == (
-        "on the part that was fitted the written model leaves 9.40 mV of the rows as measured, the declared model "
-        "9.00 mV and the recalibrated model 5.00 mV."
+        "the RMSE on the fitted part, of the rows as measured, is 9.40 mV with the written model and 9.00 mV with the "
+        "declared model and 5.00 mV with the recalibrated model."
     )
     (refit,) = warnings([outcome(7e-3, part="fit"), outcome(4e-3)], verdict("unknown"))
-    assert "leaves 7.00 mV of the rows as measured, the recalibrated model 5.00 mV." in refit
+    assert "is 7.00 mV with the written model and 5.00 mV with the recalibrated model." in refit
     assert warnings([outcome(5.2e-3, part="fit"), outcome(4e-3)], verdict("found", "film_growth"))[1:] == ()
     assert warnings([outcome(9e-3, part="fit"), outcome(4e-3)], verdict("unknown")) == ()
 
@@ -109,8 +114,9 @@ def test_resampled_blocks_of_steady_errors_have_the_gain_of_all_rows():
 def test_a_declared_model_that_is_written_unchanged_was_warned_of_as_if_it_were_another():
     (sentence,) = warnings([outcome(9e-3)], verdict("unknown"))
     assert sentence == (
-        "on the test part the declared model, which is what is written, leaves 9.00 mV, the recalibrated model 5.00 mV."
+        "the RMSE on the test part is 9.00 mV with the declared model, which model/ holds, and 5.00 mV with the "
+        "recalibrated model."
     )
     (refitted,) = warnings([outcome(5e-3, before_v=4e-3)], verdict("unknown"))
-    assert "the recalibrated model, which is what is written, leaves 5.00 mV" in refitted
-    assert refitted.endswith("do not use it there.")
+    assert "is 5.00 mV with the recalibrated model, which model/ holds," in refitted
+    assert refitted.endswith("do not use the model in model/ on such data.")

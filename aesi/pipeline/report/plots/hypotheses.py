@@ -26,12 +26,15 @@ def ranking_figure(candidates: Sequence[Row], titles: Mapping[str, str], chosen:
     rows = sorted(candidates, key=lambda row: -row["score"])[:MOST_HYPOTHESES]
     best = max(rows[0]["score"], 0.0)
     caption = (
-        "How much less each hypothesis says of data that it has not seen than the one that says most, in nats: 2.3 "
-        f"are odds of ten to one. In the shaded part, up to {ALIKE_NATS:g}, two say the same. A further name is added "
-        "only where it says more than chance would at its step, so that a hypothesis of more names may lie ahead of "
-        "the star. What stands beside another effect shares the score of both."
+        "Log-likelihood of unseen data under each hypothesis, as the distance behind the best one in nats: 2.3 nats "
+        f"are odds of ten to one. In the shaded part, up to {ALIKE_NATS:g} nats, the score does not distinguish "
+        "hypotheses. A further effect is added only where it gains more than chance would at its step, so that a "
+        "hypothesis with more effects may lie ahead of the chosen one (star). An effect that is shown beside another "
+        "has the score of both together."
     )
-    fig = style.figure("Hypotheses, behind the best", caption, max(240, 130 + 20 * (len(rows) + 1)))
+    fig = style.figure(
+        "Score of each hypothesis, behind the best", caption, max(240, 130 + 20 * (len(rows) + 1))
+    )
     behind = {_label(row, titles, chosen): best - row["score"] for row in rows} | {DECLARED: best}
     kinds = {row["kind"] for row in rows}
     for kind in (*KIND_ORDER, *sorted(kinds - set(KIND_ORDER))):
@@ -45,7 +48,7 @@ def ranking_figure(candidates: Sequence[Row], titles: Mapping[str, str], chosen:
     fig.add_vrect(x0=LEAST_NATS / 2.0, x1=ALIKE_NATS, fillcolor=style.GREY, opacity=0.12, line_width=0)
     most = max(*behind.values(), 10.0 * LEAST_NATS)
     fig.update_xaxes(
-        title_text="Behind the best, nats",
+        title_text="score behind the best, nats",
         type="log",
         range=[float(np.log10(LEAST_NATS / 2.0)), float(np.log10(2.0 * most))],
         dtick=1,
@@ -82,7 +85,9 @@ def _add_dots(
 
 def files_figure(files: Sequence[Row], labels: Mapping[str, str]) -> Figure:
     """RMSE of each file before, recalibrated and after."""
-    caption = "RMSE of the voltage on each file; files marked test chose nothing."
+    caption = (
+        "RMSE of the voltage on each file; files marked test are held out: no fit and no choice used them."
+    )
     fig = style.figure("Error by file", caption, max(220, 130 + 46 * len(files)))
     names = [f"{row['name']} ({row['part']})" for row in files][::-1]
     symbols = {"before": "circle", "recalibrated": "square", "after": "diamond"}

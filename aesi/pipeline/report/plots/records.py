@@ -120,7 +120,7 @@ def residual_figure(traces: Sequence[DiscoveryTrace], labels: Mapping[str, str])
     fig.update_yaxes(title_text="current, A", row=2)
     fig.update_yaxes(title_text="residual, mV", zeroline=True, row=3)
     fig.update_xaxes(title_text=time_title(placed, unit), row=3)
-    part = "data that chose nothing" if traces[0].part == "test" else "the data the loop was fitted on"
+    part = "held-out data" if traces[0].part == "test" else "the fitted data"
     caption = (
         f"Voltage measured, {' and '.join(dict.fromkeys(labels[state] for state in first_and_last))}; "
         f"current, positive on discharge; residual (measured minus model), on {part}."

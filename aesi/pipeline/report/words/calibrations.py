@@ -23,8 +23,8 @@ def open_line(content: Mapping[str, Any]) -> str:
     heaviest = list(dict.fromkeys(max(o["weights"], key=lambda name: abs(o["weights"][name])) for o in left))
     named = ", ".join(heaviest[:NAMED_OPEN]) + (" and others" if len(heaviest) > NAMED_OPEN else "")
     return (
-        f"these records tell {len(content['parameters']) - len(left)} of {len(content['parameters'])} combinations of "
-        f"parameters better than their priors do; the others ({named}) stay near the priors"
+        f"these records determine {len(content['parameters']) - len(left)} of {len(content['parameters'])} "
+        f"combinations of parameters better than their priors do; the others ({named}) stay near the priors"
     )
 
 
@@ -58,9 +58,9 @@ def _files(content: Mapping[str, Any]) -> list[str]:
         "|---|---|---|---|---|---|",
         *rows,
         "",
-        "Errors are RMSE on the data that were fitted: after, each record with what it has of its own (its capacity "
-        "over the file's, its start, its current sensor's offset); as simulated, the file as it is on the current as "
-        "measured.",
+        "Errors are RMSE on the data that were fitted: after, with the capacity (over the file's), initial state and "
+        "offset of the current sensor that were fitted to this record alone; as simulated, the file as it is, with the "
+        "current as measured.",
     ]
 
 
@@ -85,8 +85,8 @@ def _parameters(content: Mapping[str, Any]) -> list[str]:
         for p in best_known_first(content)
     ]
     return [
-        "Of prior: the share of the prior's width that the records leave, the best known first; of 100 % they say "
-        "nothing.",
+        "Of prior: the width of the interval, as a share of the prior's; the best-determined parameter first. At 100 % "
+        "the records do not determine the parameter.",
         "",
         "| parameter | value | 95 % interval | unit | of prior, % | prior from |",
         "|---|---|---|---|---|---|",

@@ -11,7 +11,13 @@ from aesi.constants import MV_PER_V, SECONDS_PER_HOUR
 from aesi.numerics.typing import Array
 from aesi.pipeline.digits import decimals
 from aesi.pipeline.report.views import DiscoveryView, Row
-from aesi.pipeline.report.words.sizes import finding_line, refit_does_as_well, unexplained_by, with_size
+from aesi.pipeline.report.words.sizes import (
+    explain_part,
+    finding_line,
+    refit_does_as_well,
+    unexplained_by,
+    with_size,
+)
 from aesi.tracer.decide.written import AS_GOOD
 from aesi.tracer.likelihood.model_error import MEASURED_V
 
@@ -61,10 +67,10 @@ def _worse_on_fit(discovery: Mapping[str, Any]) -> str:
     if not left.keys() >= {"recalibrated", "after"} or _written_as(discovery) == "before":
         return ""
     worse = left["after"] > AS_GOOD * left["recalibrated"]
-    return f"{ALONE['recalibrated']} has the lower error on what was fitted" if worse else ""
+    return f"{ALONE['recalibrated']} has a lower error on the fitted part" if worse else ""
 
 
-ALONE = {"before": "the declared model", "recalibrated": "a refit alone"}
+ALONE = {"before": "the declared model", "recalibrated": "recalibration alone"}
 """State of the model -> words for it beside what is written."""
 
 
@@ -75,10 +81,10 @@ def _worse_on_test(discovery: Mapping[str, Any]) -> str:
     less = [state for state in ALONE if state in left and left[state] < left.get("after", 0.0)]
     if not less:
         return ""
-    verb = "errs" if len(less) == 1 else "err"
-    others = f"{listed([ALONE[state] for state in less])} {verb} less on the test part"
+    has = "has" if len(less) == 1 else "have"
+    others = f"{listed([ALONE[state] for state in less])} {has} a lower error on the test part"
     if _written_as(discovery) == "before":
-        return f"{others} than the declared model, which is what is written"
+        return f"{others} than the declared model, which model/ holds"
     if left["after"] > AS_GOOD * min(left[state] for state in less):
         return f"do not use the written model: {others}"
     return f"{others} than the written model"
@@ -94,18 +100,18 @@ def _left_mv(discovery: Mapping[str, Any], part: str) -> dict[str, float]:
 def _verdict(view: DiscoveryView) -> str:
     verdict, effects = view.discovery["verdict"], view.discovery["effects"]
     if verdict == "none":
-        return f'Nothing is missing from the declared model of "{view.cell}" that these data could show.'
+        return f'These data show nothing that the declared model of "{view.cell}" lacks.'
     if verdict == "unknown":
         rest = unexplained_by(view.discovery)
         if not effects:
-            return f'The declared model of "{view.cell}" misses something real{rest}.'
+            return f'The declared model of "{view.cell}" has a systematic error{rest}.'
         names = [with_size(effect, view.discovery, _title(view.titles, effect)) for effect in effects]
-        return f"Named in part: {listed(names)}. Something real is left{rest}."
+        return f"{raised(listed(names))} {explain_part(names)}. A systematic error remains{rest}."
     sure = name_confidence(view.discovery, view.titles)
     if refit_does_as_well(view.discovery):
         return (
-            f"One of two explanations: {_lowered(_named(view, effects))}{sure}; or the model's own parameters are off, "
-            "since a refit of them does as well on data that chose nothing."
+            f"One of two explanations: {_lowered(_named(view, effects))}{sure}; or the model's own parameters are off: "
+            "recalibrating them gives as low an error on the held-out data."
         )
     return f"{_named(view, effects)}{sure}."
 
@@ -161,7 +167,11 @@ def written_finding(discovery: Mapping[str, Any]) -> str:
         return f"model/ holds the model {WITH_FINDING}."
     if state is None:
         names = listed([_title({}, name) for name in discovery.get("written", discovery["effects"])])
-        beside = f" with {names}, in place of what no hypothesis explains" if names else ", by another fit"
+        beside = (
+            f" with {names}, in place of an error that no hypothesis explains"
+            if names
+            else ", by another fit"
+        )
         return f"model/ holds a recalibrated model{beside}."
     if state == "recalibrated":
         return "model/ holds the recalibrated model."
@@ -169,11 +179,11 @@ def written_finding(discovery: Mapping[str, Any]) -> str:
     if (why := discovery.get("not_adopted")) is not None:
         return f"{text}. Not adopted: {why}."
     if discovery["verdict"] == "unknown":
-        return f"{text}: no fit of these data carries over well enough to take its place."
+        return f"{text}: no fit predicts data that were left out of it well enough to replace it."
     return f"{text}."
 
 
-UNSEEN = "pieces of the data that were left out of the fit in turn"
+UNSEEN = "in cross-validation (each piece of the data predicted by a fit to the others)"
 """Words for the data by which hypotheses are judged: their errors are larger than those of the fit."""
 
 
@@ -181,24 +191,24 @@ def reason_finding(discovery: Mapping[str, Any]) -> str:
     """A sentence on what the verdict rests on: the error left beyond the noise against what any such model may
     leave."""
     left, allowed = discovery["structured_mv"], discovery["tolerance_mv"]
-    amount = f"{left:.2f} mV of voltage error beyond the noise of the sensors are left on {UNSEEN}"
+    amount = f"the voltage error beyond sensor noise is {left:.2f} mV {UNSEEN}"
     if discovery["verdict"] == "none":
         return (
-            f"Why: {amount}. Up to {allowed:.2f} mV are what the noise and the accuracy of any "
-            "such model leave open, so these data give no reason to change it."
+            f"Why: {amount}. The noise and the accuracy of any such model account for up to {allowed:.2f} mV, so "
+            "these data give no reason to change the model."
         )
     if discovery["verdict"] == "found":
-        return f"Why: with the finding added {amount}; up to {allowed:.2f} mV count as explained."
+        return f"Why: with the finding added, {amount}; up to {allowed:.2f} mV count as explained."
     if left > allowed:
-        found = "with what was found added, " if discovery["effects"] else ""
-        why = f"Why: {found}{amount}, and no more than {allowed:.2f} mV would count as explained."
+        found = "with the finding added, " if discovery["effects"] else ""
+        why = f"Why: {found}{amount}; only up to {allowed:.2f} mV would count as explained."
         return f"{why} {OF_MEASURED}" if _tried(discovery) else why
     return f"Why: {discovery['reason']}."
 
 
 OF_MEASURED = (
-    "Expect an unknown of a measured cell by itself: models of measured cells have an error of some "
-    f"{MV_PER_V * MEASURED_V:.0f} mV, and a name beside it explains what exceeds that."
+    "A measured cell nearly always ends as unknown without a known-good record: models of measured cells have errors "
+    f"of some {MV_PER_V * MEASURED_V:.0f} mV. An effect that is named all the same explains only what exceeds these."
 )
 """Sentence on a verdict of `unknown`, which measured cells nearly always have."""
 
@@ -209,14 +219,14 @@ def next_finding(discovery: Mapping[str, Any], titles: Mapping[str, str] | None 
         return ""
     rows = [] if discovery["effects"] else discovery["candidates"]
     best = max(rows, key=lambda row: float(row["score"]), default=None)
-    nearest = "" if best is None else f"Nearest, but not named: {hypothesis_title(best, titles or {})}"
+    nearest = "" if best is None else f"Best candidate, not named: {hypothesis_title(best, titles or {})}"
     remark = best.get("remark") if best else ""
     nearest += f" ({remark})" if remark else ""
     return (
-        f"{nearest}{'. ' if nearest else ''}Next: data of another kind (a slow discharge, pulses with rests, another "
-        "temperature) would narrow it down, and with a known-good record of the cell (--good) the verdict can be "
-        "'found' or 'none'; aesi run learns what is left"
-        f"{'' if discovery['effects'] else ', best from the declared file'}."
+        f"{nearest}{'. ' if nearest else ''}Next: add data of another kind (a slow discharge, pulses with rests, "
+        "another temperature) to narrow down the cause, or a known-good record of the cell (--good), with which the "
+        "verdict can be 'found' or 'none'. aesi run learns a correction of the remaining error"
+        f"{'' if discovery['effects'] else '; start it from the declared file'}."
     )
 
 
@@ -240,7 +250,7 @@ def span_finding(view: DiscoveryView) -> str:
     )  # + 0.0: a rounded-away minus says nothing
     return (
         f"The data span {hours:.1f} h, {round(100 * soc[0])} to {round(100 * soc[1])} % state of charge and currents "
-        f"from {least:g} to {most:g} A (discharge positive); nothing is said beyond them."
+        f"from {least:g} to {most:g} A (discharge positive); the verdict holds only within these ranges."
     )
 
 
@@ -286,7 +296,7 @@ def discovery_consequence(view: DiscoveryView) -> str:
     that were fitted where there are none; what a finding brings is the step from the refit to it."""
     discovery = view.discovery
     part = "test" if _left_mv(discovery, "test") else "fit"
-    where = {"test": "on data that chose nothing", "fit": "on the data that were fitted"}[part]
+    where = {"test": "on held-out data", "fit": "on the fitted data"}[part]
     words = states_of(discovery)
     errors = {state: (discovery.get(state) or {}).get(part, {}).get("rmse_mv") for state in words}
     told = [f"{error:.1f} mV {words[state]}" for state, error in errors.items() if error is not None]
@@ -332,7 +342,7 @@ def closest_finding(view: DiscoveryView) -> str:
     ]
     behind = max(ours) - closest["score"]
     if behind <= 0.0:
-        return f"{listed(names)} scores {-behind:.1f} nats higher and was not taken; its remark says why."
+        return f"{listed(names)} scores {-behind:.1f} nats higher, but was not chosen: see its remark in the table."
     return f"No other hypothesis explains these data as well: {listed(names)} comes closest, {behind:.1f} nats behind."
 
 
@@ -340,20 +350,20 @@ def rest_finding(discovery: Mapping[str, Any]) -> str:
     """A sentence on what a data-driven correction could still explain of the fitted data, from which it is learnt."""
     rest, after = discovery["explainable_mv"], discovery.get("after", {}).get("fit", {}).get("rmse_mv")
     if rest is None:
-        return "What a flexible correction could still explain is not known: these data are too few for one."
-    text = f"A flexible correction learnt on what is left could still explain {rest:.1f} mV"
+        return "How much a flexible correction could still explain is not known: these data are too few to learn one."
+    text = f"A flexible correction, learnt from the remaining error, could still explain {rest:.1f} mV"
     if not after:
         return text + "."
-    text += f" of the {after:.1f} mV on the data that were fitted: "
+    text += f" of the {after:.1f} mV on the fitted data: "
     if rest > LARGE_SHARE * after:
-        return text + "much structure is left for physics to name."
+        return text + "much of the remaining error is systematic, and missing physics may explain it."
     if discovery["structured_mv"] > discovery["tolerance_mv"]:
         return (
             text
-            + "what is left is more than noise, but follows none of the model's variables in a way that carries "
-            "over to unseen data. That points to an instrument, or to a state that the model does not have."
+            + "the remaining error exceeds the noise, but no function of the model's variables predicts it on "
+            "unseen data. That points to a fault of an instrument, or to a state that the model lacks."
         )
-    return text + "little structure is left for physics to name."
+    return text + "little systematic error remains for missing physics to explain."
 
 
 def listed(names: Sequence[str]) -> str:

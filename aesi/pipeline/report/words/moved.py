@@ -7,7 +7,7 @@ from typing import Any
 
 from aesi.pipeline.report.views import Row
 from aesi.pipeline.report.words.discoveries import WITH_FINDING, listed, raised, states_of
-from aesi.pipeline.report.words.sizes import PERCENT, TELLING, name_words, resized, rounded
+from aesi.pipeline.report.words.sizes import PERCENT, TELLING, name_words, resized, rounded, two_digits
 
 MOST_NAMED = 3
 """Parameters that one sentence names."""
@@ -21,7 +21,7 @@ OF_A_RECORD = {
 """Owner of a parameter that belongs to a record -> words in place of an effect."""
 PURE = ("dimensionless", "1")
 """Units of plain numbers: of a parameter of an effect, of one of a record."""
-RECALIBRATING, BESIDE, WRITTEN = "Recalibrating", "Beside the finding the fit", "The model that is written"
+RECALIBRATING, BESIDE, WRITTEN = "Recalibration", "The fit with the finding", "The fit of the written model"
 
 
 def moved_findings(discovery: Mapping[str, Any]) -> list[str]:
@@ -42,38 +42,36 @@ def resized_finding(discovery: Mapping[str, Any]) -> str:
         return ""
     found, there = (listed([f"{name} {sizes_of[place]}" for name, *sizes_of in sizes]) for place in (1, 0))
     return (
-        f"Two fits, two sizes: the finding, with the file's parameters as declared, is {found}; model/, with them "
-        f"refitted as well, has {there}."
+        f"The finding and model/ differ in size: {found} in the finding, where the file's parameters are as declared; "
+        f"{there} in model/, where they are refitted as well."
     )
 
 
 def _sentence(words: str, rows: Sequence[Row]) -> str:
     furthest = [row for row in rows if abs(row["deviations"]) > TELLING]
     if not furthest:
-        return f"{words} moves no declared parameter by more than a standard deviation of what it allows it."
+        return f"{words} moves no declared parameter by more than one standard deviation of its prior in this fit."
     named = "; ".join(_moved(row) for row in furthest[:MOST_NAMED])
     rest = len(furthest) - MOST_NAMED
     more = f"; and {rest} more" if rest > 0 else ""
     text = f"{words} moves {named}{more}."
     ended = [parameter_words(row) for row in rows if row["at_limit"]]
     if ended:
-        limit = "its limit, so that its value is the limit's"
-        if len(ended) > 1:
-            limit = "their limits, so that their values are the limits'"
-        text += f" {raised(listed(ended))} stopped at {limit}, not the data's."
+        bound = "its bound, and its value is" if len(ended) == 1 else "their bounds, and their values are"
+        text += f" {raised(listed(ended))} ended on {bound} not determined by the data."
     return text
 
 
 def _moved(row: Row) -> str:
-    times = f"{abs(row['deviations']):.1f} standard deviations, one of which is {deviation_words(row)} in this fit"
+    times = f"{abs(row['deviations']):.1f} standard deviations of {deviation_words(row)} each"
     return f"{parameter_words(row)} {'by' if _is_change(row) else 'to'} {moved_value(row)} ({times})"
 
 
 def deviation_words(row: Row) -> str:
     """Words for one standard deviation of what a fit allows a parameter: '0.30 mV', '26 %' of a factor."""
     if row["unit"] == "dimensionless" and row["declared"] == 1.0:
-        return f"{PERCENT * row['one_sd']:.2g} %"
-    return f"{row['one_sd']:.2g}" if row["unit"] in PURE else rounded(row["one_sd"], row["unit"])
+        return f"{two_digits(PERCENT * row['one_sd'])} %"
+    return two_digits(row["one_sd"]) if row["unit"] in PURE else rounded(row["one_sd"], row["unit"])
 
 
 def _is_change(row: Row) -> bool:

@@ -62,8 +62,8 @@ def _ran_out(view: RunView) -> str:
         return ""
     where = " and ".join(f"{name} at {stamp(at_s)} s" for name, at_s in records.items())
     text = (
-        f"; a simulation runs empty or full on {where}, from where on an error says that it ran out, not by how much "
-        "the model is off"
+        f"; a simulation runs empty or full on {where}, from where on its error shows only that it ran out, not how "
+        "accurate it is"
     )
     left = {
         name: error
@@ -181,7 +181,8 @@ def constant_finding(view: RunView) -> str:
     ours = _figure(view.model(view.chosen), "free_run", "test_rmse_mv")
     if row is None or row["name"] == view.chosen or error is None or ours is None:
         return ""
-    return f"The mean error of the training records, added as a constant, leaves {_told(error, ours)[0]} mV there."
+    left = _told(error, ours)[0]
+    return f"The mean error of the training records, added as a constant, gives an RMSE of {left} mV there."
 
 
 def others_finding(view: RunView) -> str:

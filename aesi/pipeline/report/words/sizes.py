@@ -123,7 +123,12 @@ def rounded(value: float, unit: str) -> str:
     factor = 1.0
     if unit in PREFIXES and abs(value) < SMALL:
         unit, factor = PREFIXES[unit]
-    return f"{factor * value:.2g} {unit}"
+    return f"{two_digits(factor * value)} {unit}"
+
+
+def two_digits(value: float) -> str:
+    """A number to two digits, without an exponent where it is large: '170' and not '1.7e+02'."""
+    return f"{float(f'{value:.2g}'):g}"
 
 
 def finding_line(discovery: Mapping[str, Any]) -> str:
@@ -131,25 +136,30 @@ def finding_line(discovery: Mapping[str, Any]) -> str:
     effects = [with_size(effect, discovery) for effect in discovery["effects"]]
     verdict = discovery["verdict"]
     if verdict == "none":
-        return "none: nothing is missing that these data could show"
+        return "none: these data show nothing that the declared model lacks"
     if verdict == "unknown":
-        explain = "explains" if len(effects) == 1 else "explain"
-        named = f"{', '.join(effects)} {explain} a part; " if effects else ""
-        return f"unknown: {named}something real is left{unexplained_by(discovery)}"
+        remains = "a systematic error remains"
+        named = f"{', '.join(effects)} {explain_part(effects)}; " if effects else ""
+        return f"unknown: {named}{remains}{unexplained_by(discovery)}"
     if refit_does_as_well(discovery):
-        return f"one of two explanations: {', '.join(effects)}; or the model's own parameters, whose refit does as well"
+        return f"one of two explanations: {', '.join(effects)}; or the model's own parameters, whose refit fits as well"
     return f"found: {', '.join(effects)}"
 
 
+def explain_part(names: Sequence[str]) -> str:
+    """The predicate of effects that are named with an `unknown`."""
+    return f"{'explains' if len(names) == 1 else 'explain'} a part of the error"
+
+
 def unexplained_by(discovery: Mapping[str, Any]) -> str:
-    """Words after 'something real': ' that no effect of the catalogue explains', or which of them were tried, or
-    that the good records beside the others seem to be of another age."""
+    """Words after 'a systematic error remains': ' that no effect of the catalogue explains', or which of them were
+    tried, or that the good records beside the others seem to be of another age."""
     aged = discovery.get("of_another_age", ())
     if aged:
         return f" that {aged[0].replace('_', ' ')} explains if the good records are of another age"
     tried = discovery.get("tried", CATALOGUE)
     if not tried:
-        return "; no effect was tried on it"
+        return "; no effect was tried"
     if set(tried) >= {name for name, effect in CATALOGUE.items() if effect.refines is None}:
         return " that no effect of the catalogue explains"
     if len(tried) == 1:
