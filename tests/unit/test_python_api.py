@@ -182,7 +182,7 @@ def test_a_discovery_that_kept_nothing_back_showed_errors_that_are_no_number(
     shown, page = repr(found), (found.save(tmp_path) / "report.html").read_text()
     assert "RMSE, free run, fit" in page
     assert "RMSE, free run, test" not in page
-    assert shown.endswith("mV after, on the data that were fitted)")
+    assert shown.endswith("mV after, on the fitted data)")
     assert "nan" not in shown
 
 
@@ -385,7 +385,7 @@ def test_spectra_were_fitted_by_the_command_line_alone(cell, record, tmp_path, m
     (read,) = read_spectra(tmp_path / "eis.csv")
     asked = []
 
-    def fitted(cell, records, conditions):
+    def fitted(cell, records, conditions, *, starts, seed):
         asked.append(conditions)
         return Answer()
 

@@ -591,9 +591,8 @@ def test_effects_lists_and_shows(call):
     code, out, _ = call("effects", "series_resistance")
     assert "resistance_ohm [ohm]" in out
     assert "Source: " in out
-    assert (
-        "\nLeaves out its dependence on temperature. Holds wherever" in out
-    )  # said once, not "Holds: Leaves out"
+    # said once, not "Holds: Leaves out"
+    assert "\nLeaves out its dependence on temperature. Holds where the drop follows" in out
 
 
 def test_data_lists_sets(call):

@@ -120,12 +120,12 @@ def test_the_claim_of_a_killed_process_is_free_at_once(tmp_path):
 
 def test_the_claim_of_a_silent_owner_is_taken_over(tmp_path, monkeypatch):
     monkeypatch.setattr(DatabaseOutcomes, "BEAT_S", 60.0)  # as good as dead
-    monkeypatch.setattr(DatabaseOutcomes, "STALE_S", 0.5)
+    monkeypatch.setattr(DatabaseOutcomes, "STALE_S", 2.0)
     url = f"sqlite:///{tmp_path}/outcomes.db"
     dead, alive = DatabaseOutcomes(url), DatabaseOutcomes(url)
     assert dead.claim(KEY)
     assert not alive.claim(KEY)
-    time.sleep(0.7)
+    time.sleep(2.2)
     assert alive.claim(KEY)
 
 

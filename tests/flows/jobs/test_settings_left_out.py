@@ -34,6 +34,8 @@ FULL = {
         "sign": None,
         "state_words": {},
         "duplicates": None,
+        "from_s": {},
+        "to_s": {},
         "virtual": VIRTUAL,
     },
     "cell": {

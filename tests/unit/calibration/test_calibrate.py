@@ -344,7 +344,7 @@ def test_a_double_layer_that_no_cell_has_was_written_without_a_word(found):
     assert warning.startswith(
         "negative.double_layer = 66.7 F/m2 (3.5 standard deviations above 1): the records contra"
     )
-    assert "it rather stands in for something that the model lacks" in warning
+    assert "for something that the model lacks; search for missing effects with aesi discover" in warning
     free[at] = replace(free[at], given=True)  # a note says so
     told = copy(found.model)
     told.free = tuple(free)

@@ -64,7 +64,8 @@ def test_a_model_was_written_that_made_up_for_a_dead_temperature(cell, make):
     assert others[0].there_degc in (30.0, 40.0)
     moved = ModelState(problem, {"soc0": {"0": 0.91}})
     fault = fitted_at_fault(moved, others)
-    assert fault.startswith("what was fitted at 0 degC leaves")
+    assert fault.startswith("the error on made is ")
+    assert "with the fit at 0 degC" in fault
     assert fault.endswith("the fit compensates for a temperature that the record contradicts")
     assert fitted_at_fault(ModelState(problem), others) is None  # nothing was fitted
     as_good = {0: replace(others[0], there_v=others[0].left_v)}
