@@ -48,7 +48,7 @@ from aesi.calibration.start import (
     with_activation,
 )
 from aesi.constants import ZERO_CELSIUS_K
-from aesi.errors import DataError, FitError
+from aesi.errors import DataError, FitError, InputError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
 from aesi.physics.belongs import check_voltage, unlike
@@ -102,22 +102,25 @@ def calibrate(
     evaluations : most of each descent.  on_step : called at each step of a descent.
     starts : number of fits: one from the file, the others from cells drawn from the priors with `seed`. The end of the
     highest posterior density is taken, and a note says how far apart the ends are.
-    Raises DataError for records that do not belong to the cell; FitError where the start cannot be simulated.
+    Raises DataError for records that do not belong to the cell; FitError where the start cannot be simulated;
+    InputError for less than one start.
     """
     began = time.perf_counter()
     conditions = conditions or Conditions()
-    prepared_model, notes = problem(cell, records, conditions)
-    ends = _ends(prepared_model, starts, seed, evaluations, on_step)
+    if starts < 1:
+        raise InputError(f"starts = {starts}: give the number of fits, at least 1.")
+    start_model, notes = problem(cell, records, conditions)
+    ends = _ends(start_model, starts, seed, evaluations, on_step)
     model, x, found = ends[0].model, ends[0].x, ends[0].cell
     states = model.states(cell, x)
     scaled = model.jacobian(x) * information_weights(model, x)[:, None]
     covariance: Array = np.asarray(np.linalg.inv(scaled.T @ scaled), dtype=float)
     shares = capacities(model, x)
-    of_ends = told_of_ends([end.cost for end in ends], [intervals(model, end.x, covariance) for end in ends])
+    parameters = [intervals(model, end.x, covariance) for end in ends]
     return Calibration(
         cell=_with_what_it_is_of(found, cell, model, shares, conditions.dates),
         declared=cell,
-        parameters=intervals(model, x, covariance),
+        parameters=parameters[0],
         undetermined=undetermined(model, scaled),
         at_bounds=at_bounds(model, x),
         errors=_errors(model, states),
@@ -129,7 +132,7 @@ def calibrate(
             *_of_own(model, x),
             *_ran_out(model, states),
             *ends[0].of_heat,
-            *of_ends,
+            *told_of_ends([end.cost for end in ends], parameters),
         ),
         seconds=time.perf_counter() - began,
         model=model,
@@ -187,9 +190,12 @@ def _ends(model: Model, starts: int, seed: int, evaluations: int, on_step: OnSte
     ends: list[_End] = []
     for start in (np.zeros(model.layout.size), *np.clip(drawn, model.low, model.high)):
         one = copy(model)  # which takes thermal data of its own
-        if ends and not np.isfinite(one.residual(start)).all():
+        try:
+            x, cell, of_heat = _fitted_twice(_Told(one, on_step), evaluations, start)
+        except FitError:
+            if not ends:
+                raise
             continue
-        x, cell, of_heat = _fitted_twice(_Told(one, on_step), evaluations, start)
         residual = one.residual(x)
         ends.append(_End(one, x, cell, of_heat, 0.5 * float(residual @ residual)))
     return sorted(ends, key=lambda end: end.cost)

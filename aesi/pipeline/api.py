@@ -146,8 +146,6 @@ def calibrate(
     Raises AesiError, one sentence, for arguments or data that cannot be used.
     """
     check_soc(soc0)
-    if starts < 1:
-        raise InputError(f"starts = {starts}: give the number of fits, at least 1.")
     _check_by_name("temperatures_degc", temperatures_degc)
     _check_by_name("dates", dates)
     _check_priors(priors)

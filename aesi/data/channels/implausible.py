@@ -125,10 +125,14 @@ def check_scale(columns: Columns, context: Context) -> None:
     _check_pace(columns, context)
 
 
+def _charge_as(columns: Columns) -> Array:
+    """(n,) A s, charge since the first row, with the current constant since the row before."""
+    return np.append(0.0, np.cumsum(columns["current_a"][1:] * np.diff(columns["time_s"])))
+
+
 def _moved_ah(columns: Columns) -> float:
     """Range of the charge over the record, Ah."""
-    moved = columns["current_a"][1:] * np.diff(columns["time_s"])
-    return float(np.ptp(np.cumsum(np.append(0.0, moved)))) / SECONDS_PER_HOUR
+    return float(np.ptp(_charge_as(columns))) / SECONDS_PER_HOUR
 
 
 def _check_slide(columns: Columns, context: Context, moved_ah: float, resistance_ohm: float) -> None:
@@ -373,7 +377,7 @@ def _explained(columns: Columns, sign: float) -> float:
     """
     time, current, voltage = columns["time_s"], columns["current_a"], columns["voltage_v"]
     stride = max(1, len(time) // TREND_POINTS)
-    charge = np.concatenate([[0.0], np.cumsum(current[1:] * np.diff(time))])
+    charge = _charge_as(columns)
     whole = len(time) // stride * stride
     moved = [np.diff(each[:whole].reshape(-1, stride).mean(axis=1)) for each in (current, charge, voltage)]
     sizes = [float(np.linalg.norm(each)) for each in moved]
