@@ -132,7 +132,9 @@ def calibrate(
             *_of_own(model, x),
             *_ran_out(model, states),
             *ends[0].of_heat,
-            *told_of_ends([end.cost for end in ends], parameters),
+            *told_of_ends(
+                [end.cost for end in ends], parameters, [end.from_file for end in ends].index(True)
+            ),
         ),
         seconds=time.perf_counter() - began,
         model=model,
@@ -171,7 +173,8 @@ class _End:
     """The end of the descents from one start.
 
     model : with the thermal data that it was fitted with.  cell : fitted.  of_heat : sentences on its thermal data.
-    cost : minus the logarithm of the posterior density, up to a constant, nats.
+    cost : minus the logarithm of the posterior density, up to a constant, nats.  from_file : True where the start file
+    is where it began, not a cell drawn from the priors.
     """
 
     model: Model
@@ -179,6 +182,7 @@ class _End:
     cell: Cell
     of_heat: tuple[str, ...]
     cost: float
+    from_file: bool
 
 
 def _ends(model: Model, starts: int, seed: int, evaluations: int, on_step: OnStep | None) -> list[_End]:
@@ -197,7 +201,7 @@ def _ends(model: Model, starts: int, seed: int, evaluations: int, on_step: OnSte
                 raise
             continue
         residual = one.residual(x)
-        ends.append(_End(one, x, cell, of_heat, 0.5 * float(residual @ residual)))
+        ends.append(_End(one, x, cell, of_heat, 0.5 * float(residual @ residual), from_file=not ends))
     return sorted(ends, key=lambda end: end.cost)
 
 

@@ -47,11 +47,13 @@ class Interval:
     source: str
 
 
-def told_of_ends(costs: Sequence[float], ends: Sequence[Mapping[str, Interval]]) -> tuple[str, ...]:
+def told_of_ends(
+    costs: Sequence[float], ends: Sequence[Mapping[str, Interval]], of_file: int
+) -> tuple[str, ...]:
     """A sentence on how far apart the fits from several starts end; none for a single one.
 
     costs : of each end, nats, the end that is taken first.  ends : the parameters there, with the intervals of that
-    end.
+    end.  of_file : index of the end that was reached from the start file.
     """
     if len(costs) == 1:
         return ()
@@ -61,11 +63,15 @@ def told_of_ends(costs: Sequence[float], ends: Sequence[Mapping[str, Interval]])
         for name, interval in taken.items()
         if any(not interval.low <= other[name].value <= interval.high for other in others)
     ]
-    lower = ", ".join(f"{cost - costs[0]:.1f}" for cost in costs[1:])
+    lower = ", ".join(
+        f"{cost - costs[0]:.1f}{' (from the start file)' if i == of_file else ''}"
+        for i, cost in enumerate(costs[1:], 1)
+    )
+    origin = "from the start file" if of_file == 0 else "from a drawn start"
     named = ", ".join(apart[:NAMED_APART]) + (" and others" if len(apart) > NAMED_APART else "")
     return (
-        f"the fit was repeated from {len(others)} drawn start{'s' if len(others) > 1 else ''}: the best end is taken, "
-        f"the others are {lower} nats less likely. "
+        f"the fit was repeated from {len(others)} drawn start{'s' if len(others) > 1 else ''}: the best end, "
+        f"{origin}, is taken; the others are {lower} nats less likely. "
         + (
             f"There {len(apart)} of {len(taken)} parameters lie outside their 95 % intervals ({named}), which hold for "
             "the end that is taken alone."
