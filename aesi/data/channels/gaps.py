@@ -13,6 +13,7 @@ from aesi.data.channels.checks import Columns, Context
 from aesi.data.channels.load_columns import keep_rows
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
+from aesi.records.measurement import Hold, assumed_hold
 
 GAP_FLOOR_S = 5.0
 """A gap is an interval longer than this, than GAP_RATIO times both adjacent intervals, and than GAP_RATIO times the
@@ -101,18 +102,26 @@ def _longest_usual(neighbours: Array) -> float:
 
 
 def untold_charge(columns: Columns) -> list[str]:
-    """A note where the rows are too far apart around changes of the current to determine the charge moved; none for a
-    record of so few rows that its first and last currents alone make that difference."""
+    """A note where the charge moved depends on how the current runs between the rows, with that which is taken unless
+    another is declared; none for a record of so few rows that its first and last currents alone make that
+    difference."""
     size, step = np.abs(columns["current_a"]), np.diff(columns["time_s"]) / SECONDS_PER_HOUR
     until, since = float(np.sum(size[:-1] * step)), float(np.sum(size[1:] * step))
     straight = 0.5 * (until + since)
     few = len(size) <= 1.0 / UNTOLD_SHARE
     if few or abs(since - straight) <= UNTOLD_SHARE * straight:  # |until - straight| is the same
         return []
+    ways: dict[Hold, str] = {
+        "backward": f"{since:.3g} Ah with the current of the row after",
+        "linear": f"{straight:.3g} Ah with straight lines between the rows",
+    }
+    taken = assumed_hold(columns["time_s"])
+    other = ways["linear" if taken == "backward" else "backward"]
     return [
-        f"Its rows do not tell the charge that moved: {straight:.3g} Ah either way with the current in straight lines "
-        f"between them, {since:.3g} with that of the row after each, {until:.3g} with that of the row before. Give the "
-        "rows before and after each change of the current, or leave out where they are missing (--from-s, --to-s)."
+        f"Some rows are far apart where the current changes, so that they do not tell the charge that moved: either "
+        f"way {ways[taken]}, as is assumed unless --hold says otherwise, {other}, {until:.3g} Ah with that of the row "
+        "before. Where another is true declare it, or give the rows before and after each change, or leave out where "
+        "they are missing (--from-s, --to-s)."
     ]
 
 

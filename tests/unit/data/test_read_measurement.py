@@ -758,15 +758,19 @@ def test_looking_for_gaps_in_a_slowly_sampled_record_took_longer_than_reading_it
 
 
 def test_a_charge_that_the_rows_do_not_tell_was_read_without_a_word(tmp_path):
-    """Pulses of 10 s every minute, a row at the end of each pulse and of each pause: a sixth flows of what they say."""
+    """Pulses of 10 s every minute, a row at the end of each pulse and of each pause: the current of the row after
+    is right, and of straight lines a third flows."""
     ends = np.cumsum(np.tile([50.0, 10.0], 30))
     pulse = np.tile([0.0, 3.0], 30)
     voltage = 3.9 - 1e-5 * ends - 0.03 * pulse
     path = tmp_path / "pulses.csv"
     pd.DataFrame({"time_s": ends, "current_a": pulse, "voltage_v": voltage}).to_csv(path, index=False)
     (told,) = [note for note in read_measurement(path).notes if "do not tell the charge" in note]
-    assert "0.729 Ah either way" in told
-    assert "0.25 with that of the row after each, 1.21 with that of the row before" in told
+    assert (
+        "either way 0.25 Ah with the current of the row after, as is assumed unless --hold says otherwise"
+        in told
+    )
+    assert "0.729 Ah with straight lines between the rows, 1.21 Ah with that of the row before" in told
     both = (ends[1::2, None] + [-59.0, -10.0, -9.0, 0.0]).ravel()  # rows before and after each change
     pulse = np.tile([0.0, 0.0, 3.0, 3.0], 30)
     voltage = 3.9 - 1e-5 * both - 0.03 * pulse
