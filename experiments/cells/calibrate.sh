@@ -1,19 +1,22 @@
 #!/bin/sh
 # Makes the calibrated cell files of this folder from public records (AESI_DATA as in docs/reference/files.md).
-#   sh experiments/cells/calibrate.sh [panasonic | panasonic_25degc | hg2 | hg2_25degc | hg2_cold] [OUT_FOLDER]
-# Without arguments the first four, into this folder; hg2_cold needs two records of the published archive, as `aesi data
-# get lg_18650hg2 --out "$AESI_DATA/measured/lg_18650hg2"` lays an unpacked one out. Each takes some minutes of one
-# processor.
+#   sh experiments/cells/calibrate.sh [panasonic | panasonic_25degc | hg2 | hg2_25degc | hg2_discharges | hg2_cold] [OUT]
+# Without arguments the first five, into this folder; hg2_cold needs two records of the published archive, as `aesi data
+# get lg_18650hg2 --out "$AESI_DATA/measured/lg_18650hg2"` lays an unpacked one out. Each takes 4 to 40 minutes of one
+# processor. All are the most probable of three fits, from the start file and from two cells drawn from the priors.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 which=${1:-all}
 out=${2:-$here}
 data=${AESI_DATA:?say where the measured records are}/measured
 start=$here/lg_m50_chen2020.bpx.json
+calibrate() {
+    aesi calibrate --cell "$start" --starts 3 "$@"
+}
 
 panasonic() {
     p=$data/panasonic_ncr18650pf
-    aesi calibrate --cell "$start" --title "Panasonic NCR18650PF 2.9 Ah NCA|graphite, calibrated" \
+    calibrate --title "Panasonic NCR18650PF 2.9 Ah NCA|graphite, calibrated" \
         --data "$p/25degC_c20_ocv.csv" "$p/25degC_hppc.csv.gz" "$p/10degC_hppc.csv.gz" "$p/0degC_hppc.csv.gz" \
         "$p/n10degC_hppc.csv.gz" "$p/25degC_1c_start.csv" --until n10degC_hppc=78611 \
         --date 25degC_1c_start=2017-03-09 --date 25degC_hppc=2017-03-11 --date 10degC_hppc=2017-03-27 \
@@ -23,7 +26,7 @@ panasonic() {
 }
 panasonic_25degc() {
     p=$data/panasonic_ncr18650pf
-    aesi calibrate --cell "$start" --title "Panasonic NCR18650PF 2.9 Ah NCA|graphite, calibrated at 25 degC alone" \
+    calibrate --title "Panasonic NCR18650PF 2.9 Ah NCA|graphite, calibrated at 25 degC alone" \
         --data "$p/25degC_c20_ocv.csv" "$p/25degC_hppc.csv.gz" \
         --out "$out/panasonic_ncr18650pf_25degc.bpx.json"
 }
@@ -36,7 +39,7 @@ hg2_contacts=contact.resistance=0.0108:0.0012
 hg2_with() { # TITLE NAME [--data ... --date ...]
     title=$1 name=$2 p=$data/lg_18650hg2
     shift 2
-    aesi calibrate --cell "$start" --title "LG 18650HG2 3.0 Ah NMC|graphite-SiOx, $title" \
+    calibrate --title "LG 18650HG2 3.0 Ah NMC|graphite-SiOx, $title" \
         --data "$p/25degC_c20_ocv.csv" "$p/25degC_cap_1c.csv" "$p/25degC_mixed1.csv.gz" "$p/40degC_c20_ocv.csv" \
         "$p/0degC_c20_ocv.csv" "$p/n10degC_cap_1c.csv" \
         --date 25degC_c20_ocv=2018-10-26 --date 25degC_cap_1c=2018-10-28 --date 25degC_mixed1=2018-10-29 \
@@ -55,14 +58,23 @@ hg2_cold() {
 }
 hg2_25degc() {
     p=$data/lg_18650hg2
-    aesi calibrate --cell "$start" --title "LG 18650HG2 3.0 Ah NMC|graphite-SiOx, calibrated at 25 degC alone" \
+    calibrate --title "LG 18650HG2 3.0 Ah NMC|graphite-SiOx, calibrated at 25 degC alone" \
         --data "$p/25degC_c20_ocv.csv" "$p/25degC_cap_1c.csv" "$p/25degC_mixed1.csv.gz" \
         --date 25degC_c20_ocv=2018-10-26 --date 25degC_cap_1c=2018-10-28 --date 25degC_mixed1=2018-10-29 \
         --prior "$hg2_contacts" \
         --out "$out/lg_18650hg2_25degc.bpx.json"
 }
+# Without the prior of its contacts, which rests on its first drive: no drive has a part in this file, so that each may be
+# a test.
+hg2_discharges() {
+    p=$data/lg_18650hg2
+    calibrate --title "LG 18650HG2 3.0 Ah NMC|graphite-SiOx, calibrated on discharges at 25 degC" \
+        --data "$p/25degC_c20_ocv.csv" "$p/25degC_cap_1c.csv" \
+        --date 25degC_c20_ocv=2018-10-26 --date 25degC_cap_1c=2018-10-28 --as-of 2018-10-28 \
+        --out "$out/lg_18650hg2_discharges.bpx.json"
+}
 case $which in
-all) panasonic && panasonic_25degc && hg2 && hg2_25degc ;;
-panasonic | panasonic_25degc | hg2 | hg2_25degc | hg2_cold) "$which" ;;
+all) panasonic && panasonic_25degc && hg2 && hg2_25degc && hg2_discharges ;;
+panasonic | panasonic_25degc | hg2 | hg2_25degc | hg2_discharges | hg2_cold) "$which" ;;
 *) echo "there is no cell $which" >&2 && exit 2 ;;
 esac
