@@ -1,7 +1,7 @@
 #!/bin/sh
 # Makes the calibrated cell files of this folder from public records (AESI_DATA as in docs/reference/files.md).
-#   sh experiments/cells/calibrate.sh [panasonic | panasonic_25degc | hg2 | hg2_25degc | hg2_discharges | hg2_cold] [OUT]
-# Without arguments the first five, into this folder; hg2_cold needs two records of the published archive, as `aesi data
+#   sh experiments/cells/calibrate.sh [panasonic | panasonic_25degc | hg2 | hg2_25degc | hg2_cold] [OUT]
+# Without arguments the first four, into this folder; hg2_cold needs two records of the published archive, as `aesi data
 # get lg_18650hg2 --out "$AESI_DATA/measured/lg_18650hg2"` lays an unpacked one out. Each takes 4 to 40 minutes of one
 # processor. All are the most probable of three fits, from the start file and from two cells drawn from the priors.
 set -eu
@@ -64,17 +64,8 @@ hg2_25degc() {
         --prior "$hg2_contacts" \
         --out "$out/lg_18650hg2_25degc.bpx.json"
 }
-# Without the prior of its contacts, which rests on its first drive: no drive has a part in this file, so that each may be
-# a test.
-hg2_discharges() {
-    p=$data/lg_18650hg2
-    calibrate --title "LG 18650HG2 3.0 Ah NMC|graphite-SiOx, calibrated on discharges at 25 degC" \
-        --data "$p/25degC_c20_ocv.csv" "$p/25degC_cap_1c.csv" \
-        --date 25degC_c20_ocv=2018-10-26 --date 25degC_cap_1c=2018-10-28 --as-of 2018-10-28 \
-        --out "$out/lg_18650hg2_discharges.bpx.json"
-}
 case $which in
-all) panasonic && panasonic_25degc && hg2 && hg2_25degc && hg2_discharges ;;
-panasonic | panasonic_25degc | hg2 | hg2_25degc | hg2_discharges | hg2_cold) "$which" ;;
+all) panasonic && panasonic_25degc && hg2 && hg2_25degc ;;
+panasonic | panasonic_25degc | hg2 | hg2_25degc | hg2_cold) "$which" ;;
 *) echo "there is no cell $which" >&2 && exit 2 ;;
 esac

@@ -16,7 +16,6 @@ CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
 RATED_C = {
     "lg_18650hg2": 20.0 / 3.0,
     "lg_18650hg2_25degc": 20.0 / 3.0,
-    "lg_18650hg2_discharges": 20.0 / 3.0,
     "panasonic_ncr18650pf": 10.0 / 2.9,
     "panasonic_ncr18650pf_25degc": 10.0 / 2.9,
     "lg_m50_chen2020": 3.0,
