@@ -35,7 +35,7 @@ from aesi.physics.effect import (
     materials_first,
 )
 from aesi.physics.espm.plain import run_plain
-from aesi.physics.model import EspmModel
+from aesi.physics.model import EspmModel, of_record
 from aesi.physics.rest.open_circuit import OpenCircuit
 from aesi.physics.rest.voltage import freed_of_instruments, freed_of_series
 from aesi.records import Hold, Run
@@ -115,10 +115,11 @@ def simulate(
         soc0 = same_rest(cell, changed.cell, soc0)
     backward = hold == "backward"
     solved, read = (record, None) if record.read_s is None else record.with_readings(backward)
+    heated = of_record(changed, record.temperature_k is not None)
     if profiles or len(solved.time_s) > MOST_ROWS:
-        rows, further, fault_at, fault = _solved(solve, changed, solved, soc0, hold)
+        rows, further, fault_at, fault = _solved(solve, heated, solved, soc0, hold)
     else:
-        known = _remembered(model, changed, _KeyedRecord.of(solved), soc0, hold)
+        known = _remembered(model, heated, _KeyedRecord.of(solved), soc0, hold)
         rows, further, fault_at, fault = _copied(known)
     series = _series(changed.cell, rows) | further
     written_at = fault_at if read is None or fault_at < 0 else int(np.searchsorted(read, fault_at))
@@ -184,11 +185,14 @@ def solver(model_name: str, profiles: dict[str, Array] | None = None) -> Solver:
 
 
 def _solved(solve: Solver, model: EspmModel, record: Record, soc0: float, hold: Hold) -> Solution:
-    """One solution; a constant temperature column becomes the initial temperature of the cell."""
+    """One solution; a constant temperature column becomes the initial temperature of the cell.
+
+    model : that of `of_record`.
+    """
     temperature = record.temperature_k
     if temperature is not None and np.ptp(temperature) == 0.0:
         model = model.with_cell(initial_temperature_k=float(temperature[0]))
-        if model.heat is None and not model.cell.winding_resistance_k_w:
+        if model.heat is None:
             temperature = None
     warm = None if temperature is None else _own(temperature)
     return solve(model, _own(record.time_s), _own(record.current_a), warm, soc0, hold)

@@ -15,6 +15,7 @@ from aesi.numerics.typing import Array
 from aesi.over_time import stamp
 from aesi.physics import ActiveEffect, Cell, ModelName
 from aesi.physics.cell import Soh
+from aesi.physics.model import HeatBalance, of_record
 from aesi.physics.simulation import MODEL_WORDS, model_with
 from aesi.physics.start.temperature import contradicted_temperature
 from aesi.pipeline.product.hybrid import HybridModel
@@ -54,6 +55,8 @@ def temperature_sentence(cell: Cell, record: Measurement, effects: Sequence[Acti
     inferred, several = " and ".join(inferring), len(inferring) > 1
     if record.temperature_degc is not None:
         beside = f"; {inferred} {'have' if several else 'has'} nothing to add" if inferred else ""
+        if inferred and _on_case(cell, effects) != _on_case(cell, ()):
+            beside += " but the cell's heat capacity"
         return f"{record.name}: {at_its_temperature(record.temperature_degc)}{beside}."
     degc = cell.initial_temperature_k - ZERO_CELSIUS_K
     beside = f" and {inferred} {'change' if several else 'changes'} it" if inferred else ""
@@ -61,6 +64,11 @@ def temperature_sentence(cell: Cell, record: Measurement, effects: Sequence[Acti
         f"{record.name}: no temperature column; taken at {degc:.4g} degC, as the cell's file declares{beside}; "
         "for another one add a column temperature_degc, or give --column temperature_degc=40."
     )
+
+
+def _on_case(cell: Cell, effects: Sequence[ActiveEffect]) -> HeatBalance | None:
+    """The heat balance of the cell with these effects, where the temperature of its case was measured."""
+    return of_record(model_with(cell, effects), measured=True).heat
 
 
 def without_energies(cell: Cell, temperatures_degc: Iterable[Array | float | None]) -> tuple[str, ...]:
