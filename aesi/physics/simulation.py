@@ -80,8 +80,9 @@ def simulate(
     the cell is full.
     effects : active effects in addition to the cell file. Instrument faults act first, then functions of an electrode's
     stoichiometry (U(x), D(x)), then the others in the order given.
-    temperature_degc : (n,) or one value, degC, measured on the cell's case; the winding follows it (see
-    `aesi.physics.model.of_record`). None takes the cell file's initial temperature, or the heat balance of an effect.
+    temperature_degc : (n,) or one value, degC, of the cell's case; the winding follows it (see
+    `aesi.physics.model.of_record`) and is warmer under load at one value, too, where the file has a thermal
+    conductivity. None takes the cell file's initial temperature for the winding, or the heat balance of an effect.
     hold : "linear" joins the samples by straight lines; "backward" holds each row's value since the row before.
     on_depletion : action where a surface stoichiometry leaves [0, 1] or the electrolyte runs dry. "raise" raises
     SimulationError. "clip" (for searches) holds the kinetics at the limit, continues open-circuit potentials with 10 V

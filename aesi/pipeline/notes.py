@@ -19,7 +19,7 @@ from aesi.physics.model import HeatBalance, of_record
 from aesi.physics.simulation import MODEL_WORDS, model_with
 from aesi.physics.start.temperature import contradicted_temperature
 from aesi.pipeline.product.hybrid import HybridModel
-from aesi.records import Hold, Measurement, Run, at_its_temperature
+from aesi.records import Hold, Measurement, Run, at_its_temperature, measured_on_case
 
 SEPARATOR = ": "
 MERE_NAMES = re.compile(r"[^\s,]+(, [^\s,]+)*")
@@ -57,7 +57,9 @@ def temperature_sentence(cell: Cell, record: Measurement, effects: Sequence[Acti
         beside = f"; {inferred} {'have' if several else 'has'} nothing to add" if inferred else ""
         if inferred and _on_case(cell, effects) != _on_case(cell, ()):
             beside += " but the cell's heat capacity"
-        return f"{record.name}: {at_its_temperature(record.temperature_degc)}{beside}."
+        stated = not measured_on_case(record.temperature_degc) and cell.winding_resistance_k_w
+        of_case = ", for its case: the winding is warmer under load" if stated else ""
+        return f"{record.name}: {at_its_temperature(record.temperature_degc)}{of_case}{beside}."
     degc = cell.initial_temperature_k - ZERO_CELSIUS_K
     beside = f" and {inferred} {'change' if several else 'changes'} it" if inferred else ""
     return (

@@ -139,7 +139,8 @@ READING: dict[str, Any] = {
         typer.Option(
             "--column",
             help='quantity=name, for other headers: current_a="I[A]", or its number, #2, where there are none; also '
-            "cycle=, step=; temperature_degc=40 states it for every row, temperature_degc= leaves it out.",
+            "cycle=, step=; temperature_degc=40 states it for every row, as that of the case (a winding with a thermal "
+            "conductivity in its file is warmer under load), temperature_degc= leaves it out.",
         ),
     ],
     "unit": Annotated[
