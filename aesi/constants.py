@@ -9,5 +9,6 @@ COLDEST_DEGC, WARMEST_DEGC = -60.0, 150.0
 """Of a cell: colder than any is cycled, warmer than any survives; kelvins lie above."""
 MV_PER_V = 1000.0
 J_PER_KJ = 1000.0
+CM_PER_M = 100.0
 MILLI = 1000.0
-"""Thousandths in one: mohm of an ohm."""
+"""Thousandths in one: mohm of an ohm, mm of a metre, g of a kilogram."""

@@ -140,12 +140,14 @@ def of_record(model: EspmModel, measured: bool) -> EspmModel:
 
         C dT/dt = Q - (T - T_case)/R
 
-    A measured case temperature replaces any other heat balance. The winding has the temperature of the case where the
-    file declares no resistance R between them (`Cell.winding_resistance_k_w`).
+    A measured case takes the place of the surroundings: the heat capacity C of a heat balance stays, or else that of
+    the file counts, and R is the file's. The winding has the temperature of the case where the file declares no
+    resistance R between them (`Cell.winding_resistance_k_w`).
     """
     if not measured:
         return model
-    resistance, capacity = model.cell.winding_resistance_k_w, model.cell.heat_capacity_j_k
+    resistance = model.cell.winding_resistance_k_w
+    capacity = model.cell.heat_capacity_j_k if model.heat is None else model.heat.heat_capacity_j_k
     heat = None if capacity is None or not resistance else HeatBalance(capacity, 1.0 / resistance)
     return model if heat == model.heat else replace(model, heat=heat)
 

@@ -35,7 +35,7 @@ from aesi.physics.effect import (
     materials_first,
 )
 from aesi.physics.espm.plain import run_plain
-from aesi.physics.model import EspmModel
+from aesi.physics.model import EspmModel, of_record
 from aesi.physics.rest.open_circuit import OpenCircuit
 from aesi.physics.rest.voltage import freed_of_instruments, freed_of_series
 from aesi.records import Hold, Run
@@ -80,8 +80,9 @@ def simulate(
     the cell is full.
     effects : active effects in addition to the cell file. Instrument faults act first, then functions of an electrode's
     stoichiometry (U(x), D(x)), then the others in the order given.
-    temperature_degc : (n,) or one value, degC, measured on the cell's case; the winding follows it (see
-    `aesi.physics.model.of_record`). None takes the cell file's initial temperature, or the heat balance of an effect.
+    temperature_degc : (n,) or one value, degC, of the cell's case; the winding follows it (see
+    `aesi.physics.model.of_record`) and is warmer under load at one value, too, where the file has a thermal
+    conductivity. None takes the cell file's initial temperature for the winding, or the heat balance of an effect.
     hold : "linear" joins the samples by straight lines; "backward" holds each row's value since the row before.
     on_depletion : action where a surface stoichiometry leaves [0, 1] or the electrolyte runs dry. "raise" raises
     SimulationError. "clip" (for searches) holds the kinetics at the limit, continues open-circuit potentials with 10 V
@@ -115,10 +116,11 @@ def simulate(
         soc0 = same_rest(cell, changed.cell, soc0)
     backward = hold == "backward"
     solved, read = (record, None) if record.read_s is None else record.with_readings(backward)
+    heated = of_record(changed, record.temperature_k is not None)
     if profiles or len(solved.time_s) > MOST_ROWS:
-        rows, further, fault_at, fault = _solved(solve, changed, solved, soc0, hold)
+        rows, further, fault_at, fault = _solved(solve, heated, solved, soc0, hold)
     else:
-        known = _remembered(model, changed, _KeyedRecord.of(solved), soc0, hold)
+        known = _remembered(model, heated, _KeyedRecord.of(solved), soc0, hold)
         rows, further, fault_at, fault = _copied(known)
     series = _series(changed.cell, rows) | further
     written_at = fault_at if read is None or fault_at < 0 else int(np.searchsorted(read, fault_at))
@@ -184,11 +186,14 @@ def solver(model_name: str, profiles: dict[str, Array] | None = None) -> Solver:
 
 
 def _solved(solve: Solver, model: EspmModel, record: Record, soc0: float, hold: Hold) -> Solution:
-    """One solution; a constant temperature column becomes the initial temperature of the cell."""
+    """One solution; a constant temperature column becomes the initial temperature of the cell.
+
+    model : that of `of_record`.
+    """
     temperature = record.temperature_k
     if temperature is not None and np.ptp(temperature) == 0.0:
         model = model.with_cell(initial_temperature_k=float(temperature[0]))
-        if model.heat is None and not model.cell.winding_resistance_k_w:
+        if model.heat is None:
             temperature = None
     warm = None if temperature is None else _own(temperature)
     return solve(model, _own(record.time_s), _own(record.current_a), warm, soc0, hold)

@@ -22,7 +22,7 @@ from aesi.over_time import stamp
 from aesi.physics import ModelName
 from aesi.physics.arguments import check_choice, check_soc
 from aesi.physics.cell import Soh
-from aesi.pipeline.calibrate import check_records, effects_left, scaled_to, start_cell
+from aesi.pipeline.calibrate import check_records, effects_left, of_body, scaled_to, start_cell
 from aesi.pipeline.discovery.budget import within_budget
 from aesi.pipeline.discovery.cold import with_cold_admitted
 from aesi.pipeline.discovery.discover import Case, run_case
@@ -121,6 +121,8 @@ def calibrate(
     dates: Mapping[str, date] | None = None,
     as_of: date | None = None,
     cut_offs_v: tuple[float, float] | None = None,
+    body_mm: Sequence[float] | None = None,
+    mass_g: float | None = None,
     priors: Mapping[str, tuple[float, float]] | None = None,
     spectra: Spectra = (),
     hold: Hold | None = None,
@@ -135,6 +137,8 @@ def calibrate(
     the test; records of different days may have different ages.  as_of : day whose state of the cell is written; None
     takes the last day with a load.
     cut_offs_v : (lower, upper) V between which this cell is cycled; None takes those of its file.
+    body_mm : (diameter, height) of this cell, or the three edges of a flat one, mm.  mass_g : its mass, g. They replace
+    volume, surface and density of the file, see `Cell.with_body`.
     priors : parameter -> (value, standard deviation), for parameters that are known from elsewhere, with the names and
     units of the report (a factor is relative to the start file). The standard deviation is that of the natural
     logarithm for factors, double layers and the thermal conductivity.
@@ -151,10 +155,11 @@ def calibrate(
     _check_priors(priors)
     _check_days(dates or {}, as_of)
     given = declared_model(cell)
-    declared = start_cell(given.cell, cut_offs_v)
+    declared = start_cell(given.cell, cut_offs_v, body_mm, mass_g)
     measurements = _read_all(_listed(data), hold)
     check_records(measurements, temperatures_degc)
     scaled = scaled_to(declared, measurements, temperatures_degc)  # refused before anything is fitted
+    body = of_body(given.cell, scaled)
     conditions = Conditions(
         soc0,
         temperatures_degc or {},
@@ -167,7 +172,7 @@ def calibrate(
     check_distinct_spectra(conditions.spectra, ())
     check_spectra(scaled, conditions.spectra)
     found = fit_cell(declared, measurements, conditions, starts=starts, seed=seed)
-    return replace(found, notes=(*effects_left(given), *found.notes))
+    return replace(found, notes=(*effects_left(given), *body, *found.notes))
 
 
 def _read_spectra(given: Spectra) -> tuple[Spectrum, ...]:

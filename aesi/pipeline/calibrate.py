@@ -20,13 +20,14 @@ from aesi.calibration.records.spectra import BAND_HZ, check_spectra
 from aesi.calibration.result import RecordError
 from aesi.calibration.rewind import start_soc
 from aesi.calibration.start import sized, tell_the_size
-from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
+from aesi.constants import CM_PER_M, MV_PER_V, ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError
 from aesi.numerics.files.whole import write_whole
 from aesi.over_time import stamp
 from aesi.physics.arguments import check_temperature
 from aesi.physics.belongs import check_measured
 from aesi.physics.cell import Cell
+from aesi.physics.cell.bpx_values import check_values
 from aesi.physics.simulation import MODEL_WORDS
 from aesi.pipeline.distinct import check_distinct, check_distinct_spectra
 from aesi.pipeline.impedance import SpectrumError, held_against
@@ -55,6 +56,7 @@ class Request:
     posterior : steps of each walker, 0 for none.  starts : number of fits, see `aesi.calibration.calibrate`.
     seed : of the posterior's samples and of the drawn starts.
     title : name of the cell that is written.
+    body_mm, mass_g : of the records' cell, as for `Cell.with_body`; None takes those of the file.
     """
 
     conditions: Conditions = field(default_factory=Conditions)
@@ -64,21 +66,51 @@ class Request:
     starts: int = 1
     seed: int = 0
     title: str | None = None
+    body_mm: tuple[float, ...] | None = None
+    mass_g: float | None = None
 
 
 def check_request(cell: Path, request: Request) -> None:
     """Raises CellError, DataError or InputError, one sentence, for a request that can be refused without a record."""
     check_posterior(request.posterior)
     check_distinct_spectra(request.conditions.spectra, request.impedance)
-    check_names(start_cell(declared_model(cell).cell, request.cut_offs_v), request.conditions.priors)
+    given = declared_model(cell).cell
+    start = start_cell(given, request.cut_offs_v, request.body_mm, request.mass_g)
+    check_names(start, request.conditions.priors)
 
 
-def start_cell(cell: Cell, cut_offs_v: tuple[float, float] | None) -> Cell:
-    """The cell that a calibration starts from, between (lower, upper) V where these are given.
+def start_cell(
+    cell: Cell,
+    cut_offs_v: tuple[float, float] | None,
+    body_mm: Sequence[float] | None = None,
+    mass_g: float | None = None,
+) -> Cell:
+    """The cell that a calibration starts from, between (lower, upper) V and with the body where these are given.
 
-    Raises CellError for cut-offs that no cell has.
+    Raises CellError for cut-offs or a body that no cell has.
     """
-    return cell if cut_offs_v is None else cell.with_cut_offs(*cut_offs_v)
+    placed = cell if cut_offs_v is None else cell.with_cut_offs(*cut_offs_v)
+    return placed.with_body(body_mm, mass_g)
+
+
+def of_body(cell: Cell, start: Cell) -> tuple[str, ...]:
+    """A sentence on the body that was given for the cell of a file; empty where none was.
+
+    start : the cell that the calibration starts from, at its size.  Raises CellError where the body holds no such cell.
+    """
+    if (start.volume_m3, start.density_kg_m3) == (cell.volume_m3, cell.density_kg_m3):
+        return ()
+    check_values(start, f"{start.name} in the body that was given")
+    told = [
+        f"{value * to_unit:.4g} {unit}"
+        for value, to_unit, unit in (
+            (start.volume_m3, CM_PER_M**3, "cm3"),
+            (start.surface_area_m2, CM_PER_M**2, "cm2"),
+            (start.density_kg_m3, 1.0, "kg/m3"),
+        )
+        if value is not None
+    ]
+    return (f"the body of the cell as given: {', '.join(told)}.",)
 
 
 def calibrate_files(
@@ -100,8 +132,10 @@ def calibrate_files(
     check_posterior(asked.posterior)
     check_distinct_spectra(conditions.spectra, asked.impedance)
     given = declared_model(cell)
-    declared, model = start_cell(given.cell, asked.cut_offs_v), conditions.model or given.model
+    declared = start_cell(given.cell, asked.cut_offs_v, asked.body_mm, asked.mass_g)
+    model = conditions.model or given.model
     start = scaled_to(declared, measurements, conditions.temperatures_degc)
+    body = of_body(given.cell, start)
     check_spectra(start, (*conditions.spectra, *asked.impedance))
     conditions = replace(conditions, model=model)
     found = calibrate(
@@ -112,7 +146,7 @@ def calibrate_files(
     posterior = sampled(found, asked.posterior, asked.seed) if asked.posterior else None
     spectra, told = held_against(found.cell, asked.impedance, model=model, fitted=conditions.spectra)
     read = [note for m in measurements for note in m.notes]
-    content = calibration_content(found, [*effects_left(given), *read, *told], posterior, spectra)
+    content = calibration_content(found, [*effects_left(given), *body, *read, *told], posterior, spectra)
     cell_file, data, text, page = calibration_files(out)
     write_whole(cell_file, json.dumps(found.cell.to_bpx(), indent=1, allow_nan=False) + "\n")
     write_whole(data, json.dumps(content, indent=1, allow_nan=False) + "\n")

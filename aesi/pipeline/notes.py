@@ -15,10 +15,11 @@ from aesi.numerics.typing import Array
 from aesi.over_time import stamp
 from aesi.physics import ActiveEffect, Cell, ModelName
 from aesi.physics.cell import Soh
+from aesi.physics.model import HeatBalance, of_record
 from aesi.physics.simulation import MODEL_WORDS, model_with
 from aesi.physics.start.temperature import contradicted_temperature
 from aesi.pipeline.product.hybrid import HybridModel
-from aesi.records import Hold, Measurement, Run, at_its_temperature
+from aesi.records import Hold, Measurement, Run, at_its_temperature, measured_on_case
 
 SEPARATOR = ": "
 MERE_NAMES = re.compile(r"[^\s,]+(, [^\s,]+)*")
@@ -54,13 +55,22 @@ def temperature_sentence(cell: Cell, record: Measurement, effects: Sequence[Acti
     inferred, several = " and ".join(inferring), len(inferring) > 1
     if record.temperature_degc is not None:
         beside = f"; {inferred} {'have' if several else 'has'} nothing to add" if inferred else ""
-        return f"{record.name}: {at_its_temperature(record.temperature_degc)}{beside}."
+        if inferred and _on_case(cell, effects) != _on_case(cell, ()):
+            beside += " but the cell's heat capacity"
+        stated = not measured_on_case(record.temperature_degc) and cell.winding_resistance_k_w
+        of_case = ", for its case: the winding is warmer under load" if stated else ""
+        return f"{record.name}: {at_its_temperature(record.temperature_degc)}{of_case}{beside}."
     degc = cell.initial_temperature_k - ZERO_CELSIUS_K
     beside = f" and {inferred} {'change' if several else 'changes'} it" if inferred else ""
     return (
         f"{record.name}: no temperature column; taken at {degc:.4g} degC, as the cell's file declares{beside}; "
         "for another one add a column temperature_degc, or give --column temperature_degc=40."
     )
+
+
+def _on_case(cell: Cell, effects: Sequence[ActiveEffect]) -> HeatBalance | None:
+    """The heat balance of the cell with these effects, where the temperature of its case was measured."""
+    return of_record(model_with(cell, effects), measured=True).heat
 
 
 def without_energies(cell: Cell, temperatures_degc: Iterable[Array | float | None]) -> tuple[str, ...]:

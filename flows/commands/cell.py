@@ -99,6 +99,17 @@ def calibrate(
             help="LOWER:UPPER, V, between which this cell is cycled, where the start file has others."
         ),
     ] = None,
+    body: Annotated[
+        str | None,
+        typer.Option(
+            help="DIAMETERxHEIGHT of this cell, or AxBxC of a flat one, mm: its volume and surface, where the start "
+            "file is of another body."
+        ),
+    ] = None,
+    mass: Annotated[
+        float | None,
+        typer.Option(help="Mass of this cell, g: its density; without it that of the start file."),
+    ] = None,
     soc0: options.Soc0 = None,
     temperature: Annotated[
         list[str] | None,
@@ -167,14 +178,14 @@ def calibrate(
     days, day = options.dates(dates, data), options.day("--as-of", as_of)
     ends = options.by_file("--until", until, data)
     witnesses, spectra = options.spectra(impedance), options.spectra(fit_impedance)
-    priors, limits = options.priors(prior), options.cut_offs(cut_offs)
+    priors, limits, edges = options.priors(prior), options.cut_offs(cut_offs), options.body(body)
     options.say_reading(data)
     from aesi.calibration import Conditions
     from aesi.pipeline.calibrate import Request, check_request
     from flows.jobs.calibration import calibrate as flow
 
     conditions = Conditions(soc0, temperatures, days, day, model, spectra=spectra, priors=priors)
-    request = Request(conditions, witnesses, limits, posterior, starts, seed, title)
+    request = Request(conditions, witnesses, limits, posterior, starts, seed, title, edges, mass)
     check_request(cell, request)
     records = options.measurements(data, reading, hold, ends)
     flow(cell, records, out, request)

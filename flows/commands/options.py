@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Callable, Iterable
 from datetime import date
 from math import inf, isfinite
@@ -139,7 +140,8 @@ READING: dict[str, Any] = {
         typer.Option(
             "--column",
             help='quantity=name, for other headers: current_a="I[A]", or its number, #2, where there are none; also '
-            "cycle=, step=; temperature_degc=40 states it for every row, temperature_degc= leaves it out.",
+            "cycle=, step=; temperature_degc=40 states it for every row, as that of the case (a winding with a thermal "
+            "conductivity in its file is warmer under load), temperature_degc= leaves it out.",
         ),
     ],
     "unit": Annotated[
@@ -307,6 +309,21 @@ def cut_offs(text: str | None) -> tuple[float, float] | None:
     except ValueError:
         raise InputError(f"--cut-offs {text}: has to read LOWER:UPPER, in V, such as 2.5:4.2.") from None
     return lower, upper
+
+
+def body(text: str | None) -> tuple[float, ...] | None:
+    """`--body DIAMETERxHEIGHT` or `--body AxBxC` as two or three lengths."""
+    if text is None:
+        return None
+    try:
+        edges = tuple(map(_finite, re.split("[xX×]", text)))
+    except ValueError:
+        edges = ()
+    if len(edges) not in (2, 3):
+        raise InputError(
+            f"--body {text}: has to read DIAMETERxHEIGHT of a cylinder or AxBxC of a box, in mm, such as 18.4x65.0."
+        )
+    return edges
 
 
 def day(option: str, text: str | None) -> date | None:

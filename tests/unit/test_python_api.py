@@ -453,6 +453,22 @@ def test_files_of_one_name_in_two_folders_had_one_name_in_python(cell, record, m
     assert [one.name for one in aesi.calibrate(cell, files).errors] == ["cold drive", "warm drive"]
 
 
+def test_a_file_from_one_of_another_body_kept_that_body(cell, record, monkeypatch):
+    """Volume, surface and density of the start file, since a fit moves their products alone."""
+    monkeypatch.setattr("aesi.pipeline.api.fit_cell", partial(fit_cell, evaluations=1))
+    made = aesi.calibrate(cell, record, body_mm=(200.0, 150.0, 9.0), mass_g=600.0)
+    found = made.cell
+    assert (found.volume_m3, found.surface_area_m2) == pytest.approx((270e-6, 663e-4))
+    assert found.density_kg_m3 == pytest.approx(0.6 / 270e-6)
+    assert "the body of the cell as given: 270 cm3, 663 cm2, 2222 kg/m3." in made.notes
+    kept = aesi.calibrate(cell, record)
+    bodies = [(c.volume_m3, c.surface_area_m2, c.density_kg_m3) for c in (kept.cell, cell)]
+    assert bodies[0] == bodies[1]
+    assert not any("the body" in note for note in kept.notes)
+    with pytest.raises(CellError, match="in the body that was given: density, specific heat capacity and"):
+        aesi.calibrate(cell, record, body_mm=(2.0, 1.5, 0.9))
+
+
 def test_a_cell_with_other_cut_offs_needed_a_start_file_of_its_own(cell, record, monkeypatch):
     monkeypatch.setattr("aesi.pipeline.api.fit_cell", partial(fit_cell, evaluations=1))
     found = aesi.calibrate(cell, record, cut_offs_v=(2.6, 4.15)).cell

@@ -5,16 +5,26 @@ Sign convention of the whole package: current is positive on discharge.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import pi, prod
 from os import PathLike
 from typing import Any, Self
 
+from aesi.constants import CM_PER_M, MILLI
+from aesi.errors import CellError
 from aesi.physics.cell.bpx_read import read_bpx
 from aesi.physics.cell.bpx_values import check_values
 from aesi.physics.cell.bpx_write import write_bpx
 from aesi.physics.cell.parts import CellParameters
 from aesi.physics.cell.relations import hashed_once
+
+EDGE_MM = (0.1, 5000.0)
+"""Range of the diameter, height or edges of a body. A convention: 18 to 70 mm of round cells, 1 mm to a metre of flat
+ones; in metres they are below the range."""
+DENSITY_KG_M3 = (200.0, 20000.0)
+"""Range of mass over volume: 1,847 to 2,706 kg/m3 in the shipped files, and a thousand times more or less where the
+mass is in kg or the body in cm."""
 
 
 @hashed_once
@@ -48,6 +58,51 @@ class Cell(CellParameters):
         check_values(cell, self.name)
         return cell
 
+    def with_body(self, size_mm: Sequence[float] | None = None, mass_g: float | None = None) -> Self:
+        """The cell in another body: its volume, surface and density are changed.
+
+        size_mm : (diameter, height) of a cylinder, or the three edges of a box, mm; None keeps the file's volume and
+        surface.  mass_g : of the whole cell, g; None keeps the file's density.
+        Heat capacity per mass, heat transfer per surface and thermal conductivity do not change.
+
+        Raises CellError for a body or a mass that no cell has, and for a mass of a cell whose volume is not known.
+        """
+        cell = self
+        if size_mm is not None:
+            volume, surface = _volume_and_surface(size_mm)
+            cell = replace(cell, volume_m3=volume, surface_area_m2=surface)
+        if mass_g is None:
+            return cell
+        if cell.volume_m3 is None:
+            raise CellError(
+                f"{self.name}: a mass of {mass_g:g} g makes no density without a volume; give the size of the body, "
+                "too, or 'Volume [m3]' in the cell file."
+            )
+        density, (least, most) = mass_g / MILLI / cell.volume_m3, DENSITY_KG_M3
+        if not least <= density <= most:
+            raise CellError(
+                f"a mass of {mass_g:g} g in {CM_PER_M**3 * cell.volume_m3:.3g} cm3 makes {density:.3g} kg/m3, and "
+                "cells have some 2,500; the mass is in g, and the edges of the body in mm."
+            )
+        return replace(cell, density_kg_m3=density)
+
     def to_bpx(self) -> dict[str, Any]:
         """The cell as a BPX 1.x dict; `Cell.from_bpx` restores it."""
         return write_bpx(self)
+
+
+def _volume_and_surface(size_mm: Sequence[float]) -> tuple[float, float]:
+    """(m3, m2) of a cylinder (diameter, height) or a box (three edges), mm.  Raises CellError for another body."""
+    least, most = EDGE_MM
+    if len(size_mm) not in (2, 3) or not all(least <= edge <= most for edge in size_mm):
+        raise CellError(
+            f"a body of {size_mm!r} mm: give diameter and height of a cylinder, or the three edges of a box, each from "
+            f"{least:g} to {most:g} mm."
+        )
+    edges = [edge / MILLI for edge in size_mm]
+    if len(edges) == 2:
+        diameter, height = edges
+        base = pi * diameter**2 / 4.0
+        return base * height, pi * diameter * height + 2.0 * base
+    a, b, c = edges
+    return prod(edges), 2.0 * (a * b + b * c + c * a)

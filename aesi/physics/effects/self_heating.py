@@ -5,7 +5,7 @@
     D, K, kappa scale with exp(E_a/R (1/T_ref - 1/T)),   U = U_ref + dU/dT (T - T_ref)
 
 Where the temperature of the case was measured, that is used, plus the excess of the winding where the cell file states
-its thermal conductivity (`aesi.physics.model.of_record`), and this balance is not needed.
+its thermal conductivity (`aesi.physics.model.of_record`); of this balance only C counts then.
 
 Energy is conserved from one rest to another: heat includes what diffusion within particles and electrolyte dissipates,
 from the moment when it lowers the voltage.

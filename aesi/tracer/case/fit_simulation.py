@@ -25,11 +25,16 @@ def fit_simulation(
     """One simulation, at the measured temperature where there is one, in longer steps where rows are far apart.
 
     soc0 : state of charge at the first row; None takes that at which the cell rests at `rest_voltage_v` (V).
-    effects : active ones; those that infer a quantity that was measured are skipped.
+    effects : active ones; those that infer a quantity that was measured are skipped, unless they hold constants of the
+    cell, as self_heating does its heat capacity.
     Stoichiometries are clipped at the ends of their range, so that a search goes on. Raises AesiError where the
     simulation fails.
     """
-    needed = tuple(a for a in effects if a.effect.infers is None or data.temperature_degc is None)
+    needed = tuple(
+        a
+        for a in effects
+        if a.effect.infers is None or a.effect.of_every_record or data.temperature_degc is None
+    )
     data, needed = instruments_undone(data, needed)
     spared = (FEWER_POINTS,) if model == "dfn" else ()
     return simulate(

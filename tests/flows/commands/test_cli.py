@@ -106,6 +106,8 @@ def test_usage_errors_are_exit_code_2(call, arguments):
         ([*CALIBRATE, "--prior", "contact.resistance=0.1:0"], "its standard deviation, one above 0"),
         ([*CALIBRATE, "--cut-offs", "2.5-4.2"], "--cut-offs 2.5-4.2: has to read LOWER:UPPER, in V"),
         ([*CALIBRATE, "--cut-offs", "2.5:inf"], "--cut-offs 2.5:inf: has to read LOWER:UPPER, in V"),
+        ([*CALIBRATE, "--body", "18.4"], "--body 18.4: has to read DIAMETERxHEIGHT of a cylinder or AxBxC"),
+        ([*CALIBRATE, "--body", "18.4xlong"], "in mm, such as 18.4x65.0."),
         (["run", "."], ". is a folder; give an experiment file"),
         (
             ["run", "e.yaml", "--set", "seed=1", "--set", "seed=2"],
@@ -381,6 +383,8 @@ def test_a_workspace_that_may_not_be_written_to_says_where_else_it_can_be(
         ("--posterior", "2", "--posterior 2: at least 4 samples"),
         ("--cut-offs", "4.2:2.5", "the lower cut-off (4.2 V) has to be"),
         ("--cut-offs", "2500:4200", "the upper cut-off is 4200 V; one of them is in another unit"),
+        ("--body", "0.0184x0.065", "a body of (0.0184, 0.065) mm: give diameter and height of a cylinder"),
+        ("--mass", "0.047", "the mass is in g"),
     ],
 )
 def test_what_no_fit_can_be_asked_for_was_told_after_it_was_announced(

@@ -649,6 +649,44 @@ def test_a_state_of_health_that_is_no_share_is_refused(lg_m50, soh):
         lg_m50.with_soh(soh)
 
 
+def test_a_body_is_that_of_a_cylinder_or_a_box_and_its_mass_that_of_the_cell(content):
+    cell = Cell.from_bpx(content)
+    # A 21700 of 70 g: pi/4 2.1^2 7.0 = 24.245 cm3, pi 2.1 7.0 + pi/2 2.1^2 = 53.109 cm2.
+    round_one = cell.with_body((21.0, 70.0), 70.0)
+    assert round_one.volume_m3 == pytest.approx(24.245e-6, rel=1e-4)
+    assert round_one.surface_area_m2 == pytest.approx(53.109e-4, rel=1e-4)
+    assert round_one.density_kg_m3 * round_one.volume_m3 == pytest.approx(0.070)
+    flat = cell.with_body((200.0, 150.0, 10.0))
+    assert flat.volume_m3 == pytest.approx(300e-6)
+    assert flat.surface_area_m2 == pytest.approx(670e-4)
+    assert flat.density_kg_m3 == cell.density_kg_m3
+    assert flat.specific_heat_j_kg_k == cell.specific_heat_j_kg_k
+    assert cell.with_body() is cell
+    heavier = cell.with_body(mass_g=2000.0 * cell.density_kg_m3 * cell.volume_m3)
+    assert heavier.heat_capacity_j_k == pytest.approx(2.0 * cell.heat_capacity_j_k)
+
+
+@pytest.mark.parametrize(
+    ("size_mm", "mass_g", "words"),
+    [
+        ((18.4,), None, r"a body of \(18.4,\) mm: give diameter and height"),
+        ((0.0184, 0.065), None, "each from 0.1 to 5000 mm"),
+        ((18.4, float("nan")), None, "each from 0.1 to 5000 mm"),
+        ((18.4, 65.0), 0.047, "makes 2.72 kg/m3, and cells have some 2,500; the mass is in g"),
+        ((1.84, 6.5), 47.0, "and the edges of the body in mm"),
+        ((18.4, 65.0), float("nan"), "a mass of nan g"),
+    ],
+)
+def test_a_body_that_no_cell_has_is_refused(content, size_mm, mass_g, words):
+    with pytest.raises(CellError, match=words):
+        Cell.from_bpx(content).with_body(size_mm, mass_g)
+
+
+def test_a_mass_without_a_volume_is_refused(content):
+    with pytest.raises(CellError, match="a mass of 47 g makes no density without a volume"):
+        replace(Cell.from_bpx(content), volume_m3=None).with_body(mass_g=47.0)
+
+
 def test_cut_offs_of_another_cell_are_taken_or_refused(content):
     cell = Cell.from_bpx(content)
     narrow = cell.with_cut_offs(2.8, 4.1)

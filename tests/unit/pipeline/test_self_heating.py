@@ -52,6 +52,20 @@ def test_a_winding_that_conducts_less_than_the_cell_gives_off_tells_no_case(prof
     assert any("gives off 1 W/K" in one and "temperature_degc is left out" in one for one in said)
 
 
+def test_a_heat_capacity_that_counts_at_a_measured_case_was_told_to_add_nothing(profile, tmp_path):
+    cell, measured, said = CELLS / "lg_18650hg2.bpx.json", tmp_path / "measured.csv", {}
+    pd.read_csv(profile).assign(temperature_degc=30.0).to_csv(measured, index=False)
+    for factor in (1.0, 0.5):
+        effect = CATALOGUE["self_heating"].activate(heat_capacity_factor=factor)
+        told: list[str] = []
+        run = simulate_file(cell, measured, tmp_path / "out.csv", HEATED, [effect], say_notes=told.extend)
+        said[factor] = run.series["temperature_k"][300], " ".join(told)
+    assert said[0.5][0] > said[1.0][0] + 0.1
+    assert "self_heating has nothing to add but the cell's heat capacity." in said[0.5][1]
+    stated = "at 30 degC in every row, as its column states, for its case: the winding is warmer under load"
+    assert f"{stated}; self_heating has nothing to add." in said[1.0][1]
+
+
 def scaled(cell: Cell, factor: float) -> Cell:
     """A cell of the same make, that many times as large."""
     return replace(

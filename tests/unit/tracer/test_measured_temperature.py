@@ -10,6 +10,7 @@ from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.discovery.discover import discovery_content
 from aesi.pipeline.report.words.discoveries import short_finding
 from aesi.tracer import discover
+from aesi.tracer.case.fit_simulation import fit_simulation
 from aesi.tracer.decide.temperatures import fitted_at_fault, left_by_fit, other_temperatures
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.model_state import ModelState
@@ -46,6 +47,18 @@ def test_a_search_for_nothing_but_what_was_measured_ended_in_a_traceback(cell, m
     unknown = discover(cell, [off], soc0=0.9, effects=alone).verdict
     assert unknown.word == "unknown"
     assert "with no effect added" in unknown.reason
+
+
+def test_a_fit_at_a_measured_case_left_out_the_heat_capacity_that_a_simulation_has(cell, make):
+    data, conducting = make(n=600), replace(cell, thermal_conductivity_w_m_k=0.3)
+    heavy = [CATALOGUE["self_heating"].activate(heat_capacity_factor=3.0)]
+    told = replace(data, temperature_degc=np.full(len(data), 25.0))
+    fitted = fit_simulation(conducting, told, 0.9, heavy, "linear")
+    run, file = (
+        simulate(conducting, data.time_s, data.current_a, 0.9, effects, 25.0) for effects in (heavy, ())
+    )
+    assert np.array_equal(fitted.voltage_v, run.voltage_v)
+    assert np.abs(run.voltage_v - file.voltage_v).max() > 1e-4
 
 
 def warm_record(cell, make, column_degc):
