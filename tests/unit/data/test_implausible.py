@@ -203,6 +203,10 @@ def resting(kind, rows=60):
     noise = 5e-5 * rng.standard_normal(rows)
     if kind == "relaxing at 1 uA":
         return time, np.full(rows, 1e-6), 3.6 - 0.08 * np.exp(-time / 200.0) + noise
+    if kind == "relaxing at 5 mA":
+        return time, np.full(rows, 5e-3), 3.6 - 0.08 * np.exp(-time / 600.0) + noise
+    if kind == "relaxing at 20 mA and noise":
+        return time, 0.02 + 5e-4 * rng.standard_normal(rows), 3.6 - 0.08 * np.exp(-time / 600.0) + noise
     if kind == "2 mA and noise":
         return time, 2e-3 + 5e-4 * rng.standard_normal(rows), 3.6 + noise
     current = np.zeros(rows)
@@ -218,6 +222,9 @@ def resting(kind, rows=60):
         ("single steps of 1 uA", 400),
         ("2 mA and noise", 60),
         ("relaxing at 1 uA", 60),
+        ("relaxing at 5 mA", 60),
+        ("relaxing at 5 mA", 360),
+        ("relaxing at 20 mA and noise", 360),
     ],
 )
 def test_a_rest_whose_current_is_noise_was_of_the_wrong_sign_or_magnitudes(tmp_path, kind, rows):
