@@ -235,7 +235,7 @@ def check_sign(columns: Columns, context: Context, advice: str) -> None:
         contradicts, evidence = trend > CLEAR_CORRELATION, "along the test"
         if abs(trend) <= CLEAR_CORRELATION:
             contradicts = other > EXPLAINED_SHARE and right < UNEXPLAINED_SHARE
-        contradicts = contradicts and other > _relaxing(columns)
+        contradicts = contradicts and other >= _relaxing(columns)
     if contradicts:
         row = int(np.argmax(np.abs(np.diff(columns["current_a"])))) + 1
         raise DataError(

@@ -229,3 +229,24 @@ def resting(kind, rows=60):
 )
 def test_a_rest_whose_current_is_noise_was_of_the_wrong_sign_or_magnitudes(tmp_path, kind, rows):
     assert len(read_measurement(written(tmp_path, *resting(kind, rows)))) == rows
+
+
+@pytest.mark.parametrize("rows", [2, 5, 12, -5], ids=lambda rows: f"{rows} rows late")
+@pytest.mark.parametrize("one_way", [False, True], ids=["drive", "discharges alone"])
+def test_a_lag_of_the_voltage_was_a_wrong_sign_or_a_dead_current(tmp_path, one_way, rows):
+    current = np.repeat(np.random.default_rng(8).normal(1.5, 3.0, 600), 3)
+    current = np.abs(current) if one_way else current
+    late = np.interp(TIME - 4.0 * rows, TIME, voltage(current))
+    (note,) = read_measurement(written(tmp_path, TIME, current, late)).notes
+    when = f"{4 * abs(rows)} s too {'late' if rows > 0 else 'early'}"
+    assert f"Its voltage answers to the steps of its current {when}" in note
+    assert "contradicts the one declared" in refusal(tmp_path, TIME, -current, late)
+
+
+def test_a_lag_is_not_told_from_a_few_steps_or_of_a_row(tmp_path):
+    """A logger that writes the voltage a row after its current, and a discharge between two rests."""
+    row_late = np.interp(TIME - 4.0, TIME, voltage(DRIVE))
+    assert read_measurement(written(tmp_path, TIME, DRIVE, row_late)).notes == ()
+    load = np.where((TIME > 1000.0) & (TIME < 1800.0), 3.0, 0.0)
+    later = np.interp(TIME - 40.0, TIME, voltage(load))
+    assert read_measurement(written(tmp_path, TIME, load, later)).notes == ()
