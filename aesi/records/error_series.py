@@ -67,7 +67,7 @@ class ErrorSeries:
 
     @property
     def collector_mol_m3(self) -> Array | None:
-        """(n,) mol/m3, the lower one of the salt concentrations at the two collectors; None where they are no inputs."""
+        """(n,) mol/m3, the lower one of the salt concentrations at the two collectors; None without these inputs."""
         at = [self.input_names.index(name) for name in ("c_e0", "c_eL") if name in self.input_names]
         return self.inputs[:, at].min(axis=1) if at else None
 

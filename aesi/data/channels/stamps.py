@@ -19,18 +19,18 @@ LONGEST_TEST_D = 1000.0
 """Longest test with times in such days."""
 
 MOST_LAG_S = 60.0
-"""Longest lag between the channels that is looked for: two loggers that were started by hand, or whose clocks are set by
-hand. A convention."""
+"""Longest lag between the channels that is looked for: of two loggers that were started by hand, or whose clocks are
+set by hand. A convention."""
 LAG_CORRELATION = 0.5
-"""Least magnitude of the correlation of the steps of current and voltage at a lag that is taken for one. In 249 measured
-and virtual records and 10 min of each it is 0.69 or more at lags of a row of 0.1 s, which 110 of these have, and at most
-0.27 at any other lag of those with LAG_STEPS."""
+"""Least magnitude of the correlation of the steps of current and voltage at a lag that is taken for one. In 249
+measured and virtual records and 10 min of each it is 0.69 or more at lags of a row of 0.1 s, which 110 of these have,
+and at most 0.27 at any other lag of those with LAG_STEPS."""
 LAG_STEPS = 10.0
 """Least number of steps of the current that a lag is told from, as the square of the sum of their squares over the sum
 of their fourth powers: a record of two steps has 2, and is like another one at the distance of these."""
 LAG_DEVIATIONS = 5.0
-"""Least correlation at a lag, in standard deviations of that of as many independent steps: one of 240 lags of a noise is
-beyond it in one of 7,000 rests."""
+"""Least correlation at a lag, in standard deviations of that of as many independent steps. One of 120 lags of a noise
+is beyond it in one of 14,000 rests."""
 LAG_POINTS = 400_000
 """Most points of the even grid on which lags are looked for."""
 LAG_ROWS = 1
@@ -56,8 +56,8 @@ def aligned(columns: Columns, context: Context) -> tuple[Columns, Context, list[
         where,
         [
             f"Its voltage answers to the steps of its current {abs(lag_s):.3g} s too {late} (their correlation is "
-            f"{there:.2f} at that lag and {here:.2f} without), as where two loggers or channels are out of step: what a model "
-            "leaves there is not the cell's; shift one of the two columns by it."
+            f"{there:.2f} at that lag and {here:.2f} without), as where two loggers or channels are out of step: what "
+            "a model leaves there is not the cell's; shift one of the two columns by it."
         ],
     )
 

@@ -250,3 +250,13 @@ def test_a_lag_is_not_told_from_a_few_steps_or_of_a_row(tmp_path):
     load = np.where((TIME > 1000.0) & (TIME < 1800.0), 3.0, 0.0)
     later = np.interp(TIME - 40.0, TIME, voltage(load))
     assert read_measurement(written(tmp_path, TIME, load, later)).notes == ()
+
+
+def test_a_current_with_noise_beside_a_quiet_voltage_was_a_voltage_that_stands_still(tmp_path):
+    """A rest behind a drive, whose voltage is written to 0.1 mV, while its current has a noise of 0.5 %."""
+    drive = np.where(TIME < 3600.0, DRIVE, 0.0)
+    noise = 0.005 * np.abs(DRIVE).max() * np.random.default_rng(4).standard_normal(len(TIME))
+    volts = np.round(voltage(drive), 4)
+    read_measurement(written(tmp_path, TIME, drive + noise, volts))
+    stuck = np.where(TIME < 3600.0, volts, volts[899])
+    assert "the voltage stands still" in refusal(tmp_path, TIME, DRIVE + noise, stuck)
