@@ -41,8 +41,8 @@ the rests of a test."""
 SCATTERS = 6.0
 """Multiple of the noise of the current in a stretch, times the resistance, below which its steps move no voltage: 4.2
 standard deviations of a noise's steps. With a noise of 0.5 % of the largest current, of 226 measured and virtual
-records 97 were refused without it, 1 is with 6 and none with 10. With the voltage held for 600 rows, 306 of 390 cases are found
-without it and with 6, 300 with 10; for 60 rows 83, 62 and 53 of 516."""
+records 97 were refused without it, 1 is with 6 and none with 10. With the voltage held for 600 rows, 306 of 390 cases
+are found without it and with 6, 300 with 10; for 60 rows 83, 62 and 53 of 516."""
 NOISES = 10.0
 """Multiple of the noise of the voltage that a turn has to exceed."""
 
