@@ -15,7 +15,7 @@ from aesi.data.channels.gaps import untold_charge, without_gaps
 from aesi.data.channels.glitches import glitch_doubts, glitches
 from aesi.data.channels.implausible import check_scale, check_sign, check_signed
 from aesi.data.channels.load_columns import keep_rows, load_columns
-from aesi.data.channels.stamps import time_doubts
+from aesi.data.channels.stamps import aligned, time_doubts
 from aesi.data.channels.stuck import check_dead, check_stuck, held_doubts
 from aesi.data.channels.temperature import temperature_doubts
 from aesi.data.readers import open_table
@@ -152,6 +152,8 @@ def _examine(
     course = data, context
     if found.leaps.size:
         course = keep_rows(data, context, np.delete(np.arange(len(data["time_s"])), found.leaps))
+    *course, lagging = aligned(*course)
+    notes.extend(lagging)
     _examine_course(*course, header, sign_advice)
     notes.extend(held_doubts(course[0]))
     return data

@@ -19,6 +19,7 @@ from aesi.physics.model import HeatBalance, of_record
 from aesi.physics.simulation import MODEL_WORDS, model_with
 from aesi.physics.start.temperature import contradicted_temperature
 from aesi.pipeline.product.hybrid import HybridModel
+from aesi.pipeline.product.prediction import Prediction
 from aesi.records import Hold, Measurement, Run, at_its_temperature, measured_on_case
 
 SEPARATOR = ": "
@@ -181,15 +182,16 @@ def of_fitted(
     return tuple(said)
 
 
-def of_dry_collector(name: str, run: Run, model: ModelName) -> tuple[str, ...]:
+def of_dry_collector(name: str, run: Run | Prediction, model: ModelName) -> tuple[str, ...]:
     """A sentence that a single particle model depleted the salt at a collector, with the time; () where it did not."""
-    dry = np.minimum(run.series["c_e0"], run.series["c_eL"]) < 0.0
+    salt_mol_m3 = run.collector_mol_m3
+    dry = np.zeros(len(run), dtype=bool) if salt_mol_m3 is None else salt_mol_m3 < 0.0
     if model != "espm" or not dry.any():
         return ()
     return (
         f"{name}: the salt at a collector is used up in {100 * dry.mean():.2g} % of the rows, from "
         f"{stamp(run.time_s[int(np.argmax(dry))])} s on. There the reaction moves towards the separator, which one "
-        "particle an electrode does not see: compare with --model dfn.",
+        "particle an electrode does not see: compare with `aesi simulate --model dfn`.",
     )
 
 

@@ -207,6 +207,7 @@ def predict_file(
     # One step ahead knows the voltage before each row, which the physics does not: its errors are no peers of these.
     alone_v = None if hybrid.correction is None or measured else prediction.physics_v
     say(reached(hybrid.cell, record, prediction.voltage_v, prediction.soc, alone_v))
+    say(of_dry_collector(record.name, prediction, hybrid.model))
     say(_of_first(record, prediction, hybrid, measured))
     if hybrid.bands is not None and not measured and start.basis == "given" and asked.soc0_sd is None:
         say([_of_exact(record, prediction, hybrid, start.soc)])

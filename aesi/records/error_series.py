@@ -66,6 +66,12 @@ class ErrorSeries:
         return self.inputs[:, self.input_names.index("I")]
 
     @property
+    def collector_mol_m3(self) -> Array | None:
+        """(n,) mol/m3, the lower one of the salt concentrations at the two collectors; None without these inputs."""
+        at = [self.input_names.index(name) for name in ("c_e0", "c_eL") if name in self.input_names]
+        return self.inputs[:, at].min(axis=1) if at else None
+
+    @property
     def degc_or_nan(self) -> Array:
         """(n,) degC of the cell, NaN where it is not known."""
         return np.full(len(self), np.nan) if self.temperature_degc is None else self.temperature_degc

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from aesi.numerics.typing import Array
 from aesi.over_time import extent, over_time
 
@@ -50,6 +52,11 @@ class Run:
         if "soc" in self.series:
             panels["state of charge"] = {"state of charge": self.series["soc"]}
         return over_time(self.time_s, panels)
+
+    @property
+    def collector_mol_m3(self) -> Array:
+        """(n,) mol/m3, the lower one of the salt concentrations at the two collectors."""
+        return np.minimum(self.series["c_e0"], self.series["c_eL"])
 
     @property
     def states(self) -> pd.DataFrame:

@@ -63,10 +63,10 @@ OF_MEDIAN = 1.4826
 """Standard deviation of a normal distribution over its median absolute deviation."""
 
 
-def scatter_v(voltage_v: Array) -> float:
-    """V, standard deviation of the noise of a voltage (n,), from its second differences: they are noise alone where the
-    voltage is smooth, so this overestimates where it moves."""
-    return float(np.median(np.abs(np.diff(voltage_v, 2)))) * OF_MEDIAN / np.sqrt(6.0)
+def scatter(column: Array) -> float:
+    """Standard deviation of the noise of a voltage or a current (n,), n > 2, in its unit, from its second differences:
+    they are noise alone where the column is smooth or runs in steps, so this overestimates where it moves."""
+    return float(np.median(np.abs(np.diff(column, 2)))) * OF_MEDIAN / np.sqrt(6.0)
 
 
 def check_finite(columns: Columns, context: Context) -> None:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-from aesi.data.channels.checks import Columns, Context, scatter_v
+from aesi.data.channels.checks import Columns, Context, scatter
 from aesi.data.channels.implausible import ENOUGH_STEPS, STEP_SHARE
 from aesi.numerics.typing import Array, BoolArray, IntArray
 
@@ -145,9 +145,7 @@ def _jumps(time: Array, current: Array, voltage: Array, ohm: float, lost_v: floa
     explained = ohm * np.where(moved > 0, fall, rise)
     size = np.abs(moved) - lost_v
     far = (size > JUMP_V + EXPLAINED * explained) | (size > BARE_JUMP_V + BARE_EXPLAINED * explained)
-    far |= _still(current) & (
-        size > STILL_JUMP_V + NOISES * scatter_v(voltage) + STEPS_BESIDE * _beside(moved)
-    )
+    far |= _still(current) & (size > STILL_JUMP_V + NOISES * scatter(voltage) + STEPS_BESIDE * _beside(moved))
     return np.flatnonzero(far & (np.diff(time) <= JUMP_S))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aesi.data.channels.checks import Columns, Context, scatter_v
+from aesi.data.channels.checks import Columns, Context, scatter
 from aesi.data.channels.implausible import ENOUGH_STEPS, STEP_SHARE, answer_to_steps, clearest_answer
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
@@ -38,6 +38,11 @@ those 99 records, and 0.64 or more where every third of their voltages is held f
 FAR_ROWS = 3.0
 """Multiple of the median interval beyond which the current between two rows is not known, as where a file holds only
 the rests of a test."""
+SCATTERS = 6.0
+"""Multiple of the noise of the current in a stretch, times the resistance, below which its steps move no voltage: 4.2
+standard deviations of a noise's steps. With a noise of 0.5 % of the largest current, of 226 measured and virtual
+records 97 were refused without it, 1 is with 6 and none with 10. With the voltage held for 600 rows, 306 of 390 cases
+are found without it and with 6, 300 with 10; for 60 rows 83, 62 and 53 of 516."""
 NOISES = 10.0
 """Multiple of the noise of the voltage that a turn has to exceed."""
 
@@ -49,7 +54,7 @@ def check_dead(columns: Columns, context: Context) -> None:
     current, voltage, time = columns["current_a"], columns["voltage_v"], columns["time_s"]
     if len(voltage) < ENOUGH_STEPS:
         return
-    least = max(TURN_V, NOISES * scatter_v(voltage), CLEAR_RESOLUTIONS * _resolution_v(voltage))
+    least = max(TURN_V, NOISES * scatter(voltage), CLEAR_RESOLUTIONS * _resolution_v(voltage))
     within, step = STILL_SHARE * float(np.max(np.abs(current))), np.diff(time)
     goes_on = (np.abs(np.diff(current)) <= within) & (step <= FAR_ROWS * np.median(step))
     ends = np.concatenate([[-1], np.flatnonzero(~goes_on), [len(current) - 1]])
@@ -109,7 +114,8 @@ def _resolution_v(voltage: Array) -> float:
 
 
 def check_stuck(columns: Columns, context: Context) -> None:
-    """Refuse a voltage that is constant while the current rises and falls by steps that change it elsewhere.
+    """Refuse a voltage that is constant while the current rises and falls by steps that change it elsewhere, and by
+    more than its noise.
 
     A voltage that a cycler holds is accepted.
     """
@@ -125,7 +131,8 @@ def check_stuck(columns: Columns, context: Context) -> None:
     for k in np.flatnonzero(np.diff(ends) > 2 * ENOUGH_STEPS):
         begin, end = int(ends[k]) + 1, int(ends[k + 1])
         moves = expected[begin:end]
-        ways = [int(np.sum(way * moves > least)) for way in (1, -1)]
+        of_noise = SCATTERS * -found[0] * scatter(columns["current_a"][begin : end + 1])
+        ways = [int(np.sum(way * moves > max(least, of_noise))) for way in (1, -1)]
         if min(ways) >= ENOUGH_STEPS and not _is_hold(columns, slice(begin, end + 1)):
             raise DataError(
                 f"{context.at('voltage_v', begin)}: the voltage stands still at {voltage[begin]:.6g} V for "

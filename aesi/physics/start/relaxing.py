@@ -22,6 +22,7 @@ import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR, ZERO_CELSIUS_K
 from aesi.numerics.typing import Array, IntArray
+from aesi.physics.belongs import ROWS_APART
 from aesi.physics.rest.open_circuit import OpenCircuit
 from aesi.physics.simulation import ModelName, simulate
 from aesi.physics.start.load import FLOWED_S, HISTORY_C_RATE, OTHER_C_RATES
@@ -57,7 +58,8 @@ WITHIN = np.concatenate([[0.0], np.geomspace(0.02, 1.0, 8)])
 class Rest:
     """The rest at the beginning of a record.
 
-    rows : those before a load starts, or before a small current has changed the state of charge; at least the first.
+    rows : those before a load starts, without the ROWS_APART of them whose voltage may be that of the load already, or
+    before a small current has changed the state of charge; at least the first.
     flows : True where a small current goes on after these rows, and has probably flowed before them.
     """
 
@@ -76,7 +78,10 @@ def resting_rows(record: Measurement, limit_a: float, most_ah: float, hold: Hold
     one_state = np.abs(record.discharged_ah(hold)) <= most_ah
     both = small & one_state
     n = len(record) if both.all() else int(np.argmin(both))
-    return Rest(record.take(slice(0, n)), flows=n < len(record) and bool(small[n]))
+    flows = n < len(record) and bool(small[n])
+    if n < len(record) and not flows:
+        n = max(n - ROWS_APART, 1)
+    return Rest(record.take(slice(0, n)), flows)
 
 
 def settled_voltage(open_circuit: OpenCircuit, rest: Measurement, model: ModelName) -> tuple[float, float]:

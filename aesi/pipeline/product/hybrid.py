@@ -355,6 +355,7 @@ def _back(prediction: Prediction, own: ErrorSeries) -> Prediction:
         outside=onto(prediction.outside.astype(float)) > 0,
         weight=onto(prediction.weight),
         temperature_degc=own.temperature_degc,
+        collector_mol_m3=own.collector_mol_m3,
     )
 
 

@@ -24,6 +24,7 @@ class Prediction:
     weight : (n,) share of the correction that is applied, 0 to 1: it fades towards the physics with the distance from
     the training data. 1 for a correction that does not fade, NaN without one.
     nominal : coverage of the band, 0 to 1; None without one.  temperature_degc : (n,) degC, of the simulated cell.
+    collector_mol_m3 : (n,) the lower one of the salt concentrations at the two collectors, mol/m3, by the physics.
     """
 
     time_s: Array
@@ -36,6 +37,7 @@ class Prediction:
     weight: Array
     nominal: float | None = None
     temperature_degc: Array | None = None
+    collector_mol_m3: Array | None = None
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -91,4 +93,5 @@ class Prediction:
             weight=weight,
             nominal=None if alpha is None else 1.0 - alpha,
             temperature_degc=series.temperature_degc,
+            collector_mol_m3=series.collector_mol_m3,
         )

@@ -203,6 +203,10 @@ def resting(kind, rows=60):
     noise = 5e-5 * rng.standard_normal(rows)
     if kind == "relaxing at 1 uA":
         return time, np.full(rows, 1e-6), 3.6 - 0.08 * np.exp(-time / 200.0) + noise
+    if kind == "relaxing at 5 mA":
+        return time, np.full(rows, 5e-3), 3.6 - 0.08 * np.exp(-time / 600.0) + noise
+    if kind == "relaxing at 20 mA and noise":
+        return time, 0.02 + 5e-4 * rng.standard_normal(rows), 3.6 - 0.08 * np.exp(-time / 600.0) + noise
     if kind == "2 mA and noise":
         return time, 2e-3 + 5e-4 * rng.standard_normal(rows), 3.6 + noise
     current = np.zeros(rows)
@@ -218,7 +222,41 @@ def resting(kind, rows=60):
         ("single steps of 1 uA", 400),
         ("2 mA and noise", 60),
         ("relaxing at 1 uA", 60),
+        ("relaxing at 5 mA", 60),
+        ("relaxing at 5 mA", 360),
+        ("relaxing at 20 mA and noise", 360),
     ],
 )
 def test_a_rest_whose_current_is_noise_was_of_the_wrong_sign_or_magnitudes(tmp_path, kind, rows):
     assert len(read_measurement(written(tmp_path, *resting(kind, rows)))) == rows
+
+
+@pytest.mark.parametrize("rows", [2, 5, 12, -5], ids=lambda rows: f"{rows} rows late")
+@pytest.mark.parametrize("one_way", [False, True], ids=["drive", "discharges alone"])
+def test_a_lag_of_the_voltage_was_a_wrong_sign_or_a_dead_current(tmp_path, one_way, rows):
+    current = np.repeat(np.random.default_rng(8).normal(1.5, 3.0, 600), 3)
+    current = np.abs(current) if one_way else current
+    late = np.interp(TIME - 4.0 * rows, TIME, voltage(current))
+    (note,) = read_measurement(written(tmp_path, TIME, current, late)).notes
+    when = f"{4 * abs(rows)} s too {'late' if rows > 0 else 'early'}"
+    assert f"Its voltage answers to the steps of its current {when}" in note
+    assert "contradicts the one declared" in refusal(tmp_path, TIME, -current, late)
+
+
+def test_a_lag_is_not_told_from_a_few_steps_or_of_a_row(tmp_path):
+    """A logger that writes the voltage a row after its current, and a discharge between two rests."""
+    row_late = np.interp(TIME - 4.0, TIME, voltage(DRIVE))
+    assert read_measurement(written(tmp_path, TIME, DRIVE, row_late)).notes == ()
+    load = np.where((TIME > 1000.0) & (TIME < 1800.0), 3.0, 0.0)
+    later = np.interp(TIME - 40.0, TIME, voltage(load))
+    assert read_measurement(written(tmp_path, TIME, load, later)).notes == ()
+
+
+def test_a_current_with_noise_beside_a_quiet_voltage_was_a_voltage_that_stands_still(tmp_path):
+    """A rest behind a drive, whose voltage is written to 0.1 mV, while its current has a noise of 0.5 %."""
+    drive = np.where(TIME < 3600.0, DRIVE, 0.0)
+    noise = 0.005 * np.abs(DRIVE).max() * np.random.default_rng(4).standard_normal(len(TIME))
+    volts = np.round(voltage(drive), 4)
+    read_measurement(written(tmp_path, TIME, drive + noise, volts))
+    stuck = np.where(TIME < 3600.0, volts, volts[899])
+    assert "the voltage stands still" in refusal(tmp_path, TIME, DRIVE + noise, stuck)

@@ -55,6 +55,15 @@ def test_a_rest_gives_its_state_of_charge_within_the_uncertainty_it_claims(soc):
     assert abs(found.soc - soc) < found.sd
 
 
+@pytest.mark.parametrize(("rows", "step_s"), [(2, 10.0), (3, 60.0), (30, 10.0)])
+def test_a_rest_whose_last_row_held_the_voltage_of_the_load_relaxed_to_far_less(rows, step_s):
+    """A logger that writes the current a row after its voltage."""
+    time = step_s * np.arange(rows + 20)
+    run = simulate(LG_M50, time, np.where(np.arange(rows + 20) < rows, 0.0, 5.0), 0.6, hold="backward")
+    found = initial_state(LG_M50, record(time, np.append(0.0, run.current_a[:-1]), run.voltage_v))
+    assert abs(found.soc - 0.6) < min(0.01, found.sd)
+
+
 @pytest.mark.parametrize("below_mv", [0.0, 6.0, 20.0])
 def test_a_full_charge_that_relaxed_is_state_of_charge_one(below_mv):
     found = initial_state(LG_M50, resting(LG_M50.upper_voltage_v - 1e-3 * below_mv))

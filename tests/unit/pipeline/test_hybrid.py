@@ -429,6 +429,20 @@ def test_a_dead_temperature_was_simulated_at_without_a_word(model, data, tmp_pat
     assert not found or found[0].startswith("drive: its voltage contradicts its temperature. The error of ")
 
 
+@pytest.mark.parametrize("measured", [False, True], ids=["free run", "one step ahead"])
+@pytest.mark.parametrize(("column_degc", "told"), [(-20.0, ["from 47 s on"]), (25.0, [])])
+def test_a_collector_that_runs_dry_was_predicted_without_a_word(model, tmp_path, column_degc, told, measured):
+    time, said = np.arange(120.0), []
+    run = aesi.simulate(model.cell, time, np.full(120, 90.0), 1.0, temperature_degc=column_degc)
+    columns = {"time_s": time, "current_a": run.current_a, "voltage_v": run.voltage_v}
+    pd.DataFrame(columns | {"temperature_degc": column_degc}).to_csv(tmp_path / "pulse.csv", index=False)
+    folder = HybridModel(model.cell, hold="linear").save(tmp_path / "physics")
+    asked = ProfileRequest(soc0=1.0)
+    predict_file(folder, tmp_path / "pulse.csv", tmp_path / "out.csv", asked, measured, said.extend)
+    dry = [note for note in said if "the salt at a collector is used up" in note]
+    assert [words in note for note, words in zip(dry, told, strict=True)] == [True] * len(told)
+
+
 def test_physics_with_effects_alone_is_a_model_too(model, data, tmp_path):
     effect = CATALOGUE["series_resistance"].activate(resistance_ohm=1.5e-3)
     folder = HybridModel(model.cell, (effect,), hold="backward").save(tmp_path / "physics")

@@ -140,5 +140,5 @@ def test_a_collector_without_salt_is_told_with_when_and_which_model_sees_it():
     (told,) = of_dry_collector("cold", dry, "espm")
     assert "cold: the salt" in told
     assert "from 47 s on" in told
-    assert "--model dfn" in told
+    assert "`aesi simulate --model dfn`" in told  # in `aesi predict`, --model is another option
     assert of_dry_collector("warm", wet, "espm") == of_dry_collector("cold", dry, "dfn") == ()
