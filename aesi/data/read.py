@@ -152,7 +152,8 @@ def _examine(
     course = data, context
     if found.leaps.size:
         course = keep_rows(data, context, np.delete(np.arange(len(data["time_s"])), found.leaps))
-    *course, lagging = aligned(*course)
+    moved, context, lagging = aligned(*course)
+    course = moved, context
     notes.extend(lagging)
     _examine_course(*course, header, sign_advice)
     notes.extend(held_doubts(course[0]))
