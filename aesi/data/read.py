@@ -152,11 +152,10 @@ def _examine(
     course = data, context
     if found.leaps.size:
         course = keep_rows(data, context, np.delete(np.arange(len(data["time_s"])), found.leaps))
-    moved, context, lagging = aligned(*course)
-    course = moved, context
+    in_step, of_it, lagging = aligned(*course)
     notes.extend(lagging)
-    _examine_course(*course, header, sign_advice)
-    notes.extend(held_doubts(course[0]))
+    _examine_course(in_step, of_it, header, sign_advice)
+    notes.extend(held_doubts(in_step))
     return data
 
 

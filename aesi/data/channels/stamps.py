@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import correlate
 
 from aesi.constants import MILLI
 from aesi.data.channels.checks import Columns, Context
@@ -74,8 +73,10 @@ def _lag(columns: Columns) -> tuple[float, float, float]:
         return 0.0, 0.0, 0.0
     steps = float(squares.sum()) ** 2 / float(np.square(squares).sum())
     size = float(np.linalg.norm(current) * np.linalg.norm(voltage))
-    most, middle = min(max(int(MOST_LAG_S / step_s), LAG_ROWS), len(current) - 1), len(current) - 1
-    likeness = correlate(voltage, current, method="fft")[middle - most : middle + most + 1] / size
+    most = min(max(int(MOST_LAG_S / step_s), LAG_ROWS), len(current) - 1)
+    padded = 1 << (len(current) + most).bit_length()  # without it the ends would meet
+    spectrum = np.fft.rfft(voltage, padded) * np.conj(np.fft.rfft(current, padded))
+    likeness = np.fft.irfft(spectrum, padded)[np.arange(-most, most + 1)] / size
     best = int(np.argmax(np.abs(likeness)))
     least = max(LAG_CORRELATION, LAG_DEVIATIONS / np.sqrt(steps))
     if steps < LAG_STEPS or abs(likeness[best]) <= least:
