@@ -67,7 +67,7 @@ def predict(
         float | None,
         typer.Option(
             "--soc0-sd",
-            callback=options.share("--soc0-sd"),
+            callback=options.share("--soc0-sd", options.ITS_DEVIATION),
             help="How far --soc0 may be off, one standard deviation, by which the band of a free run is wider.",
         ),
     ] = None,

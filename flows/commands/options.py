@@ -27,15 +27,21 @@ CellOption = Annotated[Path, _CELL]
 CellUnlessExperiment = Annotated[Path | None, _CELL]
 
 
-def share(option: str) -> Callable[[float | None], float | None]:
-    """What lets a state of charge through, and raises InputError, naming the option, for one that is no share."""
+A_STATE = "a state of charge is a share of the capacity, from 0 (empty) to 1 (full); 90 % is 0.9"
+ITS_DEVIATION = (
+    "how far a state of charge may be off is a share of the capacity, from 0 (exact) to 1; 1 % is 0.01"
+)
+
+
+def share(option: str, of: str = A_STATE) -> Callable[[float | None], float | None]:
+    """What lets a share of the capacity through, and raises InputError, naming the option, for what is none.
+
+    of : what the share is of, for the sentence.
+    """
 
     def checked(value: float | None) -> float | None:
         if value is not None and not 0.0 <= value <= 1.0:
-            raise InputError(
-                f"{option} {value:g}: a state of charge is a share of the capacity, from 0 (empty) to 1 (full); 90 % "
-                "is 0.9."
-            )
+            raise InputError(f"{option} {value:g}: {of}.")
         return value
 
     return checked

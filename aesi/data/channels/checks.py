@@ -196,10 +196,12 @@ def check_ranges(columns: Columns, context: Context) -> None:
             row = int(np.argmax(absurd))
             warm = temperature[row] > WARMEST_DEGC and context.unit.get("temperature_degc") != "K"
             kelvin = " (in kelvin? --unit temperature_degc=K)" if warm else ""
+            stated = "temperature_degc" not in context.header
+            place = f"{context.file}: stated for every row" if stated else context.at("temperature_degc", row)
+            mend = "state another" if stated else "correct the column"
             raise DataError(
-                f"{context.at('temperature_degc', row)}: {temperature[row]:.6g} degC is outside "
-                f"{COLDEST_DEGC:g} to {WARMEST_DEGC:g} degC{kelvin}; correct the column or leave it "
-                "out: --column temperature_degc=."
+                f"{place}: {temperature[row]:.6g} degC is outside {COLDEST_DEGC:g} to {WARMEST_DEGC:g} degC{kelvin}; "
+                f"{mend} or leave it out: --column temperature_degc=."
             )
 
 

@@ -460,11 +460,16 @@ def test_the_unit_of_a_stated_temperature_was_dropped(tmp_path, stated, unit):
     )
 
 
-def test_a_stated_temperature_that_no_cell_has_is_refused(tmp_path):
+def test_a_stated_temperature_that_no_cell_has_was_looked_for_in_a_column_of_the_file(tmp_path):
     path = tmp_path / "drive.csv"
     path.write_text(text())
-    with pytest.raises(DataError, match="column temperature_degc"):
+    with pytest.raises(DataError) as caught:
         read_measurement(path, {"temperature_degc": "298.15"})
+    assert str(caught.value).startswith(
+        "drive.csv: stated for every row: 298.15 degC is outside -60 to 150 degC (in kelvin? --unit "
+    )
+    assert "state another" in str(caught.value)
+    assert "row 1" not in str(caught.value)
 
 
 def test_decimation_keeps_the_charge_and_is_said(tmp_path):
