@@ -87,8 +87,8 @@ RELAXING_FOR = (0.01, 0.03, 0.1, 0.3, 1.0, 10.0)
 """Time constants of a relaxation that goes on throughout a record, as shares of its length; with the last it goes on
 evenly, as under a constant current. A sign is wrong only where the opposite one explains the voltage better than that:
 without it 270 of 900 simulated rests whose current is an offset of 1 to 20 mA were refused, with it none. Of 1,151
-measured records and pieces of 10 min and 1 h with the opposite sign, 928 are refused with it and 972 without; the 44
-are pieces of one held current, all of the records are among the 928 as before."""
+measured records and pieces of 10 min and 1 h with the opposite sign, 929 are refused with it and 972 without; the 43
+are short pieces, all of the records are among the 929 as before."""
 CHANCE = 1e-3
 """Probability with which noise may explain as much of a voltage as the evidence for a sign. Of 300 simulated rests each
 of 18, 60 and 500 rows, with a current of single steps of 1 to 8 uA, 31, 33 and 21 were refused as of the wrong sign and
