@@ -115,11 +115,11 @@ def untold_charge(columns: Columns) -> list[str]:
         "backward": f"{since:.3g} Ah with the current of the row after",
         "linear": f"{straight:.3g} Ah with straight lines between the rows",
     }
-    taken = assumed_hold(columns["time_s"])
-    other = ways["linear" if taken == "backward" else "backward"]
+    taken = ways.pop(assumed_hold(columns["time_s"]))
+    (other,) = ways.values()
     return [
-        f"Some rows are far apart where the current changes, so that they do not tell the charge that moved: either "
-        f"way {ways[taken]}, as is assumed unless --hold says otherwise, {other}, {until:.3g} Ah with that of the row "
+        "Some rows are far apart where the current changes, so that they do not tell the charge that moved: either "
+        f"way {taken}, as is assumed unless --hold says otherwise, {other}, {until:.3g} Ah with that of the row "
         "before. Where another is true declare it, or give the rows before and after each change, or leave out where "
         "they are missing (--from-s, --to-s)."
     ]
