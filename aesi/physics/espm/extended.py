@@ -35,17 +35,19 @@ from aesi.physics.espm.tables import (
     rate_tables,
     solid_diffusion,
 )
-from aesi.physics.model import NO_PLATING, EspmModel, activation_energies, heat_numbers, of_record
+from aesi.physics.model import NO_PLATING, EspmModel, activation_energies, heat_numbers
 from aesi.records import Hold
 
 
 def run_extended(
     model: EspmModel, time: Array, current: Array, temperature_k: Array | None, soc0: float, hold: Hold
 ) -> tuple[Array, dict[str, Array], int, int]:
-    """(rows as of `plain.run_plain`, further states by name, sample of the first fault (-1 for none), its kind)."""
+    """(rows as of `plain.run_plain`, further states by name, sample of the first fault (-1 for none), its kind).
+
+    model : that of the record, see `of_record`.
+    """
     from aesi.physics.espm.extended_kernels import run_general
 
-    model = of_record(model, temperature_k is not None)
     out = np.empty((9, len(time)))
     theta0 = np.array(model.cell.stoichiometries(soc0))
     given = temperature_k is not None
