@@ -14,8 +14,8 @@ REACHED_MV = 0.3
 DOUBLE_LAYER_F_M2 = 2.0
 COEFFICIENT_W_M2_K = 5.0
 MIXING_THROUGH, MIXING_RADIAL = 20, 30
-"""A coarser mesh for the heat of mixing, by which the peer's temperature depends on every concentration at once: 0.17 mV
-and 0.051 K apart in 29 s, where 12 and 20 volumes leave 0.39 mV and 0.057 K, and 20 and 40 take 42 s for 0.16 and
+"""A coarser mesh for the heat of mixing, by which the peer's temperature depends on every concentration at once: 0.17
+mV and 0.051 K apart in 29 s, where 12 and 20 volumes leave 0.39 mV and 0.057 K, and 20 and 40 take 42 s for 0.16 and
 0.051."""
 
 
