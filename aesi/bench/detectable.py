@@ -70,7 +70,7 @@ def seen_on_measured(
     try:
         problem = inverse_problem(declared, [data], soc0, holdout, good=good)
         problem = replace(problem, trust="beside" if good else "measured")
-        archive = Archive(None, "")  # shared by all answers, so that hypotheses without them are fitted only once
+        archive = Archive(None, "")  # shared, so that hypotheses without them are fitted once
         said = [_said_more(problem, (name,), archive) for name in answers]
     except AesiError:
         return None
