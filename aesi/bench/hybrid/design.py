@@ -65,7 +65,6 @@ def run(
     settings: Sequence[str] = tuple(SETTINGS),
     seed: NonNegativeInt = 0,
     sindy: bool = True,
-    **_: Any,
 ) -> Iterator[dict[str, Any]]:
     """One row per setting: the reduction of the mean squared error in free run on the test cycles, over all cells.
 

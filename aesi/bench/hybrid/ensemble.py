@@ -50,7 +50,6 @@ def run(
     resamples: PositiveInt = 100,
     peer_models: PositiveInt = 2,
     seed: NonNegativeInt = 0,
-    **_: Any,
 ) -> Iterator[dict[str, Any]]:
     """One row per case: processor times for all candidates, their ratio, errors of the coefficients, peak memory.
 

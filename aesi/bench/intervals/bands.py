@@ -120,7 +120,6 @@ def run(
     cells: PositiveInt = 40,
     layouts: Sequence[SplitLayout] = LAYOUTS,
     seed: NonNegativeInt = 0,
-    **_: Any,
 ) -> Iterator[dict[str, Any]]:
     """One row per layout, horizon and design.
 

@@ -82,7 +82,6 @@ def run(
     peer_steps: NonNegativeInt = 1,
     mapie_steps: NonNegativeInt = 200,
     seed: NonNegativeInt = 0,
-    **_: Any,
 ) -> Iterator[dict[str, Any]]:
     """One row per method: processor times of this package and of the peer for all test steps, s; coverage, per cent;
     width and scores, V; peak memory, MiB.
