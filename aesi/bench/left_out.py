@@ -147,7 +147,8 @@ def table(rows: Sequence[CaseRow]) -> list[str]:
     """Lines of a Markdown table with one line per left-out record; the largest ratio is in bold."""
     worst = max((row.get("times_better", 0.0) for row in rows), default=0.0)
     lines = [
-        "| cell | left-out record | verdict | declared, mV | recalibrated, mV | written, mV | written / better |",
+        "| cell | left-out record | verdict | declared, mV | recalibrated, mV | as written, mV "
+        "| as written / better |",
         "|---|---|---|---:|---:|---:|---:|",
     ]
     for row in rows:
