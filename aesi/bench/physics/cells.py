@@ -7,8 +7,8 @@ Each record is simulated whole, from the state of charge that `initial_state` fi
     with_temperature  the same file, at the measured temperature of the record
     aged              the same, at the state of health that the calibration gives the cell for the day of the record
                       (`aesi.bench.physics.tested`); the cells aged during months of tests
-    windows           the calibrated file under the protocol of a publication: windows of WINDOW_ROWS rows, each from
-                      rest at a given state of charge
+    windows           the calibrated file, or else the published one, under the protocol of a publication: windows of
+                      WINDOW_ROWS rows, each from rest at a given state of charge
 
 The figures are RMS errors of the voltage, mV. A model that runs out of lithium or salt (`aesi.physics.depletion`) is
 held at that limit to the end of the record; `ran_out` gives the time, s, and the figure counts all rows. Where a tester

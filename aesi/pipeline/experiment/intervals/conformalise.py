@@ -36,8 +36,8 @@ def conformalise(
 
     All models are calibrated on the validation records; the ensembles also on each training piece, predicted by a model
     fitted without it; the physics models also on the training records.
-    left_out : the training drives under physics that was fitted without some of their rows; by default there are none.
-    Bands are calibrated on left-out parts of drives and on whole left-out drives.
+    left_out : the training drives under physics that was fitted without some of their rows; by default they are under
+    the physics as it is. Bands are calibrated on left-out parts of drives and on whole left-out drives.
     """
     return tuple(_conformalised(one, problem, chosen, config, left_out or LeftOutDrives()) for one in models)
 

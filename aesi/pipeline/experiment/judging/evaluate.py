@@ -237,7 +237,7 @@ def _ahead(one: Fitted, test: Sequence[_Judged]) -> dict[float, list[Array]]:
 
 def _k_step(one: Fitted, test: Sequence[_Judged]) -> dict[str, dict[str, float]]:
     """RMSE on the test records by horizon, mV, at the rows as measured, and that of persistence. The horizons are those
-    of the tables that are whole numbers of the records' time step."""
+    of the tables that are multiples of the records' time step."""
     ours, held = {}, {}
     for horizon in in_whole_steps(test[0].series.dt_s):
         rows = [rows_ahead(one.model, r.series, r.series.steps(horizon)) for r in test]
