@@ -1,4 +1,7 @@
-"""Benchmarks against other programs, by name; each yields one JSON-ready dict per line."""
+"""Registry of the benchmarks that compare this package with other programs or with measurements.
+
+Each benchmark is a module with a generator `run`, whose rows `aesi bench NAME --json` prints, one JSON object per line.
+"""
 
 from collections.abc import Iterable, Sequence
 from typing import Any, TypeVar
@@ -6,7 +9,7 @@ from typing import Any, TypeVar
 from aesi.errors import InputError
 
 CaseRow = dict[str, Any]
-"""Row of one case: name -> JSON-ready value."""
+"""One row of a benchmark: key -> value that JSON can hold. The last part of a key is the unit (`rmse_mv`, `ours_s`)."""
 
 BENCHMARKS = {
     "espm": "aesi.bench.physics.espm",
@@ -20,16 +23,16 @@ BENCHMARKS = {
     "drift": "aesi.bench.intervals.drift",
     "cells": "aesi.bench.physics.cells",
 }
-"""Name -> module with a function `run(**options) -> Iterator[dict]`."""
+"""Name of a benchmark -> module with a generator `run(**options)` of rows (`CaseRow`)."""
 
 Chosen = TypeVar("Chosen")
 
 
 def some_chosen(name: str, cases: Sequence[Chosen], names: Iterable[str]) -> Sequence[Chosen]:
-    """The chosen cases of a benchmark.  Raises InputError where there is none: a summary without cases would look like
-    a result.
+    """The cases that the options of a benchmark have selected, unchanged.
 
-    names : possible values of its option `only`.
+    name : of the benchmark.  cases : the selection.  names : values that its option `only` can take.
+    Raises InputError if the selection is empty, since a summary of no cases would look like a result.
     """
     if not cases:
         there = ", ".join(dict.fromkeys(names))

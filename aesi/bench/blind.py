@@ -1,8 +1,10 @@
-"""Does the tracer name what is missing? Labelled cases that PyBaMM made, the label kept from the tracer.
+"""`aesi bench blind`: does the tracer name the effect that a virtual cell lacks, when the label is withheld from it?
 
-One row per case, and a summary: strict rates with their intervals and lenient ones, by kind of case; the remaining
-error, the errors of the parameters and the coverage of their intervals; stated confidence against the frequency of
-being right; the confusion matrix. A case that exceeds its processor time, or that the tracer refuses, is a miss.
+PyBaMM simulates the measurements of a cell with known effects; the tracer gets the cell file without these effects. The
+benchmark yields one row per case and a summary. The summary has the strict and the lenient rates of right answers with
+95 % intervals, by kind of case; the error that is left; the errors of the estimated parameters and the coverage of
+their intervals; the stated confidence beside the frequency of right answers; and the confusion matrix. A case that
+exceeds its processor time, or that the tracer refuses, counts as a wrong answer.
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ from aesi.pipeline.discovery.discover import discovery_content
 from aesi.tracer import discover
 
 LIMIT_S = 180.0
-"""Processor time of a case, s, after which it counts as not answered."""
+"""Limit of the processor time of one case, s. A case that takes longer counts as not answered. A convention."""
 
 
 def chosen(
@@ -37,11 +39,12 @@ def chosen(
     every: int = 1,
     after: int = 0,
 ) -> Sequence[CaseSpec]:
-    """Cases of the plan, or of the small plan for tests.
+    """The selected cases of the plan of a seed.
 
-    cases : number of cases, from the first (None: all).  only : substring of a recipe's name, or a kind of case.
-    every : take each n-th case.  after : number of first cases left out, since they may have been looked at.
-    Raises InputError where none is left.
+    cases : number of cases, counted from the first; None selects all.  only : a kind of case, or a substring of the
+    recipe's name.  small : take the small plan, which serves tests.  seed : of the plan.  every : take each n-th case.
+    after : number of first cases that are skipped because they may have been looked at.
+    The options apply in the order only, every, after, cases.  Raises InputError if no case is selected.
     """
     specs = small_plan(seed) if small else plan(seed, FULL)
     found = [s for s in specs if only is None or only in (s.kind, *s.recipes) or only in "+".join(s.recipes)]
@@ -50,10 +53,10 @@ def chosen(
 
 
 def judged(spec: CaseSpec, cells: str, limit_s: float | None = LIMIT_S) -> dict[str, Any]:
-    """The row of one case, generated and judged.
+    """Generate one case, run the tracer on it and return its row.
 
-    cells : folder of the declared cell files.  limit_s : processor seconds of the tracer; a case that takes longer
-    is a miss.
+    cells : folder of the declared cell files.  limit_s : limit of the tracer's processor time, s; None sets no limit. A
+    case that takes longer counts as wrong. A case that the laboratory cannot simulate has the verdict NOT_MADE.
     """
     spent = Stopwatch()
     try:
@@ -64,14 +67,14 @@ def judged(spec: CaseSpec, cells: str, limit_s: float | None = LIMIT_S) -> dict[
 
 
 def lost(spec: CaseSpec) -> dict[str, Any]:
-    """The row of a case whose process the system ended: a miss, of unknown detectability."""
+    """The row of a case whose process the operating system ended. It counts as wrong; its detectability is unknown."""
     told = {"label": label_of(spec), "unexplained_mv": None, "seen_nats": None}
     return _planned(spec) | told | LOST.row | MISSED | NO_TIME
 
 
 NOT_MADE = "not made"
-"""Verdict of a case that the laboratory cannot make as planned, for example because it reaches a voltage limit: it is
-counted, but not in any rate."""
+"""Verdict of a case that the laboratory cannot simulate as planned, for example because the voltage reaches a limit.
+The summary counts these cases (`not_made`), but no rate includes them."""
 
 
 def _planned(spec: CaseSpec) -> dict[str, Any]:
@@ -111,7 +114,7 @@ MISSED: dict[str, Any] = {
     "false_name": False,
     "fitted": False,
 }
-"""Scores of a case without an answer."""
+"""Scores of a case that gave no answer."""
 
 
 def _scored(case: BlindCase, content: Mapping[str, Any]) -> dict[str, Any]:
@@ -139,8 +142,11 @@ def _scored(case: BlindCase, content: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _parameters(case: BlindCase, content: Mapping[str, Any]) -> tuple[list[float], list[bool]]:
-    """(relative errors of the parameters whose truth is known under the same name, True where the 90 % interval
-    contains the truth; False without an interval)."""
+    """Relative errors of the named effects' parameters, and whether the 90 % interval of each contains the true value.
+
+    Only parameters are compared whose true value is known under the same name and is not zero. A parameter without an
+    interval counts as not covered.
+    """
     errors, covered = [], []
     for candidate in content["candidates"]:
         if candidate["effect"] not in content["effects"]:
@@ -155,7 +161,12 @@ def _parameters(case: BlindCase, content: Mapping[str, Any]) -> tuple[list[float
 
 
 def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Strict rates with intervals and lenient ones, medians, calibration, and the confusion matrix."""
+    """The summary row: strict and lenient rates in per cent with 95 % intervals, medians, the calibration of the
+    confidence, and the confusion matrix.
+
+    Keys that begin with `seen` are of the cases with effects that the data can tell (`SEEN_NATS`); `stranger` means a
+    case whose effect is in no catalogue. `after_over_noise_median` is the error on held-out data over the noise.
+    """
     planned, rows = rows, [r for r in rows if r["verdict"] != NOT_MADE]
     effect = [r for r in rows if r["label"] not in ("none", "unknown")]
     nothing = [r for r in rows if r["label"] == "none"]
@@ -205,12 +216,13 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _answered(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Those that can hold a name; of the others it is not known whether it had been a false one."""
+    """The rows with an answer. Rates of false names are over these: of the other rows it is unknown which effects the
+    tracer would have named."""
     return [r for r in rows if r["verdict"] not in NO_ANSWER]
 
 
 def _confusion(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, int]]:
-    """Label -> answer -> number of cases."""
+    """Confusion matrix: label -> answer -> number of cases."""
     counts: dict[str, Counter[str]] = {}
     for row in rows:
         answer = "+".join([row["verdict"] if row["verdict"] != "found" else "", *row["effects"]]).strip("+")
@@ -219,13 +231,18 @@ def _confusion(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, int]]:
 
 
 def table(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """Lines of Markdown, with one line per case in a note. `nats`: log likelihood of unseen data under the label minus
-    that without effects."""
+    """Lines of Markdown: a table with one line per case, in a block that the reader can open.
+
+    Columns: `missing effect` is the label and `RMS` its change of the noise-free voltage; `nats` is the gain in log
+    likelihood of held-out data under the label (`seen_nats`); `held-out error / noise` is the RMS error of the written
+    model on held-out data over the sensor noise; `contradicted` marks verdicts `found` or `none` that leave a larger
+    error there than a right explanation may.
+    """
     lines = [
         '??? note "Each case"',
         "",
-        "    | cell | truth | records | lacks | by, mV | nats | answer | exact | in a group | test part / noise "
-        "| contradicted |",
+        "    | cell | truth | records | missing effect | RMS, mV | nats | answer | exact | in a group "
+        "| held-out error / noise | contradicted |",
         "    |---|---|---|---|---:|---:|---|---|---|---:|---|",
     ]
     for row in (row for row in rows if row["verdict"] != NOT_MADE):

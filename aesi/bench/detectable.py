@@ -1,8 +1,8 @@
-"""Can the effects of a labelled case be detected at all, by any finder with this likelihood?
+"""Detectability of the effects of a labelled case: can any search with the tracer's likelihood find them?
 
-A case specifies a change of the voltage of some size. Initial state of charge and the cell's parameters may absorb most
-of it, and on a measured cell so may the errors of its models. The detectability is the log likelihood of unseen data
-under all effects of the label minus that under the best hypothesis that lacks one of them.
+The effects of a case change the voltage. A fit of the initial state of charge and of the cell's own parameters can
+absorb most of this change, and on a measured cell so can the model error. The detectability is the log likelihood of
+held-out data under all effects of the label minus that under the best hypothesis that lacks one of them, in nats.
 """
 
 from __future__ import annotations
@@ -24,13 +24,16 @@ from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import fitted_hypothesis
 
 SEEN_NATS = 5.0
-"""Gain in log likelihood that an effect needs to be admitted: 3.8 to 5.4 nats on 14 development cases of `aesi bench
-blind`, by surrogates."""
+"""Gain in log likelihood, nats, above which an effect counts as detectable. It is about the gain that the tracer
+requires to admit an effect, which surrogates give as 3.8 to 5.4 nats on 14 development cases of `aesi bench blind`."""
 
 
 def seen_nats(case: BlindCase) -> float | None:
-    """Log likelihood of unseen data, nats, under the label minus that under the best hypothesis without one of its
-    effects; None for a case without effects, or one that the tracer refuses or the model cannot simulate."""
+    """Detectability of a blind case, nats: the log likelihood of held-out data under the label minus that under the
+    best hypothesis without one of its effects.
+
+    None for a case without effects, for one that the tracer refuses, and for one that the model cannot simulate.
+    """
     if not case.effects:
         return None
     try:
@@ -40,7 +43,8 @@ def seen_nats(case: BlindCase) -> float | None:
 
 
 def label_problem(case: BlindCase) -> InverseProblem:
-    """The inverse problem in which the label is fitted: the case with the model that generated it."""
+    """The inverse problem in which the label is fitted. Its cell model is of the kind that generated the case (`dfn` or
+    `espm`), so that the order reduction of the model is no part of the error."""
     model: ModelName = "dfn" if case.spec.model == "DFN" else "espm"
     return with_fine_numerics(
         inverse_problem(Cell.from_bpx(case.declared), case.measurements, case.soc0, model=model)
@@ -55,16 +59,18 @@ def seen_on_measured(
     good: Sequence[Measurement] = (),
     holdout: float = 0.3,
 ) -> float | None:
-    """Log likelihood of unseen data, nats, under the best of several right answers minus that under the declared model,
-    with the model error of measured cells. None where there is no right name, where none of them can be simulated, or
-    where the tracer refuses the records.
+    """Detectability of the answer on a measured record, nats: the log likelihood of held-out data under the best of the
+    right answers minus that under the declared model, with the model error of measured cells.
 
-    good : records of the cell that are known to be good.  holdout : last share of the data that is held out.
+    declared : the cell as its file declares it.  soc0 : state of charge at the first row; None if unknown.
+    answers : effects, each of which is a right answer.  good : known-good records of the cell.
+    holdout : last share of the data that is held out, 0 to 1.
+    None if there is no right answer, if none of them can be simulated, or if the tracer refuses the records.
     """
     try:
         problem = inverse_problem(declared, [data], soc0, holdout, good=good)
         problem = replace(problem, trust="beside" if good else "measured")
-        archive = Archive(None, "")  # shared: reference hypotheses are fitted once
+        archive = Archive(None, "")  # shared, so that hypotheses without them are fitted once
         said = [_said_more(problem, (name,), archive) for name in answers]
     except AesiError:
         return None
@@ -72,7 +78,8 @@ def seen_on_measured(
 
 
 def _said_more(problem: InverseProblem, effects: tuple[str, ...], archive: Archive) -> float | None:
-    """Log likelihood of unseen data, nats, minus that under the best hypothesis that lacks one of the effects."""
+    """Log likelihood of held-out data under the effects minus that under the best hypothesis that lacks one of them,
+    nats; None if the effects cannot be simulated."""
     blocks = blocks_of(problem)
 
     def fit(hypothesis: tuple[str, ...]) -> FittedHypothesis | None:

@@ -1,14 +1,16 @@
 """How large is the error of models of measured cells within seconds? Measures the fast model error of the tracer.
 
-Each development control at 25 degC with a changing current is fitted as the tracer fits a measured cell. For the
-residual minus its mean over `WINDOW_S`, the command prints the size, the correlation time, and the share of a wrong
-resistance. Then each effect is fitted, to first order. No fault was added, so sizes over their standard deviations have
-a standard deviation of one if the tracer assumes the right number of independent samples. The real lag between the
-channels of a cycler is excluded from that.
+The records are the development controls of `aesi bench real` (no fault added) at 25 degC with a changing current. The
+cell model is fitted to each as the tracer fits a measured cell. For the fast residual, which is the residual minus its
+mean over `WINDOW_S` (aesi/tracer/case/blocks.py), the command prints the RMS, the correlation time, and the relative
+error of the ohmic resistance that would explain it. Then each effect is fitted to first order. As no effect is present,
+the fitted sizes over their standard deviations should scatter with a standard deviation of one; they do if the tracer
+assumes the right number of independent samples. The effect `clock_skew` is left out of the mean over the effects,
+because the voltage channel of one cycler really lags.
 
     python -m aesi.bench.fast_error
 
-prints one line per record, and a last one with means over the records.
+prints one line per record and, last, the means over the records.
 """
 
 from __future__ import annotations
@@ -36,15 +38,15 @@ from aesi.tracer.search.fitted import base_of
 from aesi.tracer.search.grown import ended, growths_on
 
 RIGHT_TEMPERATURE = ("25degC", "drive_cycle")
+"""Parts of the names of the records that were measured at the temperature of their cell file."""
 CONSTANT = ("cap_1c",)
-"""Parts of the names of records that are left out, since their current never changes; RIGHT_TEMPERATURE: of records at
-the temperature of their file."""
+"""Parts of the names of the records with a constant current, which are left out: they show no fast response."""
 THERE = "clock_skew"
-"""Effect that is really present: the voltage channel of one cycler lags, by 0.12 s on three records."""
+"""Effect that is really present in some records: the voltage channel of one cycler lags by 0.12 s on three of them."""
 
 
 def records() -> Iterator[RealCase]:
-    """The development controls that are used."""
+    """The development controls at the temperature of their cell file whose current changes."""
     for case in chosen(only="control-", development=True):
         if case.good or any(word in case.take.file for word in CONSTANT):
             continue
@@ -53,7 +55,14 @@ def records() -> Iterator[RealCase]:
 
 
 def fast_error(case: RealCase, cells: str = "experiments/cells") -> dict[str, Any]:
-    """Row of one record: RMS, mV, correlation time, s, share of the resistance, and sizes over standard deviations."""
+    """The row of one record.
+
+    cells : folder of the cell files.
+    `rms_mv` is the RMS of the fast residual, `lasts_s` its correlation time, `resistance_off` the relative error of the
+    ohmic resistance that explains it best (positive if the model's resistance is too low), and `sds` the fitted size of
+    each effect over its standard deviation.  `failed` stands in their place if the model cannot be fitted.
+    Raises DataError if the record or the cell file is not available.
+    """
     problem = inverse_problem(declared_cell(case.cell, cells), [record(case.take)], case.soc0, HELD_OUT)
     problem = replace(problem, trust="measured")
     blocks, archive = blocks_of(problem), Archive(None, "")
@@ -75,8 +84,11 @@ def fast_error(case: RealCase, cells: str = "experiments/cells") -> dict[str, An
 
 
 def lasts_s(time_s: Array, error: Array) -> float:
-    """Integral correlation time, s, of an error (n,) at times in s: from lags of whole seconds up to the first zero of
-    the correlation."""
+    """Integral correlation time of an error, s: 1 s plus twice the sum of its autocorrelation over lags of whole
+    seconds, up to the first lag without positive correlation and at most 120 s.
+
+    time_s : (n,) s, increasing.  error : (n,) V.
+    """
     every_s = np.arange(time_s[0], time_s[-1])
     e = np.interp(every_s, time_s, error)
     lags = [float(np.mean(e[k:] * e[: len(e) - k])) for k in range(min(len(e), 120))]
@@ -94,7 +106,8 @@ def main() -> None:
 
 
 def _summary(ran: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Means over the records that could be fitted."""
+    """The summary over the records that could be fitted: geometric means of RMS (mV) and correlation time (s), RMS and
+    median of the relative resistance errors, and the RMS of size over standard deviation by effect."""
     return {
         "summary": True,
         "records": len(ran),

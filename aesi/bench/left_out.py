@@ -1,8 +1,10 @@
-"""Does a finding generalise? Each measured record in turn is the test, with the others of its cell as data.
+"""`aesi bench left_out`: does the written model predict a record that the search has not seen?
 
-The written model (`after`) is compared with the declared and the recalibrated one on the test record, which starts as
-`ModelState.simulated` does for a record that was not fitted. Records with a thermocouple are simulated at its
-temperature. Only the first hour of drives is used.
+Each record of a measured cell is left out in turn: the search sees the others, and the models are tested on the
+left-out record. The RMS error of the written model (`after`) is compared with those of the declared model (`before`)
+and of the recalibrated one. The initial state of charge of the left-out record is found as `ModelState.simulated` finds
+it for any record that was not fitted. A record with a thermocouple is simulated at the measured temperature. Of a drive
+only the first hour is used.
 """
 
 from __future__ import annotations
@@ -26,15 +28,15 @@ from aesi.tracer import discover
 from aesi.tracer.decide.written import AS_GOOD
 
 LIMIT_S = 900.0
-"""Limit of processor time for one case, s: a convention; the slowest of `aesi bench left_out` took 390 s."""
+"""Limit of the processor time of one case, s. A convention; the slowest case took 390 s."""
 
 
 @dataclass(frozen=True)
 class MeasuredSet:
-    """Records of one measured cell and the file that declares it.
+    """The records of one measured cell and the file that declares it.
 
-    data : name of the data set.  cell : a file in the folder of cell files, or None for the one published with the set.
-    slow : records that are used whole.  drives : records of which the first hour is used.
+    data : name of the data set.  cell : name of a file in the folder of cell files; None takes the file published with
+    the data set.  slow : records that are used whole.  drives : records of which only the first hour is used.
     """
 
     data: str
@@ -60,28 +62,33 @@ SETS = (
 
 @dataclass(frozen=True)
 class LeftOutCase:
-    """A record of a set that is left out as the test."""
+    """One case: the record `test` of a set is left out, and the search sees the other records."""
 
     set: MeasuredSet
     test: str
 
     @property
     def name(self) -> str:
-        """Name of the case."""
+        """Name of the case, `SET/RECORD`."""
         return f"{self.set.data}/{self.test}"
 
 
 def plan(only: str | None = None) -> Sequence[LeftOutCase]:
-    """Every record of every set in turn; only : substring of the name of a case.  Raises InputError if none has it."""
+    """One case for each record of each set.
+
+    only : substring of a case's name; None selects all cases.  Raises InputError if no case is selected.
+    """
     cases = [LeftOutCase(one, test) for one in SETS for test in (*one.slow, *one.drives)]
     found = [case for case in cases if only is None or only in case.name]
     return some_chosen("left_out", found, (case.name for case in cases))
 
 
 def judged(case: LeftOutCase, cells: str, limit_s: float | None = LIMIT_S) -> CaseRow:
-    """The row of one case; `verdict` is 'not run' where its data are not available.
+    """Run one case and return its row; the verdict is NOT_RUN if its data are not available.
 
-    cells : folder of the cell files.  limit_s : processor seconds; a case that takes longer has failed.
+    cells : folder of the cell files.  limit_s : limit of the processor time, s; None sets no limit. A case that takes
+    longer has failed.  `times_better` is the error of the written model over the lower of the errors of the declared
+    and the recalibrated model, so that values above 1 mean that the written model is worse.
     """
     spent = Stopwatch()
     row = _asked(case)
@@ -102,7 +109,7 @@ def judged(case: LeftOutCase, cells: str, limit_s: float | None = LIMIT_S) -> Ca
 
 
 def lost(case: LeftOutCase) -> CaseRow:
-    """The row of a case whose process the system ended: it has failed."""
+    """The row of a case whose process the operating system ended. The case counts as failed."""
     return _asked(case) | LOST.row | NO_TIME
 
 
@@ -118,7 +125,9 @@ def _records(one: MeasuredSet) -> Iterator[tuple[str, Measurement]]:
 
 
 def summary(rows: Sequence[CaseRow]) -> dict[str, Any]:
-    """Share of cases where the written model is no worse than the declared cell, the worst case, and named effects."""
+    """The summary row: in how many cases the written model is no worse than the better of the declared and the
+    recalibrated model (`no_worse`: at most AS_GOOD times its error), the worst case, and how often each answer was
+    given (`confusion`)."""
     ran = [row for row in rows if row["verdict"] != NOT_RUN]
     judged_rows = [row for row in ran if "times_better" in row]
     worst = max(judged_rows, key=lambda row: float(row["times_better"]), default=None)
@@ -135,10 +144,11 @@ def summary(rows: Sequence[CaseRow]) -> dict[str, Any]:
 
 
 def table(rows: Sequence[CaseRow]) -> list[str]:
-    """Lines of Markdown, one per record, the worst in bold."""
+    """Lines of a Markdown table with one line per left-out record; the largest ratio is in bold."""
     worst = max((row.get("times_better", 0.0) for row in rows), default=0.0)
     lines = [
-        "| cell | left out | verdict | declared, mV | recalibrated, mV | after, mV | after / better |",
+        "| cell | left-out record | verdict | declared, mV | recalibrated, mV | as written, mV "
+        "| as written / better |",
         "|---|---|---|---:|---:|---:|---:|",
     ]
     for row in rows:

@@ -1,4 +1,4 @@
-"""A limit on the processor seconds of one piece of work, and the row of a benchmark's case without an answer."""
+"""A limit on the processor time of one case of a benchmark, and the row of a case that gives no answer."""
 
 from __future__ import annotations
 
@@ -18,21 +18,22 @@ T = TypeVar("T")
 
 ERROR, OUT_OF_TIME = "error", "out of time"
 NO_ANSWER = (ERROR, OUT_OF_TIME)
-"""Verdicts of cases without an answer."""
+"""Verdicts of cases that gave no answer: the tracer refused the records, or the processor time was used up."""
 NOT_RUN = "not run"
-"""Verdict of a case whose data are not available: it is counted, but not in any figure."""
+"""Verdict of a case whose data are not available. The summary counts these cases, but no figure includes them."""
 
 
 class OutOfTime(BaseException):
-    """The processor seconds are used up. Not an Exception, so that no handler for errors of a fit catches it."""
+    """The processor time is used up. It derives from BaseException, so that no handler for the errors of a fit catches
+    it."""
 
 
 @contextmanager
 def processor_limit(seconds: float | None) -> Iterator[None]:
-    """Raise OutOfTime in the body once it has used `seconds` of processor time; None sets no limit.
+    """Raise OutOfTime in the body of the `with` statement once it has used `seconds` of processor time.
 
-    Effective in the main thread of a process, on systems with interval timers; elsewhere (threads of
-    Dask workers, Windows) the body runs without a limit.
+    seconds : s; None sets no limit. The limit works in the main thread of a process, on systems with interval timers.
+    Elsewhere (threads of Dask workers, Windows) the body runs without a limit.
     """
     here = threading.current_thread() is threading.main_thread() and hasattr(signal, "setitimer")
     if seconds is None or not here:
@@ -53,14 +54,14 @@ def processor_limit(seconds: float | None) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class NoAnswer:
-    """Why a case gave no answer: `verdict` is one of NO_ANSWER, `error` one sentence."""
+    """Why a case gave no answer.  verdict : one of NO_ANSWER.  error : the reason, one sentence."""
 
     verdict: str
     error: str
 
     @property
     def row(self) -> CaseRow:
-        """Its entries in the row of the case."""
+        """The entries `verdict` and `error` of the case's row."""
         return {"verdict": self.verdict, "error": self.error}
 
 
@@ -68,13 +69,14 @@ LOST = NoAnswer(
     ERROR,
     "the system ended the process that worked on it, perhaps for want of memory; fewer workers have more each.",
 )
-"""Answer of a case whose process was ended from outside."""
+"""Outcome of a case whose process was ended by the operating system."""
 NO_TIME: CaseRow = {"processor_s": 0.0, "ours_s": 0.0}
-"""Entries of a row in place of those of a stopwatch that was lost with its process."""
+"""Times of a case whose stopwatch was lost with its process."""
 
 
 def answer_of(look: Callable[[], T], limit_s: float | None) -> T | NoAnswer:
-    """What `look` returns; NoAnswer where it raises AesiError or uses more than limit_s processor seconds."""
+    """The value of `look()`; NoAnswer if it raises AesiError or uses more than `limit_s` s of processor time (None: no
+    limit)."""
     try:
         with processor_limit(limit_s):
             return look()
@@ -86,14 +88,17 @@ def answer_of(look: Callable[[], T], limit_s: float | None) -> T | NoAnswer:
 
 @dataclass(frozen=True)
 class Stopwatch:
-    """Processor seconds of this process and wall-clock seconds, since its creation."""
+    """Processor time of this process and wall time since the stopwatch was created.
+
+    Both attributes are the readings of the two clocks at that moment, s.
+    """
 
     processor_began: float = field(default_factory=time.process_time)
     clock_began: float = field(default_factory=time.perf_counter)
 
     @property
     def row(self) -> CaseRow:
-        """The seconds under their names in the row of a case."""
+        """The elapsed times, s: `processor_s` (processor time of this process) and `ours_s` (wall time)."""
         return {
             "processor_s": time.process_time() - self.processor_began,
             "ours_s": time.perf_counter() - self.clock_began,

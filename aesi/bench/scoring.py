@@ -1,4 +1,8 @@
-"""Scoring of an answer: strictly (the exact name, or the name in a small group, and no further name) and leniently."""
+"""Scores of an answer of the tracer against the label of a case.
+
+The strict scores require exactly the right names, and no further name: `exact` each effect by its own name, `grouped`
+also by a look-alike in a small group. The lenient score also accepts the other answers that the case lists as right.
+"""
 
 from __future__ import annotations
 
@@ -9,28 +13,30 @@ from typing import Any
 import numpy as np
 
 LARGEST_GROUP = 3
-"""A group of look-alikes with more members than this does not count as a name."""
+"""Most members of a group of look-alikes that counts as a name. A convention: a larger group says too little."""
 NOTHING = "reaction_nonuniformity"
-"""Effect of the order reduction: on a cell that is as declared, naming it counts as naming nothing."""
+"""Effect by which the single-particle model differs from the porous electrode. Where it is the right answer, the
+verdict `none` is right as well."""
 TWINS = frozenset({frozenset({"leakage_current", "current_sensor_offset"})})
-"""Effects that are identical in current and voltage: a current through the cell but not the sensor. Naming either, with
-the other in its group, is exact."""
+"""Pairs of effects that no record of current and voltage can distinguish: both are a current that flows through the
+cell and not through the sensor. An answer with either of them, and the other in its group, counts as exact."""
 CERTAIN = 0.95
-"""Confidence of every interval of a rate (Clopper and Pearson 1934, exact)."""
+"""Confidence level of the intervals of rates, which are exact (Clopper and Pearson, Biometrika 26, 1934, 404)."""
 TO_THE_NOISE = 1.1
-"""Multiple of the noise up to which an error on unseen data counts as noise."""
+"""Multiple of the sensor noise up to which the error on held-out data counts as noise. A convention."""
 TENTHS = 10
-"""Number of bins of confidence."""
+"""Number of bins of equal width over the confidence, 0 to 1."""
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """The scores of an answer against the label.
+    """The scores of one answer against the label.
 
-    exact : all effects by their names and no others; verdict `none` or `unknown` without a name where that is the
-    label.  grouped : the same, where an effect may also be a member of the group of a named one.
-    named : share of the label's effects that are named or in such a group.  false_names : names of effects that are not
-    present, for any verdict.  lenient : as grouped, or one of the other answers listed as right.
+    exact : the answer names all effects of the label and no others; for the labels `none` and `unknown`, it has that
+    verdict and names nothing.  grouped : the same, but an effect may also be a look-alike of a named one, in a group of
+    at most LARGEST_GROUP.  named : share of the label's effects that are named or in such a group, 0 to 1.
+    false_names : named effects that are not present, whatever the verdict.  lenient : the answer is right as in
+    `grouped`, or is one of the other answers that the case lists as right.
     """
 
     exact: bool
@@ -41,10 +47,10 @@ class Judgement:
 
 
 def judge(label: str, also: Sequence[str], neutral: Collection[str], content: Mapping[str, Any]) -> Judgement:
-    """Judge an answer.
+    """The scores of one answer.
 
-    label : 'none', 'unknown' or effects joined by '+'.  also : answers that the lenient judge takes.  neutral :
-    names that are neither right nor wrong.  content : the answer, as `discovery.json` has it.
+    label : 'none', 'unknown', or the ids of effects joined by '+'.  also : other answers that the lenient score
+    accepts.  neutral : names that count neither as right nor as wrong.  content : the answer as in `discovery.json`.
     """
     verdict = str(content["verdict"])
     said = [name for name in content["effects"] if name not in neutral]
@@ -68,20 +74,21 @@ def judge(label: str, also: Sequence[str], neutral: Collection[str], content: Ma
 
 
 def _group(name: str, groups: Sequence[Sequence[str]]) -> set[str]:
-    """A name and its look-alikes, where they are few enough."""
+    """The name with its look-alikes; the name alone if there are more than LARGEST_GROUP of them together."""
     found = {name}.union(*(group for group in groups if name in group))
     return found if len(found) <= LARGEST_GROUP else {name}
 
 
 def _twin(name: str, stands_for: Mapping[str, set[str]]) -> bool:
+    """Whether a named effect cannot be distinguished from this one in principle (TWINS) and lists it in its group."""
     return any(frozenset({name, said}) in TWINS and name in group for said, group in stands_for.items())
 
 
 def is_right(label: str, also: tuple[str, ...], content: Mapping[str, Any]) -> bool:
-    """True where the answer matches the label, or one of the other answers listed as right.
+    """Whether the answer matches the label or one of the other answers that are listed as right (`also`).
 
-    Effects match where each effect of the label is named or in the group of a named one, no other is named, and no
-    group has more than three members.
+    Effects match if each effect of the label is named or in the group of a named one, no other effect is named, and no
+    group has more than LARGEST_GROUP members.
     """
     return any(_matches(answer, content) for answer in (label, *also))
 
@@ -103,6 +110,7 @@ def _matches(answer: str, content: Mapping[str, Any]) -> bool:
 
 
 def _assignable(wanted: list[str], stands_for: list[set[str]]) -> bool:
+    """Whether each wanted effect can be assigned to a named one of its own whose group contains it."""
     if not wanted:
         return True
     first, rest = wanted[0], wanted[1:]
@@ -114,25 +122,26 @@ def _assignable(wanted: list[str], stands_for: list[set[str]]) -> bool:
 
 @dataclass(frozen=True)
 class Rate:
-    """A share in per cent with its exact 95 % interval; None where there were no cases."""
+    """A share of cases.  pct : per cent.  interval_pct : its exact 95 % interval, per cent.  cases : number of cases.
+    The first two are None if there are no cases."""
 
     pct: float | None
     interval_pct: tuple[float, float] | None
     cases: int
 
     def named(self, name: str) -> dict[str, Any]:
-        """`name_pct`, `name_95_pct` (low, high) and `name_cases`."""
+        """The entries of a summary row: `NAME_pct`, `NAME_95_pct` ([low, high]) and `NAME_cases`."""
         interval = list(self.interval_pct) if self.interval_pct else None
         return {f"{name}_pct": self.pct, f"{name}_95_pct": interval, f"{name}_cases": self.cases}
 
 
 def rate(rows: Sequence[Mapping[str, Any]], key: str) -> Rate:
-    """Share of rows where `key` is true."""
+    """Share of the rows in which the entry `key` is true."""
     return proportion(sum(bool(row[key]) for row in rows), len(rows))
 
 
 def proportion(hits: int, cases: int) -> Rate:
-    """hits of cases, with the interval."""
+    """The share hits / cases, rounded to 0.1 %, with its exact 95 % interval."""
     from scipy.stats import binomtest
 
     if not cases:
@@ -143,7 +152,8 @@ def proportion(hits: int, cases: int) -> Rate:
 
 
 def calibration(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Confidence shown against the frequency of being right, by tenths of the confidence; empty tenths left out."""
+    """Mean stated confidence beside the frequency of right answers (`grouped`), per cent, by bins of the confidence of
+    0.1; bins without a case are left out."""
     found = []
     for tenth in range(TENTHS):
         part = [

@@ -1,13 +1,14 @@
-"""How much do our model and an independent solver of the same cell differ? Measures the prior of the model error under
-the right hypothesis.
+"""How much do this package's model and an independent solver differ on the same virtual cell?
 
-The label of each development case of `aesi bench blind` is fitted to the laboratory's records. The likelihood of unseen
-data at each size of the model error is a likelihood of that size. The sizes of all cases have a log-normal prior, whose
-median and deviation maximise the likelihood of all cases.
+The answer is the prior of the model error under the right hypothesis on virtual cells. The effects of the label are
+fitted to the records that PyBaMM simulated for each case of `aesi bench blind` (seed 0 is for development). The
+likelihood of held-out data as a function of the size of the model error is the likelihood of that size. A log-normal
+prior describes the sizes of all cases; its median and the standard deviation of its logarithm are those that maximise
+the likelihood of all cases together.
 
     python -m aesi.bench.solver_error --seed 0 --cases 40
 
-prints one line per case and a last one with that prior.
+prints one line per case and, last, the prior.
 """
 
 from __future__ import annotations
@@ -36,12 +37,15 @@ from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import fitted_hypothesis
 
 SIZES_V = 1e-3 * np.geomspace(0.003125, 25.6, 14)
-"""Tried sizes, V, a factor of two apart: two more than needed at both ends."""
+"""Sizes of the model error at which the likelihood is evaluated, V, a factor of two apart. The grid is two steps wider
+at both ends than the sizes of the cases need."""
 
 
 def said_by_size(case: BlindCase) -> Array | None:
-    """(n_sizes,) log likelihood of unseen data, nats, under the label at each size, minus the largest; None where the
-    label cannot be simulated or is outside the catalogue."""
+    """Log likelihood of held-out data under the label at each of SIZES_V minus its maximum, (n_sizes,) nats.
+
+    None if the label cannot be simulated or its effect is in no catalogue ('unknown').
+    """
     if case.label == "unknown":
         return None
     problem = label_problem(case)
@@ -55,9 +59,10 @@ def said_by_size(case: BlindCase) -> Array | None:
 
 
 def most_likely_prior(said: Sequence[Array]) -> tuple[float, float, float]:
-    """(median, V; standard deviation of the logarithm; log likelihood) of the prior with the largest likelihood.
+    """The log-normal prior with the largest likelihood: (median, V; standard deviation of the natural logarithm; log
+    likelihood, nats).
 
-    said : (n_sizes,) log likelihoods of each case, nats.
+    said : of each case, the log likelihoods (n_sizes,) of `said_by_size`, nats.
     """
     table, logs = np.array(said), np.log(SIZES_V)
 
@@ -70,16 +75,18 @@ def most_likely_prior(said: Sequence[Array]) -> tuple[float, float, float]:
 
 
 def log_likelihood(said: Array, median_v: float, sd: float) -> float:
-    """Log likelihood, nats, of a log-normal prior over the sizes: the sum over cases of the log of the mean likelihood.
+    """Log likelihood of a log-normal prior over the sizes, nats: the sum over the cases of the logarithm of the case's
+    likelihood, averaged over the sizes with the prior as weight.
 
-    said : (n_cases, n_sizes) log likelihoods, nats.
+    said : (n_cases, n_sizes) log likelihoods, nats.  median_v : V.  sd : standard deviation of the natural logarithm.
     """
     prior = -0.5 * (np.log(SIZES_V / median_v) / sd) ** 2
     return float(np.sum(logsumexp(said + (prior - logsumexp(prior)), axis=1)))
 
 
 def row(case: BlindCase) -> dict[str, Any]:
-    """The printed row of one case."""
+    """The row of one case: its most likely size of the model error, mV, and the log likelihoods of all sizes, nats;
+    `said` is None where `said_by_size` is."""
     said = said_by_size(case)
     told: dict[str, Any] = {"case": case.spec.name, "cell": case.spec.cell, "label": case.label}
     if said is None:
@@ -91,7 +98,7 @@ def row(case: BlindCase) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Print one line per case and the prior."""
+    """Print one line per case and, last, the prior with the largest likelihood."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--cases", type=int, default=40)
@@ -101,7 +108,7 @@ def main() -> None:
     for spec in chosen(options.cases, seed=options.seed):
         try:
             case = generate(spec, cells_in(Path(options.cells)))
-        except SimulationError:  # the laboratory cannot make it as planned
+        except SimulationError:  # the laboratory cannot simulate the case as planned
             continue
         one = row(case)
         print(json.dumps(one), flush=True)

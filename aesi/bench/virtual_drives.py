@@ -1,9 +1,9 @@
-"""Virtual cells by the dozen, quickly: one drive, and cells that differ at random from what is declared.
+"""Virtual cells that are fast to simulate: drives of cells that differ from the declared cell at random.
 
-The measurement is the project's own simulation of the declared cell with effects added, and noise on the
-voltage, where the laboratory solves a porous-electrode model. The error series are smooth functions of the states
-with hysteresis and heat, as on real cells; they are for ranking designs of the error model and its bands, not for
-judging the physics.
+The measured voltage is this package's own simulation of the declared cell with effects added, an error of the
+open-circuit voltage and white noise. The virtual laboratory (`aesi.data.virtual`) solves a porous-electrode model
+instead, which takes longer. As on real cells, the voltage error is a smooth function of the states with hysteresis and
+heat. These cells serve to rank designs of the error model and of its bands; they cannot judge the physics.
 """
 
 from __future__ import annotations
@@ -29,32 +29,49 @@ from aesi.records import ErrorSeries, Measurement, Run, Split
 from aesi.sparse import with_inputs
 
 SplitLayout = Literal["repeats", "schedules", "beyond", "one"]
-"""repeats : WLTC five times over the whole state of charge, training on 1, 3 and 5, test on 2 and 4.
-schedules : the paper's training, validation and test schedules.
-beyond : as repeats, but the training drives never charge, and the test drives do, at BEYOND times the current.
-one : a single training record, WLTC five times over the whole state of charge; test on UDDS five times."""
+"""How training and test data are laid out.
+
+repeats : one record, five WLTC cycles from SOC_START to SOC_END; cycles 1, 3 and 5 train, 2 and 4 test.
+schedules : the paper's training, validation and test schedules, a record each.
+beyond : as `repeats`, but the training cycles have their charging currents set to zero, and the test cycles keep them
+and have BEYOND times the current.
+one : one training record of five WLTC cycles and one test record of five UDDS cycles, both from SOC_START to SOC_END.
+"""
 
 INPUTS = ("I", "I_next", "I_60s", "c_sp", "c_sn", "c_e0", "c_eL")
+"""Inputs of the correction, those of the experiments on measured drives."""
 DT_S = 1.0
+"""Time step of the drives, s."""
 NOISE_V = 5e-4
-"""White noise of the voltage."""
+"""Standard deviation of the white noise on the voltage, V."""
 OPEN_CIRCUIT_V = 3e-3
-"""Standard deviation of each of OPEN_CIRCUIT_TERMS terms by which the true open-circuit voltage is off."""
+"""Standard deviation of each Chebyshev coefficient of the error of the declared open-circuit voltage, V. A convention,
+as are the other sizes here: about what cells of one type scatter by."""
 OPEN_CIRCUIT_TERMS = 7
+"""Number of these coefficients, over the state of charge."""
 N_REPEATS = 5
+"""Number of drive cycles in a record."""
 BEYOND = 1.3
-"""Against the training's largest current."""
+"""Factor on the current of the test cycles in the layout `beyond`."""
 SOC_START, SOC_END = 0.97, 0.06
+"""State of charge of the declared cell before and after the drive cycles."""
 TEST_REPEATS = (2, 4)
 TRAIN_REPEATS = (1, 3, 5)
+"""Numbers of the cycles that test and that train, counted from 1."""
 MOST_TRIES = 20
-"""Random cells that are drawn until one can be driven like that."""
+"""Most random cells that are drawn until one can deliver the charge of the drive."""
 
 DrawnValues = dict[str, float]
+"""Parameter of an effect -> value, in the unit that its name ends with."""
 
 
 def virtual_splits(cell: Cell, layout: SplitLayout, count: int, seed: int = 0) -> Iterator[Split]:
-    """`count` virtual cells under one drive, each with another set of undeclared differences."""
+    """The data of `count` virtual cells, one after the other, each with other random differences from the declared
+    cell.
+
+    seed : of the differences and of the noise.  Raises SimulationError if MOST_TRIES random cells in a row cannot be
+    simulated.
+    """
     rng = np.random.default_rng(seed)
     declared = {
         role: [_declared(cell, profile) for profile in profiles]
@@ -65,12 +82,14 @@ def virtual_splits(cell: Cell, layout: SplitLayout, count: int, seed: int = 0) -
 
 
 def cuts_of(layout: SplitLayout) -> int:
-    """Into how many parts an experiment cuts a drive of the layout to leave them out in turn."""
+    """Number of parts into which an experiment cuts each training drive of the layout, to leave them out in turn
+    (`aesi.pipeline.experiment.drives.cuts`)."""
     return HALVES if layout in ("repeats", "beyond") else 1
 
 
 def random_effects(cell: Cell, rng: np.random.Generator) -> tuple[ActiveEffect, ...]:
-    """Each difference with even odds, its size at random about what cells of one type scatter by."""
+    """A random set of effects: each of DIFFERENCES with a probability of one half, with random parameters; a series
+    resistance if none was drawn."""
     chosen = [name for name in DIFFERENCES if rng.random() < 0.5] or ["series_resistance"]
     return tuple(CATALOGUE[name].activate(**DIFFERENCES[name](rng, cell.capacity_ah)) for name in chosen)
 
@@ -92,12 +111,17 @@ DIFFERENCES: dict[str, Callable[[np.random.Generator, float], DrawnValues]] = {
     },
     "self_heating": lambda rng, q: {"heat_transfer_w_k": rng.uniform(0.1, 0.5)},
 }
-"""Effect -> (rng, capacity in Ah) -> values."""
+"""Effect -> function of the random generator and the capacity in Ah that draws its parameters. The ranges are about
+what cells of one type scatter by: conventions."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Made:
-    """How a cell differs: effects, and Chebyshev coefficients of its open-circuit voltage over the charge."""
+    """The differences of one virtual cell from the declared cell.
+
+    open_circuit_v : (OPEN_CIRCUIT_TERMS,) V, Chebyshev coefficients of the error of the open-circuit voltage over the
+    state of charge, the interval [0, 1] mapped to [-1, 1].
+    """
 
     effects: tuple[ActiveEffect, ...]
     open_circuit_v: Array
@@ -119,7 +143,8 @@ def _beyond(capacity_ah: float) -> dict[str, tuple[Profile, ...]]:
 def _in_turn(
     capacity_ah: float, train: Callable[[Array], Array], test: Callable[[Array], Array]
 ) -> dict[str, tuple[Profile, ...]]:
-    """WLTC by turns for training and test."""
+    """One record of N_REPEATS WLTC cycles, the training cycles changed by `train`, the test cycles by `test` (both map
+    (n,) A to (n,) A)."""
     once = Bench(capacity_ah, DT_S).drive("wltc_3b")
     drives = [(test if k + 1 in TEST_REPEATS else train)(once) for k in range(N_REPEATS)]
     return {"record": (_emptying("drive", drives, capacity_ah),)}
@@ -134,7 +159,8 @@ def _one(capacity_ah: float) -> dict[str, tuple[Profile, ...]]:
 
 
 def _emptying(name: str, drives: Sequence[Array], capacity_ah: float) -> Profile:
-    """The drives after a minute of rest, so many times as hard that they use up the charge from start to end."""
+    """The drives one after the other, after 60 s of rest, with the current scaled so that they discharge the cell from
+    SOC_START to SOC_END."""
     bench = Bench(capacity_ah, DT_S)
     share = float(np.sum(np.concatenate(drives))) * DT_S / SECONDS_PER_HOUR / capacity_ah
     scale = (SOC_START - SOC_END) / share
@@ -151,7 +177,10 @@ PROFILES: dict[SplitLayout, Callable[[float], dict[str, tuple[Profile, ...]]]] =
 
 @dataclass(frozen=True, eq=False)
 class _Declared:
-    """A drive of the declared cell: its run, and what each parameter is worth along it (n, k), V a deviation."""
+    """A drive simulated with the declared cell.
+
+    slopes_v : (n, k) V, change of the voltage by one prior standard deviation of each of k parameters.
+    """
 
     profile: Profile
     run: Run
@@ -173,7 +202,7 @@ def _split(cell: Cell, declared: dict[str, list[_Declared]], rng: np.random.Gene
                 role: tuple(_series(cell, made, one, rng) for one in drives)
                 for role, drives in declared.items()
             }
-        except SimulationError:  # the cell with these effects cannot give that charge
+        except SimulationError:  # the cell with these effects cannot deliver the charge of the drive
             continue
         if "record" not in series:
             return Split(series["train"], series["valid"], series["test"])

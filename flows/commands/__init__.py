@@ -1,1 +1,1 @@
-"""The commands of `aesi`, by subject. Arguments to one call; no logic."""
+"""The commands of `aesi`, one module per subject. Each turns its arguments into one call and decides nothing."""

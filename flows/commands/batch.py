@@ -1,4 +1,4 @@
-"""`aesi batch`: many cells at once."""
+"""`aesi batch`: one discovery for each of many cells."""
 
 from __future__ import annotations
 
@@ -16,31 +16,54 @@ from flows.commands import options, outputs
 def batch(
     source: Annotated[
         Path,
-        typer.Argument(help="A folder with one subfolder a cell, or a CSV with the columns name and data."),
+        typer.Argument(
+            help="Folder with one subfolder of records per cell, or CSV with the columns name and data (several files "
+            "separated by ;) and, if needed, cell, test, soc0, soh, specimen and at."
+        ),
     ],
     *,
     reading: Any,
-    out: Annotated[Path, typer.Option(help="Folder for one discovery a cell and the summary.")],
+    out: Annotated[
+        Path,
+        typer.Option(help="Folder to write: one subfolder per cell with its discovery, and the summary."),
+    ],
     cell: Annotated[
-        Path | None, typer.Option("--cell", help="BPX file of every cell that names none of its own.")
+        Path | None,
+        typer.Option(
+            "--cell",
+            help="Cell file (BPX, or a saved model's folder) of all cells that have none of their own.",
+        ),
     ] = None,
     soh: options.SohOption = None,
     holdout: Annotated[
         float,
-        typer.Option(min=0.05, max=0.9, help="Last share of the data kept back, where no test is named."),
+        typer.Option(
+            min=0.05,
+            max=0.9,
+            help="Share of the data, at their end, that is held out for a cell without test data.",
+        ),
     ] = 0.3,
     max_effects: options.MaxEffects = 3,
     seed: options.Seed = 0,
-    workers: Annotated[int, typer.Option(min=1, help="Cells at a time.")] = 2,
+    workers: Annotated[
+        int, typer.Option(min=1, help="Number of cells that are worked on at the same time.")
+    ] = 2,
     runner: Annotated[
-        Literal["local", "dask"], typer.Option(help="Processes here, or a Dask cluster.")
+        Literal["local", "dask"],
+        typer.Option(help="Where cells are worked on: in processes of this machine, or on a Dask cluster."),
     ] = "local",
     address: Annotated[
         str | None,
-        typer.Option(help="Dask scheduler, with --runner dask; without it a cluster on this machine."),
+        typer.Option(
+            help="Address of the Dask scheduler, such as tcp://HOST:8786, with --runner dask. Default: a cluster on "
+            "this machine."
+        ),
     ] = None,
 ) -> None:
-    """One discovery a cell, a summary of all; check-ups of one specimen as a trend. Goes on where it was stopped."""
+    """Run one discovery per cell and summarise all of them. Several check-ups of one specimen are shown as a trend.
+
+    A batch that was interrupted continues where it ended when the same command is given again.
+    """
     outputs.check_folder(out)
     outputs.check_beside(out, source)
     if address is not None and runner != "dask":

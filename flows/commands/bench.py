@@ -1,4 +1,4 @@
-"""`aesi bench`: the benchmarks against the peers."""
+"""`aesi bench`: run the benchmarks, and compare their figures with recorded ones."""
 
 from __future__ import annotations
 
@@ -17,16 +17,28 @@ if TYPE_CHECKING:
 
 def bench(
     name: Annotated[
-        str | None, typer.Argument(help="One benchmark; all without it.", autocompletion=complete.benchmarks)
+        str | None,
+        typer.Argument(help="Name of a benchmark. Default: all.", autocompletion=complete.benchmarks),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="One JSON line each.")] = False,
-    given: Annotated[list[str] | None, options.key_value("key=value, an option of the benchmark.")] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print each row of figures as one line of JSON.")
+    ] = False,
+    given: Annotated[
+        list[str] | None,
+        options.key_value(
+            "Option of the benchmark as KEY=VALUE, the value in JSON; may be repeated. Examples: seed=1, "
+            "'cells=[\"nmc\"]'. An unknown key lists those of the benchmark."
+        ),
+    ] = None,
     compare: Annotated[
         Path | None,
-        typer.Option(help="A history of results (docs/benchmarks.json): say what got worse, exit code 1."),
+        typer.Option(
+            help="File with recorded figures (docs/benchmarks.json). If a figure is worse than recorded, it is named, "
+            "and the exit code is 1."
+        ),
     ] = None,
 ) -> None:
-    """Time and check the project against its peers, in one run on this machine."""
+    """Measure accuracy and processor time on this machine, beside those of other programs. Some take hours."""
     from flows.benchmarks import run
     from flows.benchmarks.history import not_compared, regressions
 
@@ -49,11 +61,14 @@ def bench(
 
 
 class Regressed(AesiError):
-    """A benchmark is worse than it was."""
+    """A figure of a benchmark is worse than the recorded one."""
 
 
 def _chosen(name: str | None) -> list[str]:
-    """The benchmark of that name, or all.  Raises InputError for an unknown one, and where a peer is not installed."""
+    """The benchmark of that name, or all for None.
+
+    Raises InputError for an unknown name, and if a program that it compares with is not installed.
+    """
     from flows.benchmarks import BENCHMARKS, missing
 
     if name is not None and name not in BENCHMARKS:
@@ -70,7 +85,11 @@ def _chosen(name: str | None) -> list[str]:
 
 
 def _recorded(file: Path, keywords: dict[str, object]) -> list[Entry]:
-    """The history in a file.  Raises InputError where it holds none, or the benchmark would write over it."""
+    """The recorded figures in a file.
+
+    keywords : options of the benchmark.  Raises InputError if the file has no figures, or if the benchmark would write
+    to it.
+    """
     from flows.benchmarks.history import read_history
 
     if not file.exists():

@@ -1,4 +1,4 @@
-"""Commands about one cell: simulate, predict, calibrate, impedance, discover."""
+"""Commands about one cell: simulate, predict, calibrate, impedance, discover, export."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from aesi.pipeline.written import calibration_files, discovery_files
 from flows.commands import options, outputs
 
 BESIDE_AN_EXPERIMENT = ("experiment", "out", "overrides", "prefect")
-"""What `aesi discover` takes beside an experiment file, which says all else itself."""
+"""Arguments of `aesi discover` that may be given with an experiment file. All others are keys of that file."""
 
 
 @options.reads_files
@@ -20,8 +20,16 @@ def simulate(
     *,
     reading: Any,
     cell: options.CellOption,
-    current: Annotated[Path, typer.Option(help="CSV with time_s, current_a[, temperature_degc].")],
-    out: Annotated[Path, typer.Option(help="CSV to write: time, current, voltage and states.")],
+    current: Annotated[
+        Path,
+        typer.Option(
+            help="Current profile: CSV with time_s (s) and current_a (A, discharge positive) and, if measured, "
+            "voltage_v (V) and temperature_degc (degC)."
+        ),
+    ],
+    out: Annotated[
+        Path, typer.Option(help="CSV to write: time, current, voltage and the states of the model.")
+    ],
     soc0: options.Soc0 = None,
     soh: options.SohOption = None,
     effect: options.Effects = None,
@@ -33,12 +41,12 @@ def simulate(
         bool,
         typer.Option(
             "--run-on",
-            help="Continue past depletion of a particle's surface or of the electrolyte. The voltage is not physical "
-            "from then on; a message gives the time.",
+            help="Continue after the lithium in a particle's surface or the salt in the electrolyte is depleted, "
+            "instead of stopping. The voltage is not physical from then on; a message gives the time.",
         ),
     ] = False,
 ) -> None:
-    """The physics model alone, under a current profile."""
+    """Simulate the voltage of a cell under a current profile with the physics model alone."""
     outputs.check_table(out, [cell, current, *(effect_file or [])])
     from aesi.pipeline.simulation import ProfileRequest, simulate_file, voltage_words
 
@@ -55,12 +63,29 @@ def predict(
     *,
     reading: Any,
     model: Annotated[
-        Path, typer.Option("--model", "--cell", help="Folder of a saved model (runs/.../model).")
+        Path,
+        typer.Option("--model", "--cell", help="Folder of a saved hybrid model, such as runs/NAME/model."),
     ],
-    current: Annotated[Path, typer.Option(help="CSV with time_s, current_a[, voltage_v, temperature_degc].")],
-    out: Annotated[Path, typer.Option(help="CSV to write: voltage_v, lower_v, upper_v.")],
+    current: Annotated[
+        Path,
+        typer.Option(
+            help="Current profile: CSV with time_s (s) and current_a (A, discharge positive) and, if measured, "
+            "voltage_v (V) and temperature_degc (degC)."
+        ),
+    ],
+    out: Annotated[
+        Path,
+        typer.Option(
+            help="CSV to write, with voltage_v and the bounds lower_v and upper_v of its prediction interval, V."
+        ),
+    ],
     measured: Annotated[
-        bool, typer.Option("--measured", help="Use the measured voltage: one step ahead, not free run.")
+        bool,
+        typer.Option(
+            "--measured",
+            help="Predict one step ahead: the measured voltage of the row before is known. Default: free run, which "
+            "uses no measured voltage after the first row.",
+        ),
     ] = False,
     soc0: options.Soc0 = None,
     soc0_sd: Annotated[
@@ -68,14 +93,15 @@ def predict(
         typer.Option(
             "--soc0-sd",
             callback=options.share("--soc0-sd", options.ITS_DEVIATION),
-            help="How far --soc0 may be off, one standard deviation, by which the band of a free run is wider.",
+            help="Standard deviation of --soc0, as a share of the capacity (0.01 is 1 %). It widens the band of a free "
+            "run. Default: --soc0 is taken as exact.",
         ),
     ] = None,
     soh: options.SohOption = None,
     hold: options.HoldOption = None,
     self_heating: options.SelfHeating = False,
 ) -> None:
-    """A saved hybrid model with its intervals."""
+    """Predict the voltage with a saved hybrid model, with prediction intervals."""
     outputs.check_table(out, [model, current])
     from aesi.pipeline.simulation import ProfileRequest, predict_file
 
@@ -91,86 +117,115 @@ def calibrate(
     *,
     reading: Any,
     cell: options.CellOption,
-    data: Annotated[list[Path], typer.Option("--data", help="Measurement to fit; may be given again.")],
-    out: Annotated[Path, typer.Option(help="BPX file to write; a report is written beside it.")],
+    data: Annotated[list[Path], typer.Option("--data", help="Measurement to fit; may be repeated.")],
+    out: Annotated[
+        Path, typer.Option(help="BPX file to write (.json). A report (HTML) is written beside it.")
+    ],
     cut_offs: Annotated[
         str | None,
         typer.Option(
-            help="LOWER:UPPER, V, between which this cell is cycled, where the start file has others."
+            help="Cut-off voltages of this cell as LOWER:UPPER, V, such as 2.5:4.2. Default: those of the start file."
         ),
     ] = None,
     body: Annotated[
         str | None,
         typer.Option(
-            help="DIAMETERxHEIGHT of this cell, or AxBxC of a flat one, mm: its volume and surface, where the start "
-            "file is of another body."
+            help="Outer size of this cell, mm: DIAMETERxHEIGHT of a cylinder, such as 18.4x65.0, or AxBxC of a box. It "
+            "sets volume and surface. Default: those of the start file."
         ),
     ] = None,
     mass: Annotated[
         float | None,
-        typer.Option(help="Mass of this cell, g: its density; without it that of the start file."),
+        typer.Option(
+            help="Mass of this cell, g. It sets the density. Default: the density of the start file."
+        ),
     ] = None,
     soc0: options.Soc0 = None,
     temperature: Annotated[
         list[str] | None,
         typer.Option(
-            "--temperature", help="FILE=DEGC, of a record without a temperature column; repeatable."
+            "--temperature",
+            help="Temperature of a record without a temperature column, as FILE=DEGC in degC, such as drive.csv=25; "
+            "may be repeated.",
         ),
     ] = None,
     dates: Annotated[
         list[str] | None,
         typer.Option(
             "--date",
-            help="FILE=YYYY-MM-DD, the day of a record: those of other days may be of another age; repeatable.",
+            help="Day on which a record was measured, as FILE=YYYY-MM-DD; may be repeated. Between records of "
+            "different days the cell may have aged.",
         ),
     ] = None,
     as_of: Annotated[
         str | None,
         typer.Option(
-            help="YYYY-MM-DD, the day of the state that the file is in; without it the last with a load."
+            help="Day (YYYY-MM-DD) whose state of the cell the written file describes, with --date. Default: the last "
+            "day of a record under load."
         ),
     ] = None,
     prior: Annotated[
         list[str] | None,
         typer.Option(
             "--prior",
-            help="NAME=VALUE:SD, what is known of a parameter from elsewhere, as the report names it; repeatable.",
+            help="Prior of a parameter as NAME=VALUE:SD, in its unit in the report, in place of the default prior; may "
+            "be repeated. Example: contact.resistance=0.0108:0.0012 (ohm).",
         ),
     ] = None,
     hold: options.HoldOption = None,
     until: Annotated[
         list[str] | None,
-        typer.Option("--until", help="FILE=SECONDS: read this record up to there; repeatable."),
+        typer.Option(
+            "--until",
+            help="Use a record only up to a time, as FILE=SECONDS, such as hppc.csv=3600; may be repeated.",
+        ),
     ] = None,
     impedance: Annotated[
         list[Path] | None,
         typer.Option(
-            "--impedance", help="Measured spectra to hold the result against; nothing is fitted to them."
+            "--impedance",
+            help="Measured impedance spectra that the result is compared with. They are not fitted. May be repeated.",
         ),
     ] = None,
     fit_impedance: Annotated[
         list[Path] | None,
         typer.Option(
-            "--fit-impedance", help="Measured spectra of this very cell to fit beside the measurements."
+            "--fit-impedance",
+            help="Measured impedance spectra of this cell that are fitted together with the measurements; may be "
+            "repeated.",
         ),
     ] = None,
     posterior: Annotated[
         int,
-        typer.Option("--posterior", min=0, help="Samples of each walker to draw from the posterior (emcee)."),
+        typer.Option(
+            "--posterior",
+            min=0,
+            help="Number of samples that each walker draws from the posterior (needs emcee), to test the intervals; 0 "
+            "draws none. Example: 500.",
+        ),
     ] = 0,
     starts: Annotated[
         int,
         typer.Option(
             "--starts",
             min=1,
-            help="Number of fits: from the start file, and from cells drawn from the priors. The best is taken.",
+            help="Number of fits: the first begins with the start file, the others with cells drawn from the priors. "
+            "The best one is taken.",
         ),
     ] = 1,
-    title: Annotated[str | None, typer.Option(help="Name of the cell in the file that is written.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the posterior's samples and of the drawn starts.")] = 0,
+    title: Annotated[
+        str | None,
+        typer.Option(help="Name of the cell in the written file. Default: that of the start file."),
+    ] = None,
+    seed: Annotated[
+        int, typer.Option(min=0, help="Random seed of the samples of --posterior and the cells of --starts.")
+    ] = 0,
     model: options.ModelOption = None,
 ) -> None:
-    """Fit the physics model's own parameters to measurements of any temperatures together."""
+    """Fit the parameters of the physics model to all measurements of a cell together, at any temperatures.
+
+    --cell is the start file: its parameters are the starting point and, with their tolerances, the priors of the fit.
+    """
     read = [cell, *data, *(impedance or []), *(fit_impedance or [])]
     outputs.check_json(out, read, calibration_files(out))
     options.check_once("--data", data)
@@ -194,19 +249,27 @@ def calibrate(
 def impedance(
     cell: options.CellOption,
     soc: Annotated[
-        float, typer.Option(callback=options.share("--soc"), help="State of charge at rest, from 0 to 1.")
+        float,
+        typer.Option(
+            callback=options.share("--soc"),
+            help="State of charge, 0 (empty) to 1 (full); the cell is at rest.",
+        ),
     ],
     frequencies: Annotated[
-        str, typer.Option(help="CSV with a column frequency_hz, or LOW:HIGH:N for N of them, log-spaced.")
+        str,
+        typer.Option(
+            help="Frequencies, Hz: LOW:HIGH:N for N of them at equal ratios, such as 0.001:1000:61, or a CSV with a "
+            "column frequency_hz."
+        ),
     ],
     out: Annotated[Path, typer.Option(help="CSV to write: frequency_hz, z_real_ohm, z_imag_ohm.")],
-    temperature_degc: Annotated[float, typer.Option(help="Of the cell.")] = 25.0,
+    temperature_degc: Annotated[float, typer.Option(help="Temperature of the cell, degC.")] = 25.0,
     effect: options.Effects = None,
     effect_file: options.EffectFiles = None,
     model: options.ModelOption = None,
     soh: options.SohOption = None,
 ) -> None:
-    """The physics model in the frequency domain, at rest."""
+    """Compute the impedance of the physics model at rest."""
     outputs.check_table(out, [cell, Path(frequencies), *(effect_file or [])])
     from aesi.pipeline.impedance import impedance_file
 
@@ -231,23 +294,37 @@ def discover(
     context: typer.Context,
     reading: Any,
     experiment: Annotated[
-        Path | None, typer.Argument(help="An experiment file instead of --cell and --data.")
+        Path | None,
+        typer.Argument(
+            help="Experiment file (YAML) that names cell and data, in place of --cell and --data."
+        ),
     ] = None,
     cell: options.CellUnlessExperiment = None,
     data: Annotated[
-        list[Path] | None, typer.Option("--data", help="Measurement; may be given again.")
+        list[Path] | None,
+        typer.Option("--data", help="Measurement to search for missing effects; may be repeated."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for discovery.json, report.html and model/.")
+        Path | None,
+        typer.Option(
+            help="Folder to write: discovery.json, report.html and model/. Default with an experiment file: "
+            "runs/NAME/discovery."
+        ),
     ] = None,
     test: Annotated[
         list[Path] | None,
-        typer.Option("--test", help="Held-out measurement, for the error alone; may be repeated."),
+        typer.Option(
+            "--test",
+            help="Held-out measurement: used for the error before and after only. May be repeated. Default: the last "
+            "part of the data (--holdout).",
+        ),
     ] = None,
     good: Annotated[
         list[Path] | None,
         typer.Option(
-            "--good", help="Known-good record of the same cell; the answer is how --data differs from it."
+            "--good",
+            help="Record of the same cell that is known to have no fault; may be repeated. The answer is then how "
+            "--data differs from it.",
         ),
     ] = None,
     soc0: options.Soc0 = None,
@@ -257,7 +334,7 @@ def discover(
         typer.Option(
             min=0.0,
             max=0.9,
-            help="Last share of the data kept back, without --test: 0.3 where none is given.",
+            help="Share of the data, at their end, that is held out without --test. Default: 0.3.",
         ),
     ] = None,
     max_effects: options.MaxEffects = 3,
@@ -267,26 +344,36 @@ def discover(
     only: Annotated[
         list[str] | None,
         typer.Option(
-            "--only", help="Try only this effect; may be repeated. Parameters of all others stay as declared."
+            "--only",
+            help="Id of an effect to try, as `aesi effects` lists it; may be repeated. No other effect is tried, and "
+            "the parameters of all others stay as declared. Default: all effects.",
         ),
     ] = None,
     without: Annotated[
-        list[str] | None, typer.Option("--without", help="Leave this effect out; may be repeated.")
+        list[str] | None,
+        typer.Option("--without", help="Id of an effect that is not tried; may be repeated."),
     ] = None,
     model: Annotated[
         Literal["espm", "dfn"] | None,
         typer.Option(
             "--model",
-            help="Single particle or porous electrode. Without it, where the two differ notably, both are searched, "
-            "and the one that explains the data with fewer or likelier names is taken.",
+            help="Physics model: espm (single particle) or dfn (porous electrode). Default: both are searched if they "
+            "differ notably on the data, and the one that explains them with fewer or likelier effects is taken.",
         ),
     ] = None,
     overrides: Annotated[
-        list[str] | None, options.key_value("key=value laid over the experiment file.")
+        list[str] | None,
+        options.key_value(
+            "KEY=VALUE that replaces a key of the experiment file, the value in YAML; may be repeated. Example: "
+            "discover.max_effects=1."
+        ),
     ] = None,
     prefect: options.PrefectOption = True,
 ) -> None:
-    """Close the loop: find what physics the model lacks, add it, and report the error before and after."""
+    """Find which effects the physics model of a cell lacks, add them, and report the error before and after.
+
+    Example: aesi discover --cell cell.bpx.json --data drive.csv --out found
+    """
     if out is not None:
         given = [*([cell] if cell else []), *(data or []), *(test or []), *(good or []), *(effect_file or [])]
         outputs.check_folder(out, given, discovery_files(out))
@@ -328,7 +415,8 @@ def discover(
 
 
 def _discover_experiment(experiment: Path, overrides: list[str], out: Path | None, prefect: bool) -> None:
-    """The job of an experiment file. Raises InputError where its finding would be written over a file that it names."""
+    """Run the discovery of an experiment file.  Raises InputError if its results would overwrite a file that it
+    names."""
     options.say_reading([experiment])
     from aesi.pipeline.experiment.sources import named_files
     from flows.jobs.discovery import finding_folder
@@ -344,10 +432,14 @@ def _discover_experiment(experiment: Path, overrides: list[str], out: Path | Non
 
 def export(
     cell: options.CellOption,
-    to: Annotated[Literal["bpx", "pybamm"], typer.Option(help="A BPX file, or a script that PyBaMM runs.")],
+    to: Annotated[
+        Literal["bpx", "pybamm"],
+        typer.Option(help="Format: bpx (a BPX file) or pybamm (a Python script that PyBaMM runs)."),
+    ],
     out: Annotated[Path, typer.Option(help="File to write: .json for bpx, .py for pybamm.")],
 ) -> None:
-    """A cell, and what was found about it, for other tools; says what they cannot hold."""
+    """Write a cell, with the effects that were found, for other programs. Messages name what their format cannot
+    hold."""
     from aesi.pipeline.export import export as write
     from aesi.pipeline.export import files_written
 

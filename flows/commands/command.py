@@ -1,4 +1,4 @@
-"""Commands whose options are refused in one sentence, and taken once each."""
+"""Base class of the commands: a wrong value or a repeated option is refused with one sentence."""
 
 from __future__ import annotations
 
@@ -12,16 +12,18 @@ from typer.core import TyperCommand
 from aesi.errors import InputError, wanted
 
 MEANT = {"--model": "a saved model is given with --cell"}
-"""Option that is a choice -> how the sentence on a value that is none of them goes on."""
+"""Option with a list of choices -> end of the sentence on a value that is not one of them."""
 
 
 class Command(TyperCommand):
-    """A command that raises InputError, naming the option or its environment variable, for a value that is none and for
-    an option that is there twice and cannot be: of two the last would count, and nobody be told."""
+    """A command that raises InputError, naming the option or its environment variable, for an invalid value and for an
+    option that is given twice but takes one value. Of two values the last would count without a message."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """The arguments that are left."""
-        if not ctx.resilient_parsing:  # as while a shell asks what could stand there
+        """The arguments that the options have not taken, as in click.  Raises InputError (see the class)."""
+        if (
+            not ctx.resilient_parsing
+        ):  # set while a shell asks for completions, where a line may be incomplete
             _, _, given = self.make_parser(ctx).parse_args(list(args))
             for parameter, times in Counter(given).items():
                 if times > 1 and not (parameter.multiple or parameter.is_eager):
@@ -41,15 +43,15 @@ class Command(TyperCommand):
 
 
 class App(typer.Typer):
-    """A group of such commands."""
+    """A group whose commands are of the class `Command`."""
 
     def command(self, name: str | None = None, **how: Any) -> Callable[[Any], Any]:
-        """As of typer."""
+        """The decorator of `typer.Typer.command`, with `Command` as the default class."""
         return super().command(name, **{"cls": Command, **how})
 
 
 def _sentence(option: str, fault: dict[str, Any]) -> str:
-    if fault["type"] == "value_error":  # of a choice, which holds the value
+    if fault["type"] == "value_error":  # from a list of choices; its message contains the value
         meant = f"; {MEANT[option]}" if option in MEANT else ""
         return f"{option}: {str(fault['ctx']['error']).rstrip('.')}{meant}."
     return f"{option} {fault['input']}: it {wanted(fault)}."

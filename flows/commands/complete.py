@@ -1,4 +1,8 @@
-"""What a shell offers where a name is expected; each imports only what knows the names."""
+"""Completions that a shell offers where a name is expected.
+
+incomplete : what has been typed so far. Each function imports only the module that knows the names, so that a shell
+does not wait for the libraries.
+"""
 
 from __future__ import annotations
 
@@ -6,21 +10,21 @@ from collections.abc import Iterable
 
 
 def effects(incomplete: str) -> list[str]:
-    """Effects of the catalogue."""
+    """Ids of the effects in the catalogue that begin so."""
     from aesi.physics.effects import CATALOGUE
 
     return _starting(CATALOGUE, incomplete)
 
 
 def benchmarks(incomplete: str) -> list[str]:
-    """Benchmarks."""
+    """Names of the benchmarks that begin so."""
     from flows.benchmarks import BENCHMARKS
 
     return _starting(BENCHMARKS, incomplete)
 
 
 def data_sets(incomplete: str) -> list[str]:
-    """Data sets of the catalogue."""
+    """Names of the data sets in the catalogue that begin so."""
     from aesi.data.catalogue import SETS
 
     return _starting([each.name for each in SETS], incomplete)

@@ -1,4 +1,4 @@
-"""`aesi data`: what measured data there are, and how to get them."""
+"""`aesi data`: list, fetch and convert measured data."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ app = App(no_args_is_help=True, rich_markup_mode=None)
 
 @app.command("list")
 def list_() -> None:
-    """Bundled and downloadable data sets, and whether they are on this machine."""
+    """List the bundled and the downloadable data sets, and say which are on this machine."""
     from aesi.data import catalogue
 
     for line in catalogue.catalogue_lines():
@@ -28,12 +28,15 @@ def get(
     name: Annotated[
         str,
         typer.Argument(
-            help="Name of a data set, as `aesi data list` gives it.", autocompletion=complete.data_sets
+            help="Name of a data set, as `aesi data list` shows it.", autocompletion=complete.data_sets
         ),
     ],
-    out: Annotated[Path | None, typer.Option(help="Folder to put it in; the cache without it.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder to write the data set to. Default: the cache folder of this user."),
+    ] = None,
 ) -> None:
-    """Fetch a data set, check it against its checksums and convert it."""
+    """Fetch a data set, verify its checksums, and convert it to CSV files in SI units. Prints the folder."""
     if out is not None:
         outputs.check_folder(out)
     from aesi.data import catalogue
@@ -44,7 +47,10 @@ def get(
 @app.command("convert")
 @options.reads_files
 def convert(
-    file: Annotated[Path, typer.Argument(help="A cycler's export or own file, CSV, Excel, Parquet or BDF.")],
+    file: Annotated[
+        Path,
+        typer.Argument(help="Measurement: a cycler's export or native file, CSV, Excel, Parquet or BDF."),
+    ],
     *,
     reading: Any,
     out: Annotated[Path, typer.Option(help="CSV to write.")],
@@ -52,19 +58,20 @@ def convert(
         Path | None,
         typer.Option(
             "--cell",
-            help="BPX file, or a saved model, of the cell: a record that cannot be of it, as in another unit of time "
-            "or current, is refused.",
+            help="Cell file (BPX, or a saved model's folder). A record that cannot be of this cell is refused, for "
+            "example one in another unit of time or current.",
         ),
     ] = None,
     to: Annotated[
         Literal["aesi", "bdf"],
         typer.Option(
-            help="This project's columns (current positive on discharge), or BDF (positive on charge)."
+            help="Columns to write: aesi (this project's, current positive on discharge) or bdf (Battery Data Format, "
+            "positive on charge)."
         ),
     ] = "aesi",
 ) -> None:
-    """Write a measurement as CSV in SI units, and say what was done to it."""
-    read = [file] if not file.is_dir() else []  # a folder is none that is read, which the reader says
+    """Write a measurement as CSV in SI units. Messages say how its columns, signs and rows were understood."""
+    read = [file] if not file.is_dir() else []  # a folder is no input; the reader refuses it with a sentence
     outputs.check_table(out, [*read, *([cell] if cell else [])])
     from aesi.data.convert import convert_file, record_lines
 

@@ -10,9 +10,13 @@ import typer
 from aesi.errors import InputError
 from flows.commands import options, outputs
 
-Experiment = Annotated[Path, typer.Argument(help="An experiment file, for instance experiments/smoke.yaml.")]
+Experiment = Annotated[Path, typer.Argument(help="Experiment file (YAML), such as experiments/smoke.yaml.")]
 Overrides = Annotated[
-    list[str] | None, options.key_value("key=value laid over the file: search.candidates=50.")
+    list[str] | None,
+    options.key_value(
+        "KEY=VALUE that replaces a key of the experiment file, the value in YAML; may be repeated. Example: "
+        "search.candidates=50."
+    ),
 ]
 
 
@@ -20,19 +24,32 @@ def run(
     experiment: Experiment,
     overrides: Overrides = None,
     runner: Annotated[
-        Literal["local", "dask"] | None, typer.Option(help="Who evaluates the candidates.")
+        Literal["local", "dask"] | None,
+        typer.Option(
+            help="Where candidates are evaluated: in processes of this machine, or on a Dask cluster. Default: "
+            "runner.kind of the experiment file."
+        ),
     ] = None,
     address: Annotated[
         str | None,
-        typer.Option(help="Dask scheduler; without it that of the file, else a cluster on this machine."),
+        typer.Option(
+            help="Address of the Dask scheduler, such as tcp://HOST:8786. Default: that of the experiment file, else a "
+            "cluster on this machine."
+        ),
     ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with the last unfinished run.")] = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Continue the last unfinished run of this experiment.")
+    ] = False,
     cache: Annotated[
-        bool, typer.Option("--cache/--no-cache", help="Use what was computed before from the same content.")
+        bool,
+        typer.Option(
+            "--cache/--no-cache", help="Use the results of earlier stages that had the same inputs."
+        ),
     ] = True,
     prefect: options.PrefectOption = True,
 ) -> None:
-    """The whole flow: data, physics, search, ensembles, intervals, tables, figures, report."""
+    """Run an experiment: read and simulate the data, search for a correction, calibrate intervals, and write tables,
+    figures and the report to runs/NAME."""
     from flows.jobs.start import start
 
     start(
@@ -50,7 +67,8 @@ def worker(
     experiment: Experiment,
     overrides: Overrides = None,
 ) -> None:
-    """One more process on a shared study: evaluates candidates of an experiment that others also work on."""
+    """Evaluate candidates of an experiment together with other processes, which share them through the workspace or
+    through the database that runner.storage names."""
     from flows.jobs.worker import work
 
     work(experiment, list(overrides or []))
@@ -58,19 +76,30 @@ def worker(
 
 def tables(
     experiment: Annotated[str, typer.Argument(help="Name of an experiment, or its file.")],
-    format: Annotated[Literal["md", "tex", "csv"], typer.Option(help="Markdown, LaTeX or CSV.")] = "md",
+    format: Annotated[
+        Literal["md", "tex", "csv"],
+        typer.Option(help="Format of the tables: Markdown, LaTeX or CSV."),
+    ] = "md",
     run_id: Annotated[
-        list[str] | None, typer.Option("--run", help="Only this tracked run; may be repeated.")
+        list[str] | None,
+        typer.Option(
+            "--run",
+            help="Id of a tracked run to use, or its beginning; may be repeated. Default: the newest finished run of "
+            "each seed.",
+        ),
     ] = None,
     figures: Annotated[
-        Path | None, typer.Option(help="Also write the tracked figures and reports to this folder.")
+        Path | None, typer.Option(help="Folder to which the tracked figures and reports are written as well.")
     ] = None,
     uri: Annotated[
         str | None,
-        typer.Option(help="Tracking store; without it that of the experiment's file, else the workspace's."),
+        typer.Option(
+            help="Address of the tracking store (MLflow). Default: that of the experiment file, else the store of the "
+            "workspace."
+        ),
     ] = None,
 ) -> None:
-    """The paper's tables from tracked runs alone, with mean and spread where there are several seeds."""
+    """Print the tables of an experiment from its tracked runs alone, with mean and spread over several seeds."""
     if figures is not None:
         outputs.check_folder(figures, option="--figures")
     from flows.results.tables import tables_of, tracked_as
@@ -80,7 +109,7 @@ def tables(
 
 
 def _deliver(uri: str | None) -> None:
-    """Hand to a store what waits for it in this workspace, before it is read."""
+    """Send to a tracking store what this workspace still holds back for it, before the store is read."""
     from flows.base.console import Console
     from flows.tracking.leftovers import deliver_leftovers
     from flows.tracking.store import Store
@@ -91,12 +120,14 @@ def _deliver(uri: str | None) -> None:
 def compare(
     runs: Annotated[
         list[str],
-        typer.Argument(help="Tracked runs (the beginning of their ids), or experiments for all of theirs."),
+        typer.Argument(
+            help="Ids of tracked runs, or their beginnings; a name of an experiment takes all its runs."
+        ),
     ],
-    out: Annotated[Path, typer.Option(help="The page to write.")] = Path("compare.html"),
+    out: Annotated[Path, typer.Option(help="HTML file to write.")] = Path("compare.html"),
     uri: options.StoreUri = None,
 ) -> None:
-    """Tracked runs side by side on one offline page: what differed, what came of it, where the error is."""
+    """Compare tracked runs on one HTML page that opens offline: their settings, their figures, maps of their errors."""
     outputs.check_page(out)
     from flows.results.compare import compare as write
 
@@ -106,11 +137,17 @@ def compare(
 
 
 def candidate(
-    run_id: Annotated[str, typer.Argument(help="A tracked candidate, or a run for the one that it chose.")],
-    out: Annotated[Path, typer.Option(help="Folder for model/ and candidate.json.")],
+    run_id: Annotated[
+        str,
+        typer.Argument(
+            help="Id of a tracked candidate, or of a run, which takes the candidate that it chose."
+        ),
+    ],
+    out: Annotated[Path, typer.Option(help="Folder to write: model/ and candidate.json.")],
     uri: options.StoreUri = None,
 ) -> None:
-    """A candidate of a search made again from the tracking store alone, with its model."""
+    """Rebuild a candidate of a search, and its model, from the tracking store alone. The exit code is 1 if its figures
+    differ from the tracked ones."""
     outputs.check_folder(out)
     from flows.base.console import Console
     from flows.base.folder_lock import alone_in
@@ -128,22 +165,35 @@ def candidate(
 def ui(
     port: Annotated[
         int | None,
-        typer.Option(min=1, max=65535, help="5000 without it; 8080 with --optuna, 4200 with --prefect."),
+        typer.Option(
+            min=1,
+            max=65535,
+            help="TCP port to serve on. Default: 5000, with --optuna 8080, with --prefect 4200.",
+        ),
     ] = None,
-    host: Annotated[str, typer.Option(help="Loopback unless you say otherwise.")] = "127.0.0.1",
+    host: Annotated[
+        str,
+        typer.Option(
+            help="Address to serve on. The default can be reached from this machine only; 0.0.0.0 from the whole "
+            "network."
+        ),
+    ] = "127.0.0.1",
     uri: options.StoreUri = None,
     optuna: Annotated[
-        bool, typer.Option("--optuna", help="Optuna's dashboard, also while a search runs.")
+        bool, typer.Option("--optuna", help="Show Optuna's dashboard of the searches, finished or running.")
     ] = False,
     prefect: Annotated[
-        bool, typer.Option("--prefect", help="Prefect's server on the flow runs here.")
+        bool, typer.Option("--prefect", help="Show Prefect's pages of the flow runs in this workspace.")
     ] = False,
     storage: Annotated[
         str | None,
-        typer.Option(help="With --optuna: a database, as in runner.storage; else the workspace's journal."),
+        typer.Option(
+            help="URL of the database with the searches, as in runner.storage; with --optuna alone. Default: the "
+            "journal of the workspace."
+        ),
     ] = None,
 ) -> None:
-    """The MLflow UI on the tracking store in use, Optuna's dashboard on the searches, or Prefect on the flow runs."""
+    """Serve a web page with the tracked runs (MLflow), searches (Optuna) or flow runs (Prefect) until Ctrl-C."""
     if storage is not None and not optuna:
         raise InputError(
             "--storage is a database for Optuna's dashboard; give --optuna beside it, or leave it out."

@@ -1,4 +1,4 @@
-"""Options that several commands share, and their reading into plain values."""
+"""Options that several commands share, and functions that turn their texts into values."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 Value = TypeVar("Value")
 
-_CELL = typer.Option("--cell", help="BPX file, or a model folder that `discover` wrote.")
+_CELL = typer.Option("--cell", help="Cell file: BPX, or the folder of a saved model, such as found/model.")
 CellOption = Annotated[Path, _CELL]
 CellUnlessExperiment = Annotated[Path | None, _CELL]
 
@@ -34,9 +34,10 @@ ITS_DEVIATION = (
 
 
 def share(option: str, of: str = A_STATE) -> Callable[[float | None], float | None]:
-    """What lets a share of the capacity through, and raises InputError, naming the option, for what is none.
+    """A callback that returns a share of the capacity unchanged, and raises InputError, naming the option, for a value
+    outside 0 to 1.
 
-    of : what the share is of, for the sentence.
+    of : end of that sentence, which says what the value means.
     """
 
     def checked(value: float | None) -> float | None:
@@ -48,13 +49,13 @@ def share(option: str, of: str = A_STATE) -> Callable[[float | None], float | No
 
 
 def _known_health(text: str | None) -> str | None:
-    """Lets a state of health through.  Raises InputError, naming the option, for one that is none."""
+    """The text of --soh unchanged.  Raises InputError, naming the option, if it is no state of health."""
     state_of_health(text)
     return text
 
 
 def state_of_health(text: str | None) -> Soh | None:
-    """`--soh SHARE` or `--soh YYYY-MM-DD`.  Raises InputError, naming the option, for what is neither."""
+    """The value of `--soh SHARE` or `--soh YYYY-MM-DD`.  Raises InputError, naming the option, if it is neither."""
     if text is None:
         return None
     from aesi.physics.cell.health import read_soh
@@ -67,7 +68,12 @@ def state_of_health(text: str | None) -> Soh | None:
 
 Soc0 = Annotated[
     float | None,
-    typer.Option("--soc0", callback=share("--soc0"), help="State of charge at the first row, from 0 to 1."),
+    typer.Option(
+        "--soc0",
+        callback=share("--soc0"),
+        help="State of charge at the first row, 0 (empty) to 1 (full). Default: read from the measured voltage; a "
+        "profile without a voltage takes that of a saved model.",
+    ),
 ]
 SohOption = Annotated[
     str | None,
@@ -75,30 +81,40 @@ SohOption = Annotated[
         "--soh",
         callback=_known_health,
         metavar="<share|YYYY-MM-DD>",
-        help="State of health: share of the cell file's capacity that the cell had when this was measured, or the day "
-        "of that, where the file was calibrated with dates.",
+        help="State of health: capacity of the cell when it was measured, as a share of the cell file's capacity "
+        "(0.96), or the day of the measurement if the file was calibrated with dates. Default: the file's capacity.",
     ),
 ]
 Effects = Annotated[
-    list[str] | None, typer.Option("--effect", help="An effect to add: id or id:parameter=value,...")
+    list[str] | None,
+    typer.Option(
+        "--effect",
+        help="Effect to add, as ID or ID:PARAMETER=VALUE,... in the units that `aesi effects ID` lists; may be "
+        "repeated. Example: series_resistance:resistance_ohm=1e-3.",
+    ),
 ]
 EffectFiles = Annotated[
-    list[Path] | None, typer.Option("--effect-file", help="A Python file of yours with an EFFECT in it.")
+    list[Path] | None,
+    typer.Option(
+        "--effect-file",
+        help="Python file of your own that defines an EFFECT; may be repeated. It is run: give only files that you "
+        "trust.",
+    ),
 ]
 HoldOption = Annotated[
     Literal["linear", "backward"] | None,
     typer.Option(
         "--hold",
-        help="How the current runs between rows. linear: straight; backward: constant since the row before, as loggers "
-        "write. Without it that of a saved model; elsewhere backward where rows come more than 5 s apart, but linear "
-        "for a profile without a voltage. A message states which was used.",
+        help="Current between two rows. linear: a straight line; backward: constant since the row before, as loggers "
+        "record it. Default: that of a saved model; else backward for a measurement with rows more than 5 s apart, and "
+        "linear otherwise. A message says which was used.",
     ),
 ]
 
 
 def _no_key_twice(pairs: list[str] | None) -> list[str] | None:
-    """Lets KEY=VALUE pairs through.  Raises InputError for a key that is there twice: of two values the last would
-    count, and nobody be told."""
+    """The KEY=VALUE pairs unchanged.  Raises InputError for a key that is given twice: the last value would count
+    without a message."""
     seen = set()
     for pair in pairs or []:
         key = pair.partition("=")[0].strip()
@@ -109,7 +125,7 @@ def _no_key_twice(pairs: list[str] | None) -> list[str] | None:
 
 
 def key_value(told: str) -> Any:
-    """The option `--set`, with its help."""
+    """The option `--set KEY=VALUE`.  told : its help text."""
     return typer.Option("--set", callback=_no_key_twice, help=told)
 
 
@@ -117,7 +133,8 @@ SelfHeating = Annotated[
     bool,
     typer.Option(
         "--self-heating",
-        help="Let the cell warm itself, by its file's thermal data; a measured temperature is used as it is.",
+        help="Simulate the heating of the cell by its losses, with the thermal data of its file. A measured "
+        "temperature is used as it is. Default: the temperature is that of the file, or as measured.",
     ),
 ]
 
@@ -125,18 +142,31 @@ ModelOption = Annotated[
     Literal["espm", "dfn"] | None,
     typer.Option(
         "--model",
-        help="Single particle or porous electrode; without it that of a saved model, or that the cell's file was "
-        "fitted with, else espm.",
+        help="Physics model: espm (single particle) or dfn (porous electrode). Default: that of a saved model, or the "
+        "one that the cell file was fitted with, else espm.",
     ),
 ]
 
-MaxEffects = Annotated[int, typer.Option("--max-effects", min=0, max=10, help="Most effects that are added.")]
+MaxEffects = Annotated[
+    int, typer.Option("--max-effects", min=0, max=10, help="Largest number of effects that are added.")
+]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Random seed.")]
-StoreUri = Annotated[str | None, typer.Option("--uri", help="Tracking store; the workspace's without it.")]
+StoreUri = Annotated[
+    str | None,
+    typer.Option(
+        "--uri",
+        help="Address of the tracking store (MLflow), such as http://HOST:5000 or sqlite:///FILE. Default: the store "
+        "of the workspace.",
+    ),
+]
 
 PrefectOption = Annotated[
     bool,
-    typer.Option("--prefect/--no-prefect", envvar="AESI_PREFECT", help="Run the stages as a Prefect flow."),
+    typer.Option(
+        "--prefect/--no-prefect",
+        envvar="AESI_PREFECT",
+        help="Run the stages as a Prefect flow, which records them, or as plain functions.",
+    ),
 ]
 
 _LIST = list[str] | None
@@ -145,47 +175,72 @@ READING: dict[str, Any] = {
         _LIST,
         typer.Option(
             "--column",
-            help='quantity=name, for other headers: current_a="I[A]", or its number, #2, where there are none; also '
-            "cycle=, step=; temperature_degc=40 states it for every row, as that of the case (a winding with a thermal "
-            "conductivity in its file is warmer under load), temperature_degc= leaves it out.",
+            help='Column of a quantity in the file, as QUANTITY=NAME, such as current_a="I[A]"; without headers by its '
+            "number, such as current_a=#2. Quantities: time_s, current_a, voltage_v, temperature_degc, cycle, step. "
+            "temperature_degc=40 states the temperature of the case for every row (under load the winding is warmer if "
+            "the cell file has a thermal conductivity); temperature_degc= leaves the column out. May be repeated.",
         ),
     ],
     "unit": Annotated[
         _LIST,
         typer.Option(
             "--unit",
-            help="quantity=unit where a column is not in s, A, V, degC: current_a=mA, time_s=h:m:s or =date.",
+            help="Unit of a column that is not in s, A, V or degC, as QUANTITY=UNIT: current_a=mA, temperature_degc=K, "
+            "time_s=h:m:s, time_s=date. May be repeated.",
         ),
     ],
     "sign": Annotated[
         Literal["discharge-positive", "charge-positive"] | None,
         typer.Option(
             "--sign",
-            help="Which direction of the current is positive; without it as the export has it, or discharge.",
+            help="Direction in which the current of the file is positive. Default: that of a known cycler's export, "
+            "else discharge.",
         ),
     ],
     "state": Annotated[
         str | None,
-        typer.Option("--state", help="Column that says which way a current without a sign flows."),
+        typer.Option(
+            "--state", help="Column that gives the direction of a current without a sign, in words or codes."
+        ),
     ],
     "state_word": Annotated[
         _LIST,
-        typer.Option("--state-word", help="WORD=charge, discharge or rest, for a word of that column."),
+        typer.Option(
+            "--state-word",
+            help="Meaning of a word in the column of --state, as WORD=charge, WORD=discharge or WORD=rest; may be "
+            "repeated.",
+        ),
     ],
-    "cycle": Annotated[str | None, typer.Option("--cycle", help="Rows of this cycle alone: 3, or 3:5.")],
-    "step": Annotated[str | None, typer.Option("--step", help="Rows of this step alone: 7, or 7:9.")],
-    "from_s": Annotated[float | None, typer.Option("--from-s", help="Rows from this time on.")],
-    "to_s": Annotated[float | None, typer.Option("--to-s", help="Rows up to this time.")],
+    "cycle": Annotated[
+        str | None,
+        typer.Option("--cycle", help="Use only the rows of this cycle, such as 3, or 3:5 for 3 to 5."),
+    ],
+    "step": Annotated[
+        str | None,
+        typer.Option("--step", help="Use only the rows of this step, such as 7, or 7:9 for 7 to 9."),
+    ],
+    "from_s": Annotated[
+        float | None,
+        typer.Option("--from-s", help="Use only the rows from this time on, s, in the file's clock."),
+    ],
+    "to_s": Annotated[
+        float | None,
+        typer.Option("--to-s", help="Use only the rows up to this time, s, in the file's clock."),
+    ],
     "duplicates": Annotated[
         Literal["refuse", "first", "last"] | None,
-        typer.Option("--duplicates", help="Which row of several with one stamp to keep."),
+        typer.Option(
+            "--duplicates",
+            help="Which of several rows with the same time is used; refuse stops with an error. Default: first in a "
+            "known cycler's export, else refuse.",
+        ),
     ],
 }
-"""What can be said of files, in every command that reads them."""
+"""Keyword -> option that says how files are read, in every command that reads measurements."""
 
 
 def reads_files(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options that say how its files are read, handed to it as `reading`."""
+    """The command with the options of READING added. It gets them together as its keyword `reading`, a `Reading`."""
     signature = inspect.signature(command, eval_str=True)
     keyword = inspect.Parameter.KEYWORD_ONLY
     own = [p.replace(kind=keyword) for p in signature.parameters.values() if p.name != "reading"]
@@ -205,7 +260,10 @@ def reads_files(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def check_unsaid(context: typer.Context, admissible: Iterable[str]) -> None:
-    """Raises InputError where an option is given beside an experiment file that would not be looked at."""
+    """Raises InputError if an option is given beside an experiment file and would be ignored.
+
+    admissible : names of the parameters that may be given.
+    """
     for name in context.params:
         source = context.get_parameter_source(name)
         if source is not None and source.name == "COMMANDLINE" and name not in admissible:
@@ -251,9 +309,10 @@ def _pairs(option: str, pairs: list[str] | None) -> dict[str, str]:
 def measurements(
     paths: list[Path], reading: Reading, hold: Hold | None = None, until: dict[str, float] | None = None
 ) -> tuple[Measurement, ...]:
-    """The files as measurements, with how the current was declared to run between their rows.
+    """The measurements in the files, with all their rows.
 
-    until : seconds up to which single records are read, by their names.
+    reading : how the files are read.  hold : current between rows, None leaves it undeclared.  until : name of a record
+    -> time up to which it is read, s.
     """
     from aesi.data.read import read
     from aesi.data.reading import record_names
@@ -264,12 +323,12 @@ def measurements(
         told = reading if end is None else reading.but(stop_s=end)
         out.append(
             read(path, told, None, name).held(hold)
-        )  # with all rows, as in Python: a fit thins them itself
+        )  # all rows are read, as in Python: a fit thins them itself
     return tuple(out)
 
 
 def check_once(option: str, paths: list[Path]) -> None:
-    """Raises InputError for a file that is given twice."""
+    """Raises InputError, naming the option, for a file that is given twice."""
     seen = set()
     for path in paths:
         if path.resolve() in seen:
@@ -278,17 +337,23 @@ def check_once(option: str, paths: list[Path]) -> None:
 
 
 def by_file(option: str, pairs: list[str] | None, paths: list[Path]) -> dict[str, float]:
-    """`FILE=NUMBER` pairs as numbers by record of the files `paths`."""
+    """Record -> number, from `FILE=NUMBER` pairs. FILE means one of the files `paths` (`_record_of`).
+
+    Raises InputError for a pair that cannot be read, an unknown file, and a record that is given twice.
+    """
     return _by_file(option, pairs, paths, _finite, "NUMBER")
 
 
 def dates(pairs: list[str] | None, paths: list[Path]) -> dict[str, date]:
-    """`--date FILE=YYYY-MM-DD` pairs as days by record of the files `paths`."""
+    """Record -> day, from `--date FILE=YYYY-MM-DD` pairs; raises as `by_file`."""
     return _by_file("--date", pairs, paths, date.fromisoformat, "YYYY-MM-DD")
 
 
 def priors(pairs: list[str] | None) -> dict[str, tuple[float, float]]:
-    """`--prior NAME=VALUE:SD` as value and standard deviation by name."""
+    """Parameter -> (value, standard deviation), from `--prior NAME=VALUE:SD`.
+
+    Raises InputError for a pair that cannot be read, and for a parameter that is given twice.
+    """
     out: dict[str, tuple[float, float]] = {}
     for pair in pairs or []:
         name, _, told = (part.strip() for part in pair.partition("="))
@@ -307,7 +372,7 @@ def priors(pairs: list[str] | None) -> dict[str, tuple[float, float]]:
 
 
 def cut_offs(text: str | None) -> tuple[float, float] | None:
-    """`--cut-offs LOWER:UPPER` as two voltages."""
+    """The two voltages of `--cut-offs LOWER:UPPER`, V.  Raises InputError if they cannot be read."""
     if text is None:
         return None
     try:
@@ -318,7 +383,8 @@ def cut_offs(text: str | None) -> tuple[float, float] | None:
 
 
 def body(text: str | None) -> tuple[float, ...] | None:
-    """`--body DIAMETERxHEIGHT` or `--body AxBxC` as two or three lengths."""
+    """The two or three lengths of `--body DIAMETERxHEIGHT` or `--body AxBxC`, mm.  Raises InputError if they cannot be
+    read."""
     if text is None:
         return None
     try:
@@ -333,7 +399,7 @@ def body(text: str | None) -> tuple[float, ...] | None:
 
 
 def day(option: str, text: str | None) -> date | None:
-    """A day that an option gives."""
+    """The day that an option gives as YYYY-MM-DD; None for None.  Raises InputError, naming the option."""
     try:
         return None if text is None else date.fromisoformat(text)
     except ValueError:
@@ -341,7 +407,7 @@ def day(option: str, text: str | None) -> date | None:
 
 
 def _finite(text: str) -> float:
-    """Raises ValueError for a text that is no number, or no finite one."""
+    """The number in a text.  Raises ValueError if it is none, or not finite."""
     value = float(text)
     if not isfinite(value):
         raise ValueError(text)
@@ -368,7 +434,11 @@ def _by_file(
 
 
 def _record_of(option: str, file: str, paths: list[Path]) -> str:
-    """What the record is called that an option means by `file`: a path as in --data, a file's name, or a record's."""
+    """The name of the record that an option means by `file`: a path as in --data, the name of a file, or that of a
+    record, tried in this order.
+
+    Raises InputError if it means none of the files `paths`, or several.
+    """
     from aesi.data.reading import record_name, record_names
 
     names = record_names(paths)
@@ -390,19 +460,19 @@ def _record_of(option: str, file: str, paths: list[Path]) -> str:
 
 
 def spectra(paths: list[Path] | None) -> tuple[Spectrum, ...]:
-    """The spectra of impedance files."""
+    """All spectra in the impedance files."""
     from aesi.data import read_spectra
 
     return tuple(spectrum for path in paths or [] for spectrum in read_spectra(path))
 
 
 def say_reading(paths: Iterable[Path]) -> None:
-    """The first line of a long command, before the libraries load."""
+    """Print the first line of a long command, on stderr, before the libraries are loaded."""
     typer.echo(f"Reading {', '.join(path.name or str(path) for path in paths)} ...", err=True)
 
 
 def say_notes(notes: Iterable[str]) -> None:
-    """What a reader dropped, mapped or averaged, on stderr."""
+    """Print the notes of a reader (dropped, renamed or averaged rows and columns) on stderr, similar ones together."""
     from aesi.pipeline.notes import together
 
     for note in together(notes):
@@ -410,9 +480,10 @@ def say_notes(notes: Iterable[str]) -> None:
 
 
 def added_effects(texts: list[str] | None, files: list[Path] | None) -> tuple[ActiveEffect, ...]:
-    """The effects of `--effect id:parameter=value,...`, of the catalogue and of the user's files.
+    """The effects of `--effect ID:PARAMETER=VALUE,...`, from the catalogue and from the user's files.
 
-    Raises InputError also for a file whose effect no `--effect` names: it would not be simulated.
+    Raises InputError for an unknown effect or parameter, and for a file whose effect no `--effect` names, since that
+    effect would not be simulated.
     """
     from aesi.physics.effects import activated, load_effect
 
@@ -428,7 +499,7 @@ def added_effects(texts: list[str] | None, files: list[Path] | None) -> tuple[Ac
 
 
 def _effect_values(text: str) -> tuple[str, dict[str, float]]:
-    """`id:parameter=value,...` as the id and its values."""
+    """(id, parameter -> value) of a text `ID:PARAMETER=VALUE,...`.  Raises InputError if it cannot be read."""
     name, colon, rest = text.partition(":")
     values: dict[str, float] = {}
     for item in rest.split(",") if colon else ():

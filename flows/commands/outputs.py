@@ -1,4 +1,5 @@
-"""Where a command writes, checked before its work: what is computed can be kept, and no input is overwritten."""
+"""Checks of the places that a command writes to. They run before its work, so that its results can be saved at the end
+and no input file is overwritten."""
 
 from __future__ import annotations
 
@@ -23,9 +24,11 @@ OTHER_FORMATS = (
 def check_file(
     out: Path, inputs: Iterable[Path], written: Sequence[Path] = (), option: str = "--out"
 ) -> None:
-    """Raises InputError where `out` cannot be a file to write, or what is written is one of the files that are read.
+    """Check that `out` can be written, and that no written file is one of those that are read.
 
-    inputs : files, and folders of saved models, whose files are read.  written : the files, where there are more.
+    inputs : files, and folders of saved models, that are read.  written : further files that are written.  option : the
+    option that names `out`, for the sentence.
+    Raises InputError if one of the checks fails.
     """
     with _refused(out, option):
         if out.is_dir():
@@ -42,22 +45,22 @@ def check_file(
 
 
 def check_table(out: Path, inputs: Iterable[Path]) -> None:
-    """As `check_file`, of a CSV.  Raises InputError also where the name promises another format."""
+    """`check_file` for a CSV.  Raises InputError also if the name has the suffix of another format."""
     check_file(out, inputs)
     if out.suffix.lower() in OTHER_FORMATS:
         raise InputError(f"--out {out}: what is written is a CSV; give a name that ends in .csv or .csv.gz.")
 
 
 def check_json(out: Path, inputs: Iterable[Path], written: Sequence[Path] = ()) -> None:
-    """As `check_file`, of a cell's file.  Raises InputError also where the name promises another format."""
+    """`check_file` for a cell file (BPX).  Raises InputError also if the name does not end in .json."""
     check_file(out, inputs, written)
     if out.suffix.lower() != ".json":
         raise InputError(f"--out {out}: what is written is BPX; give a name that ends in .json.")
 
 
 def check_page(out: Path) -> None:
-    """As `check_file`, of a page, beside which no file is read.  Raises InputError also where the name promises another
-    format."""
+    """`check_file` for an HTML page; no file is read for it.  Raises InputError also if the name does not end in .html
+    or .htm."""
     check_file(out, ())
     if out.suffix.lower() not in PAGES:
         raise InputError(f"--out {out}: what is written is a page; give a name that ends in .html.")
@@ -66,10 +69,11 @@ def check_page(out: Path) -> None:
 def check_folder(
     out: Path, inputs: Iterable[Path] = (), written: Sequence[Path] = (), option: str = "--out"
 ) -> None:
-    """Raises InputError where `out` cannot be a folder to write to, or what is written in it is one of the files that
-    are read; one that is there is kept, and its files may be replaced.
+    """Check that `out` can be a folder to write to, and that no written file is one of those that are read.
 
-    inputs, written : as in `check_file`.
+    An existing folder is kept, and its files may be replaced; a folder with the results of a run is refused.
+    inputs, written, option : as in `check_file`.
+    Raises InputError if one of the checks fails.
     """
     with _refused(out, option):
         if out.exists() and not out.is_dir():
@@ -89,7 +93,8 @@ def check_folder(
 
 
 def check_beside(out: Path, source: Path) -> None:
-    """Raises InputError where `out` is the folder `source` or lies in it: what is written would be read next time."""
+    """Raises InputError if `out` is the folder `source` or lies in it, since the next run would read the results as
+    cells."""
     if source.is_dir() and out.resolve().is_relative_to(source.resolve()):
         raise InputError(
             f"--out {out} lies in {source}, whose subfolders are read as cells; name a folder beside it."
@@ -97,13 +102,17 @@ def check_beside(out: Path, source: Path) -> None:
 
 
 def first_lost(written: Iterable[Path], inputs: Iterable[Path]) -> Path | None:
-    """The first of the files that are written which is there and is read."""
+    """The first written file that exists and is one of the files that are read; None if there is none.
+
+    inputs : as in `check_file`.
+    """
     read = {file.resolve() for given in inputs for file in _files_read(given)}
     return next((file for file in written if file.is_file() and file.resolve() in read), None)
 
 
 def _files_read(given: Path) -> Iterator[Path]:
-    """The file itself; of a folder with a saved model its files, and those of the user's effects that it names."""
+    """The files that are read for an input: a file itself; of a saved model's folder all its files, and the files of
+    the user's own effects that it names."""
     if not given.is_dir():
         yield given
     elif (given / HEAD).is_file():
@@ -115,7 +124,7 @@ def _files_read(given: Path) -> Iterator[Path]:
 
 
 def _content(file: Path) -> object:
-    """None of a file that cannot be read, which whoever loads the model says."""
+    """The content of a JSON file; None if it cannot be read. Loading the model raises the error on such a file."""
     try:
         return json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -124,7 +133,8 @@ def _content(file: Path) -> object:
 
 @contextmanager
 def _refused(out: Path, option: str = "--out") -> Iterator[None]:
-    """What the system refuses, as a sentence about the option; and `-`, which elsewhere is the standard output."""
+    """Turns an OSError in the body of the `with` statement into an InputError about the option.  Raises InputError also
+    for `-`, which other programs take as the standard output."""
     if str(out) == "-":
         raise InputError(f"{option} -: name a place to write to; the standard output is /dev/stdout.")
     try:

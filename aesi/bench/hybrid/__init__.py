@@ -1,1 +1,1 @@
-"""The hybrid: the ensemble against PySINDy, designs of its search, and measured drives split in every way."""
+"""Benchmarks of the hybrid model: speed against PySINDy, settings of the search, and prediction of unseen drives."""

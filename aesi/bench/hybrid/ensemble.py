@@ -1,18 +1,21 @@
-"""A search whose candidates are ensembles of bootstrap resamples, against PySINDy's STLSQ on the same ones.
+"""`aesi bench ensemble`: how fast is a search over ensembles of bootstrap resamples, compared with PySINDy's STLSQ?
 
-Synthetic records of the paper's size: a current with drive-like pulses, states that follow it through
-low-passes and its integral, and an error that they drive besides coloured noise. The library holds the terms
-of lowest degree. Ours is everything a search does, one-off work included: library, factorisation, Gram
-matrices of all resamples, and for each candidate the fits, the out-of-bag errors in free run, and both
-ensembles. The peer is timed on a few resamples and scaled: STLSQ alone, without building the library,
-without out-of-bag errors. Both run in one thread, and seconds are those of the processor, so that other work on
-the machine moves them little. `failed` counts candidates that a search would prune: with hardly any ridge most of them
-diverge on the left-out pieces, which is found after all fits are done and both ensembles are made, so they cost what
-the others cost; one whose threshold is above every coefficient is seen at once and costs nothing.
+The record is synthetic and of the paper's size: the current has pulses like those of a drive, the states follow it
+through low-pass filters and through its integral, and the error depends on these states, with coloured noise added. The
+library holds the terms of lowest degree. The time of this package (`ours_s`) is that of a whole search, work that is
+done once included: building the library, factorisation, Gram matrices of all resamples, and for each candidate the
+fits, the out-of-bag errors in free run, and both ensembles. PySINDy is timed on a few of the same resamples, and the
+time is scaled to all; it is that of STLSQ alone, without the library and the out-of-bag errors. Both run in one thread.
+All times are processor times, which other work on the machine changes little.
 
-The ratio of a small library depends on how many candidates share the one-off work, and on how many come to nothing
-at once. At 60 terms the one-off work took 1.27 s of processor, a candidate that is fitted 0.35 to 0.48 s, one whose
-threshold leaves nothing 0.01 s: four runs with three candidates gave 21.5 to 23.7, earlier ones with twenty 93 and 211.
+`failed` counts the candidates that a search would discard. With a tiny ridge most candidates diverge on the left-out
+pieces; this shows only when all fits are done and both ensembles are made, so that these candidates cost as much as the
+others. A candidate whose threshold exceeds every coefficient is recognised at once and costs almost nothing.
+
+For a small library the ratio of times depends on how many candidates share the work that is done once, and on how many
+are discarded at once. At 60 terms this work took 1.27 s of processor time, a fitted candidate 0.35 to 0.48 s, and one
+without any term left 0.01 s. The ratio was 21.5 to 23.7 in four runs with three candidates, and 93 and 211 in earlier
+runs with twenty.
 """
 
 from __future__ import annotations
@@ -32,11 +35,12 @@ from aesi.sparse import Genome, Library, Options, Problem, STRidge, evaluate
 from aesi.sparse.terms.inputs import low_pass, with_inputs
 
 CASES = ((60, 1e-3), (200, 1e-12), (626, 1e-3), (626, 1e-12))
-"""Terms in the library, lambda1."""
+"""(number of terms in the library, ridge lambda1) of each case."""
 
 _DT_S = 0.1
-"""That of the paper's records."""
+"""Time step, s, that of the paper's records."""
 _CAPACITY_AS = 30.0 * SECONDS_PER_HOUR
+"""Capacity of the cell, A s (30 Ah)."""
 
 
 def run(
@@ -46,21 +50,26 @@ def run(
     resamples: PositiveInt = 100,
     peer_models: PositiveInt = 2,
     seed: NonNegativeInt = 0,
-    **_: Any,
 ) -> Iterator[dict[str, Any]]:
-    """One line a case: seconds of ours and of the peer for all candidates, their ratio, errors, memory."""
+    """One row per case: processor times for all candidates, their ratio, errors of the coefficients, peak memory.
+
+    cases : (terms, lambda1).  n : rows that are fitted.  candidates : number of candidates, which differ in their
+    threshold.  resamples : bootstrap resamples of each.  peer_models : fits of PySINDy that are timed.  seed : of the
+    record.  Coefficient errors are relative to the largest coefficient of a QR solution.
+    """
     from threadpoolctl import threadpool_limits
 
     record = synthetic_record(n + 1, seed)
     with threadpool_limits(1):
-        # Compiled code is loaded, and solvers warm up, before anything is timed.
+        # A small case first, so that loading compiled code and warming up the solvers is not timed.
         _ours(synthetic_record(2001, seed), 40, 1e-3, 1, 4)
         for terms, lambda1 in cases:
             yield _case(record, terms, lambda1, candidates, resamples, peer_models)
 
 
 def synthetic_record(n: int, seed: int) -> ErrorSeries:
-    """A record of n samples at 10 Hz: smooth states, as an ESPM has, and an error they partly explain."""
+    """A synthetic record of n samples at 10 Hz: smooth states like those of an ESPM, and an error that depends on them
+    in part."""
     rng = np.random.default_rng(seed)
     time_s: Array = _DT_S * np.arange(n, dtype=float)
     raw = np.repeat(rng.normal(0.0, 45.0, n // 40 + 1), 40)[:n]
@@ -130,7 +139,8 @@ def _ours(
 
 
 def _peer(problem: Problem, genomes: Sequence[Genome], models: int) -> tuple[float, float, float]:
-    """Seconds of a model of the peer, its largest coefficient error, and ours, against a QR of the rows."""
+    """(processor time of one fit of PySINDy, s; largest error of its coefficients; largest error of ours). The errors
+    are relative to the largest coefficient, and the reference is a QR solution of the weighted rows."""
     from pysindy import STLSQ
 
     theta = problem.theta(np.arange(len(problem.library))).T
@@ -156,12 +166,12 @@ def _peer(problem: Problem, genomes: Sequence[Genome], models: int) -> tuple[flo
 def _quiet() -> Any:
     import warnings
 
-    # STLSQ announces an empty model and an ill-conditioned solve; both are expected here.
+    # STLSQ warns of an empty model and of an ill-conditioned system; both are expected here.
     return warnings.catch_warnings(action="ignore")
 
 
 class _PeakMemory:
-    """Highest resident memory of this process while the block runs, looked at every 20 ms."""
+    """Peak resident memory of this process while a `with` block runs, MiB, sampled every 20 ms."""
 
     peak_mb = 0.0
 

@@ -1,4 +1,7 @@
-"""What splits sum up to: means and worst cases by cell, and the table of the docs."""
+"""Summary of the benchmark on splits of measured drives: mean and worst figures by cell, and the table of the docs.
+
+The figures of a split are described in `splits.judged`.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ from aesi.bench.limit import NOT_RUN
 from aesi.pipeline.experiment.physics_models import RECALIBRATED
 
 BEST = "AESI I"
-"""The model that the docs tell of."""
+"""The model whose figures the table shows."""
 TITLES = {
     "nmc": "NMC pouch, parts of a drive",
     "lfp": "LFP 18650, parts of a drive",
@@ -24,12 +27,13 @@ TITLES = {
 
 
 def summary(rows: Sequence[CaseRow]) -> dict[str, Any]:
-    """Means and worst cases by cell, of all splits and of those that judge alone.
+    """Means and worst values by cell, over all splits (`all`) and over the test splits alone (`judging`).
 
-    A run (a split with one seed) that failed counts as nothing gained, 0 %, in every reduction of the squared error on
-    its own temperature, and in no other figure; one whose data cannot be had counts in none.
-    best_in_hindsight : of whichever model errs least on each split, the recalibrated one among them: what a choice that
-    knew the test could have taken off, and no choice from training drives can count on."""
+    A run is one split with one seed. A failed run counts as a reduction of 0 % in every reduction of the squared error
+    at the cell's own temperature, and in no other figure. A run whose data are not available counts in no figure.
+    `best_in_hindsight` is the reduction by whichever model has the lowest error on each split, the recalibrated model
+    included. It needs the test data, so that it is an upper bound for any choice of a model from the training drives.
+    """
     ran = [row for row in rows if row.get("verdict") != NOT_RUN]
     return {
         "summary": True,
@@ -50,7 +54,8 @@ def _by_cell(rows: Sequence[CaseRow]) -> dict[str, list[CaseRow]]:
 
 
 def _of(rows: Sequence[CaseRow]) -> dict[str, Any]:
-    """The figures of one cell: of each model, of the best in hindsight, and how far the validation figure is off."""
+    """The figures of the runs of one cell: of each model, of the best model in hindsight, and the absolute difference
+    of the validation figure and the test figure, in percentage points."""
     good = [row for row in rows if "error" not in row]
     out: dict[str, Any] = {"splits": len({row["split"] for row in rows}), "runs": len(rows)}
     if not good:
@@ -80,7 +85,8 @@ def _of(rows: Sequence[CaseRow]) -> dict[str, Any]:
 
 
 def _of_bands(models: Sequence[Mapping[str, Any]]) -> dict[str, float]:
-    """Coverage and Winkler score over the rows of all splits; nothing where one of the models has no band."""
+    """Coverage (per cent) and Winkler score (mV) over the rows of all splits, and the lowest coverage of a drive. Empty
+    if the model has no band in one of the splits."""
     if not all("coverage_pct" in m for m in models):
         return {}
     counts = np.array([m["rows"] for m in models], dtype=float)
@@ -92,12 +98,12 @@ def _of_bands(models: Sequence[Mapping[str, Any]]) -> dict[str, float]:
 
 
 def _gains(name: str, tests: Sequence[Mapping[str, Any]]) -> list[float]:
-    """Reduction by a model of what the recalibrated one leaves, per cent, of each test that has both."""
+    """Reduction of the recalibrated model's squared error by a model, per cent, for each test with both models."""
     return [against(test[name], test[RECALIBRATED]) for test in tests if RECALIBRATED in test]
 
 
 def _spread(name: str, values: Sequence[float], failed: Sequence[float] = ()) -> dict[str, float]:
-    """Mean and worst, with what a failed run counts as; nothing of no values."""
+    """Mean and worst (lowest) value; empty if there are no values.  failed : values at which failed runs count."""
     if not values:
         return {}
     every = [*values, *failed]
@@ -105,20 +111,25 @@ def _spread(name: str, values: Sequence[float], failed: Sequence[float] = ()) ->
 
 
 HEAD = [
-    "| cell | splits | seeds | recalibrated, % | AESI I, % | against recalibrated, % | validation off, points "
-    "| covered by AESI I, % | Winkler, recalibrated / AESI I, mV |",
+    "| cell | splits | seeds | recalibrated, % | AESI I, % | AESI I against recalibrated, % "
+    "| validation minus test, points | coverage of AESI I, % | Winkler score, recalibrated / AESI I, mV |",
     "|---|---:|---:|---:|---:|---:|---:|---:|---:|",
 ]
 EACH = [
-    "| without, or trained on | tested on | recalibrated, % | AESI I, % | AESI II, % | AESI I against recalibrated, % "
-    "| validation, % | covered by AESI I, % | worst drive, % | Winkler, recalibrated / AESI I, mV |",
+    "| split | tested on | recalibrated, % | AESI I, % | AESI II, % | AESI I against recalibrated, % "
+    "| validation, % | coverage of AESI I, % | worst drive, % | Winkler score, recalibrated / AESI I, mV |",
     "|---|---|---:|---:|---:|---:|---:|---:|---:|---:|",
 ]
 
 
 def table(rows: Sequence[CaseRow]) -> list[str]:
-    """Lines of Markdown: a cell and a temperature a line, mean / worst split, each split by its mean over the seeds;
-    and folded away each split. What failed counts as in `summary`, and is told below."""
+    """Lines of Markdown: a table with one line per cell and test temperature, then each split in a block to open.
+
+    A field of the first table is `mean / worst split`, each split with its mean over the seeds. Columns named after a
+    model are the reduction of the declared model's squared error by it, per cent. `validation minus test` is the
+    absolute difference of these two reductions by AESI I, `median / worst`. `coverage` is over all rows, then that of
+    the worst drive. Failed runs count as in `summary`, and are listed between the two tables.
+    """
     ran = [row for row in rows if row.get("verdict") != NOT_RUN]
     lines, each = list(HEAD), list(EACH)
     for cell, title in TITLES.items():
@@ -139,7 +150,12 @@ def _by(key: str, rows: Sequence[CaseRow]) -> Iterator[list[CaseRow]]:
 
 
 def _over_seeds(rows: Sequence[CaseRow]) -> dict[str, Any]:
-    """`home` and what was tested `abroad`: model -> means of its figures, with `against` the recalibrated one."""
+    """The figures of one split, averaged over its seeds; at least one run has not failed.
+
+    `home` and, for each test record at another temperature, `abroad` : model -> mean figures; `against` in them is the
+    reduction of the recalibrated model's squared error, per cent. `validation` and `off` : the validation figure and
+    its absolute difference from the test figure, both of AESI I, percentage points.
+    """
     good = [row for row in rows if "error" not in row]
     first, share = good[0], len(good) / len(rows)
     told = [row["validation_mser_pct"].get(BEST) for row in good]
@@ -160,7 +176,8 @@ FIGURES = ("mser_pct", "coverage_pct", "worst_drive_coverage_pct", "winkler_mv",
 
 
 def _mean(models: Sequence[Mapping[str, Any]], share: float) -> dict[str, dict[str, float]]:
-    """share : of the runs that did not fail; the others gained nothing."""
+    """Model -> mean figures over the runs that did not fail.  share : share of these runs among all; reductions are
+    multiplied by it, since a failed run counts as a reduction of 0."""
     out = {
         name: {
             key: float(np.mean([m[name][key] for m in models])) for key in FIGURES if key in models[0][name]
@@ -174,7 +191,8 @@ def _mean(models: Sequence[Mapping[str, Any]], share: float) -> dict[str, dict[s
 
 
 def _summed(title: str, splits: Sequence[Mapping[str, Any]], failed: int) -> Iterator[str]:
-    """failed : splits of which no run came to an end."""
+    """The lines of one cell in the first table.  failed : number of splits of which all runs failed; they count as
+    reductions of 0."""
     if not splits:
         return
     off = [split["off"] for split in splits]

@@ -1,15 +1,16 @@
-"""Which splits of the measured drives a hybrid is asked to survive, and how one is judged.
+"""Splits of measured drives into training and test data, and the figures of a hybrid model on one split.
 
-Every split trains on some drives of a cell and is tested, in free run, on drives that it has not seen:
+In every split a hybrid model is trained on some drives of a cell and predicts drives that it has not seen, in free run:
 
-    nmc        each three, and each two, of the five parts of the NMC pouch cell's drive; the others test
-    lfp        the same of the LFP cell's drive, on which no rule or default was chosen: all of them judge
-    hg2        each drive of the LG HG2 at 25 degC in turn; the others train
-    panasonic  the same for the Panasonic NCR18650PF
-    m50t       each half (odd and even repeats) of the LG M50T's UDDS in turn
+    nmc        trains on three, or on two, of the five parts of the NMC pouch cell's drive; the other parts test
+    lfp        the same with the LFP cell's drive, on which no rule or default was chosen
+    hg2        one drive of the LG HG2 at 25 degC tests, the others train; each drive in turn
+    panasonic  the same with the Panasonic NCR18650PF
+    m50t       trains on the odd repeats of the LG M50T's UDDS and tests on the even ones, and the reverse
 
-Every second split of the other cells is a development split: rules and defaults may be chosen by a look at those. The
-others judge, and they alone are tested at other temperatures as well.
+Every second split of a cell other than lfp is a development split, whose figures may choose rules and defaults. The
+other splits, and all of lfp, are test splits: they choose nothing. Of the hg2 and the panasonic the test splits alone
+are tested at other temperatures as well (`abroad`).
 """
 
 from __future__ import annotations
@@ -38,9 +39,9 @@ from aesi.records import ErrorModel, ErrorSeries, FreeRun
 class SplitCase:
     """One split.
 
-    cell : of which table row.  experiment : file name of the experiment whose settings it takes.
-    overrides : what is laid over that.  abroad : names of test records at other temperatures.
-    development : whether rules may be chosen by a look at it.
+    cell : key of EXPERIMENTS.  name : of the split.  experiment : name of the experiment file with the settings.
+    overrides : `key=value` that replace settings of that file.  abroad : names of test records at other temperatures.
+    development : whether the figures of this split may choose rules and defaults.
     """
 
     cell: str
@@ -62,10 +63,12 @@ DRIVES = {
         "25degC_cycle_3",
     ),
 }
+"""Cell -> its drives at 25 degC, each of which is the test of one split."""
 ABROAD = {
     "hg2": ("10degC_us06", "40degC_la92"),
     "panasonic": ("10degC_cycle_1", "0degC_cycle_1"),
 }
+"""Cell -> drives at other temperatures, on which test splits are tested as well."""
 EXPERIMENTS = {
     "nmc": "measured_nmc_drive.yaml",
     "lfp": "measured_lfp_drive.yaml",
@@ -73,17 +76,19 @@ EXPERIMENTS = {
     "panasonic": "panasonic_ncr18650pf.yaml",
     "m50t": "lg_m50t_udds.yaml",
 }
+"""Cell -> file name of the experiment with its settings."""
 DRIVE_PARTS = (1, 2, 3, 4, 5)
-"""The published drives of the NMC and the LFP cell pass from part to part after DRIVE_PART_S, and that of the M50T
-repeats itself after M50T_PERIOD_S."""
+"""Numbers of the parts of the published drives of the NMC and the LFP cell, DRIVE_PART_S long each."""
 DRIVE_PART_S = 1800.0
+"""Duration of a part, s, as published."""
 M50T_HALVES = ((1, 3, 5, 7), (2, 4, 6))
-"""Odd and even repeats."""
+"""Odd and even repeats of the M50T's UDDS, M50T_PERIOD_S long each."""
 M50T_PERIOD_S = 2600.0
+"""Period of the schedule, s, as in the record."""
 
 
 def all_splits() -> tuple[SplitCase, ...]:
-    """Every split, the cells one after the other."""
+    """All splits, ordered by cell."""
     halves = (M50T_HALVES, M50T_HALVES[::-1])
     return (
         *_by_repeats("nmc", DRIVE_PART_S, _drive_parts()),
@@ -100,9 +105,11 @@ def chosen_splits(
     only: str | None = None,
     development: bool | None = None,
 ) -> tuple[SplitCase, ...]:
-    """Splits of the named cells, at most `a_cell` of each, spread evenly over its list.
+    """The selected splits.
 
-    only : a part of the name.  development : those alone, or the judging ones alone.
+    cells : keys of EXPERIMENTS.  a_cell : most splits of a cell, spread evenly over its list; None for all.
+    only : substring of the split's name.  development : True selects the development splits, False the test splits.
+    Raises InputError for an unknown cell, and if no split is selected.
     """
     unknown = [name for name in cells if name not in EXPERIMENTS]
     if unknown:
@@ -120,13 +127,18 @@ def chosen_splits(
 
 
 def judged(fitted: Sequence[Fitted], tests: Sequence[ErrorSeries]) -> dict[str, Any]:
-    """Model -> RMSE (mV), reduction against the declared model (per cent), and band of the pooled test records; of each
-    by itself in `drives`."""
+    """Model -> its figures in free run over all test records together, and over each by itself (`drives`).
+
+    tests : error series of the test records.  The figures are the RMSE (mV), the reduction of the declared model's mean
+    squared error (`mser_pct`, per cent), the number of runs that diverged, and of a model with bands their coverage
+    (per cent), mean width and Winkler score (mV).
+    """
     return {one.model.name: _figures(one, tests) for one in fitted}
 
 
 def against(mine: Mapping[str, Any], other: Mapping[str, Any]) -> float:
-    """Reduction of the squared error of `other` by `mine`, per cent; both entries of `judged`."""
+    """Reduction of the mean squared error of `other` by `mine`, per cent; positive if `mine` is better. Both are
+    entries of `judged`."""
     return float(100.0 * (1.0 - (mine["rmse_mv"] / other["rmse_mv"]) ** 2))
 
 
@@ -163,7 +175,7 @@ def _figures(one: Fitted, tests: Sequence[ErrorSeries]) -> dict[str, Any]:
 def _band(
     bands: FreeRunBands, model: ErrorModel, tests: Sequence[ErrorSeries], runs: Sequence[FreeRun]
 ) -> tuple[Array, Array]:
-    """Its edges over all rows, (n,) V each."""
+    """Lower and upper bound of the band over all rows of all records, relative to the free run, (n,) V each."""
     along = [
         bands.intervals(series, run, reach(model, series)) for series, run in zip(tests, runs, strict=True)
     ]
@@ -171,11 +183,13 @@ def _band(
 
 
 def _by_record(column: Array | BoolArray, tests: Sequence[ErrorSeries]) -> list[Array]:
-    """A column over all rows, (n,), as one array a record."""
+    """A column (n,) over all rows of all records, cut into one array per record."""
     return np.split(column, np.cumsum([len(series) for series in tests])[:-1])
 
 
 def _winkler(left: Array, low: Array, high: Array, alpha: float) -> Array:
+    """Winkler score of each row, (n,) V.  left : errors of the free run.  low, high : bounds of the band. (n,) V
+    each."""
     outside = np.maximum(low - left, 0.0) + np.maximum(left - high, 0.0)
     return np.asarray(high - low + 2.0 / alpha * outside)
 
@@ -194,7 +208,11 @@ def _by_repeats(
     parts: Sequence[tuple[tuple[int, ...], tuple[int, ...]]],
     development: bool = True,
 ) -> Iterator[SplitCase]:
-    """development : every second of them is for development; else none is."""
+    """Splits of one record whose parts, period_s s long, train and test.
+
+    parts : (numbers of the training parts, of the test parts) of each split.  development : whether every second split
+    is for development; otherwise none is.
+    """
     for number, (train, test) in enumerate(parts):
         repeats = RepeatsConfig(period_s=period_s, train=train, test=test)
         yield SplitCase(

@@ -1,1 +1,1 @@
-"""The intervals: one step ahead against MAPIE, and bands of the free run on virtual cells."""
+"""Benchmarks of prediction intervals: one step ahead on known series and under drift, and free-run bands."""

@@ -1,12 +1,16 @@
-"""Are free-run bands as wide as they have to be? Virtual cells by the dozen, one design beside another.
+"""`aesi bench bands`: are free-run bands as wide as they have to be?
 
-Every cell is fitted with the same genome, and calibrated as an experiment calibrates: by models that did not see the
-piece (halves of repeats and whole ones, or drives), and by the validation record where there is one. One line a layout
-(and for all), horizon and design, with means over the cells. A single drive has few independent errors, so its coverage
-scatters: `coverage_sd_pct` says by how much, `coverage_se_pct` what that leaves open of the mean over cells, which
-share the schedules of their layout. `score_ratio` is against the best constant width in hindsight, which knows the
-test. The truth is a function of the state here, alike in all repeats: a whole one that is left out errs more than a
-test repeat, which lies between two.
+Several designs of the bands are compared on many virtual cells (`virtual_drives`). Every cell is fitted with the same
+genome. The bands are calibrated as in an experiment: on the errors that models leave on pieces they were not fitted to
+(halves of repeats and whole repeats, or drives), and on the validation record if there is one. The benchmark yields one
+row per layout, horizon and design, with means over the cells, and then the same over all layouts.
+
+A single drive has few independent errors, so that its coverage scatters: `coverage_sd_pct` is the standard deviation
+over the cells, `coverage_se_pct` the standard error of the mean. The standard error is over cells only; the cells of a
+layout share their schedules. `score_ratio` is the interval score over that of the best constant width in hindsight,
+which is set on the test errors themselves (geometric mean over the cells). The true error of these cells is a function
+of the states, and the same in all repeats. A whole repeat that is left out therefore has larger errors than a test
+repeat, which lies between two training repeats; the bands of the layout `repeats` are wider than necessary.
 """
 
 from __future__ import annotations
@@ -33,16 +37,21 @@ from aesi.sparse import Genome, Options, Problem, evaluate
 from aesi.sparse.search.fold_models import fold_models, with_leverage
 
 ALPHA = 0.1
-"""Bands for 90 %."""
+"""Nominal share of misses: bands for 90 %."""
 OPTIONS = Options(p_c=3, d=2, mixed=False, resamples=50, block=100)
 RIDGE, THRESHOLD = 10.0, 1e-3
-"""Genes of the one genome that is fitted: conventions, in the midst of what a search tries."""
+"""lambda1 and lambda2 of the genome that all cells are fitted with. Conventions, in the middle of the ranges that a
+search tries."""
 LAYOUTS: tuple[SplitLayout, ...] = ("repeats", "schedules", "beyond")
 
 
 @dataclass(frozen=True, eq=False)
 class _Errors:
-    """Of one cell: what to calibrate on, how many stretches of it err independently, what came of the test records."""
+    """The errors of the models of one cell.
+
+    calibration : on left-out pieces and the validation record.  test : on the test records.  stretches : number of
+    stretches of the calibration data whose errors are independent of each other.
+    """
 
     calibration: OutOfSampleErrors
     test: OutOfSampleErrors
@@ -50,11 +59,11 @@ class _Errors:
 
 
 HalfWidths = dict[float, list[Array]]
-"""Horizon in s -> (n,) V a test record."""
+"""Horizon, s -> half width of the band along each test record, (n,) V."""
 
 
 def one_width(errors: _Errors) -> HalfWidths:
-    """The same width everywhere: the quantile of all left-out errors."""
+    """The same width everywhere: the quantile of the absolute errors of calibration."""
     return {
         h: [np.full(len(e), np.nanquantile(np.abs(np.concatenate(left)), 1 - ALPHA)) for e in errors.test.soc]
         for h, left in errors.calibration.by_horizon.items()
@@ -62,13 +71,13 @@ def one_width(errors: _Errors) -> HalfWidths:
 
 
 def without_leverage(errors: _Errors) -> HalfWidths:
-    """The bands of the package, blind to how far a sample lies from the fitted rows."""
+    """The bands of the package without the term for the distance of a sample from the fitted rows (leverage)."""
     nothing: list[Array | None] = [None] * len(errors.calibration.soc)
     return bands(replace(errors, calibration=replace(errors.calibration, excess=nothing)))
 
 
 def without_spread(errors: _Errors) -> HalfWidths:
-    """The bands of the package, blind to what the fitted rows leave open of the physics."""
+    """The bands of the package without the term for the uncertainty of the physical parameters (spread)."""
     calibration, test = (
         replace(each, spread=[np.zeros(len(s)) for s in each.spread])
         for each in (errors.calibration, errors.test)
@@ -77,18 +86,18 @@ def without_spread(errors: _Errors) -> HalfWidths:
 
 
 def held_at_the_edge(errors: _Errors) -> HalfWidths:
-    """The bands of the package, no wider where the model leaves its trained range."""
+    """The bands of the package without the widening where the model leaves its trained range (reach)."""
     nowhere = {h: [np.zeros(len(r)) for r in each] for h, each in errors.test.reach.items()}
     return bands(replace(errors, test=replace(errors.test, reach=nowhere)))
 
 
 def best_width(errors: _Errors) -> HalfWidths:
-    """The best constant width in hindsight: the quantile of the test errors themselves."""
+    """The best constant width in hindsight: the quantile of the absolute test errors."""
     return one_width(replace(errors, calibration=errors.test))
 
 
 def bands(errors: _Errors) -> HalfWidths:
-    """The bands of the package."""
+    """The bands of the package, calibrated by `OutOfSampleErrors.bands`."""
     found, test = errors.calibration.bands(ALPHA, errors.stretches), errors.test
     return {
         h: [found.at(h, p, x, r)[1] for p, x, r in zip(test.spread, test.excess, test.reach[h], strict=True)]
@@ -111,9 +120,12 @@ def run(
     cells: PositiveInt = 40,
     layouts: Sequence[SplitLayout] = LAYOUTS,
     seed: NonNegativeInt = 0,
-    **_: Any,
 ) -> Iterator[dict[str, Any]]:
-    """cell : BPX file of the declared cell.  cells : virtual cells a layout.  layouts : see `SplitLayout`."""
+    """One row per layout, horizon and design.
+
+    cell : BPX file of the declared cell.  cells : virtual cells of each layout.  layouts : see `SplitLayout`.
+    seed : of the virtual cells.  Widths and scores are in mV; `horizon_s` is null for the whole drive.
+    """
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1):
@@ -137,7 +149,8 @@ def run(
 
 
 def _errors(split: Split, cuts: int) -> _Errors | None:
-    """None where the genome fails on this cell.  cuts : into how many parts a drive is cut to be left out."""
+    """The errors of one cell; None if the genome cannot be evaluated on it.  cuts : number of parts into which a drive
+    is cut to be left out in turn."""
     problem = Problem.build(split, replace(OPTIONS, cuts=cuts))
     chosen = evaluate(problem, Genome.whole(problem.library, RIDGE, THRESHOLD, 0.5, 1, 1))
     if isinstance(chosen, Failed):
@@ -158,7 +171,8 @@ def _errors(split: Split, cuts: int) -> _Errors | None:
 
 
 def _judged(test: OutOfSampleErrors, widths: HalfWidths, horizon: float) -> tuple[float, ...]:
-    """Coverage, mean width, interval score, worst bin, and the score over that of the best constant width."""
+    """(coverage; mean width, V; interval score, V; lowest coverage in a bin; score over that of the best constant
+    width) of the test records of one cell at one horizon. Coverages are shares, 0 to 1."""
     left, half = np.concatenate(test.by_horizon[horizon]), np.concatenate(widths[horizon])
     seen = np.isfinite(left)
     covered = np.where(seen, np.abs(left) <= half, np.nan)

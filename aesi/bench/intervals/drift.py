@@ -1,9 +1,10 @@
-"""`aesi bench drift`: does the adaptive step hold coverage at every current while the error of a cell drifts?
+"""`aesi bench drift`: do adaptive intervals keep their coverage at every current while the error of a cell drifts?
 
-Normal residuals whose size depends on the range of the current, calibrated bands for them, and a record over which the
-size grows linearly to twice what it was: at no current, at all of them, or at the hardest alone. Each range's coverage
-and the interval score are those of the adaptive step by itself; `score_ratio` is over the score of the best band, which
-knows the drift.
+The residuals are normal, with a standard deviation that depends on the range of the current. The intervals begin with
+the right width for each range. Over the record the standard deviation then grows linearly to twice its value: at no
+current (`none`), at all currents (`all`), or in the range of the highest current alone (`hardest`). Only the adaptive
+step of the intervals is tested, without the method that sets their first width. `score_ratio` is the interval score
+over that of the best intervals, which know the drift.
 """
 
 from __future__ import annotations
@@ -21,18 +22,25 @@ from aesi.conformal.scores import interval_score
 from aesi.numerics.typing import Array, IntArray
 
 ALPHA, NORMAL_95 = 0.1, 1.6448536269514722
+"""Nominal share of misses, and the 95 % quantile of the standard normal distribution."""
 SIZE_V = 1e-3
-"""Size of a residual at the mildest current, V; at the hardest it is GROWTH times as large, conventions all."""
+"""Standard deviation of a residual in the range of the lowest current, V. A convention."""
 GROWTH = 4.0
+"""Ratio of the standard deviations in the ranges of the highest and the lowest current. A convention."""
 HOLD = 30
-"""Samples that a current lasts. A convention."""
+"""Number of samples for which the current stays in one range. A convention."""
 DRIFTS = ("none", "all", "hardest")
+"""Ranges of the current in which the standard deviation grows."""
 
 
 def run(
     records: PositiveInt = 100, n: PositiveInt = 3000, seed: NonNegativeInt = 0
 ) -> Iterator[dict[str, Any]]:
-    """One dict a kind of drift, means over `records` records of n samples each."""
+    """One row per kind of drift, with means over `records` records of n samples each.
+
+    `short_pct` is the share of records with less than nominal coverage, `worst_range_coverage_pct` the coverage in the
+    range of the current where it is lowest (mean over the records).  seed : of the residuals.
+    """
     rng = np.random.default_rng(seed)
     for drift in DRIFTS:
         figures = np.array([_record(drift, n, rng) for _ in range(records)])
@@ -48,7 +56,8 @@ def run(
 
 
 def _record(drift: str, n: int, rng: np.random.Generator) -> tuple[float, float, float]:
-    """Coverage, that of the range of the current that is covered least, and the score over that of the best band."""
+    """(coverage; coverage of the range of the current where it is lowest; interval score over that of the best
+    intervals) of one record. Coverages are shares, 0 to 1."""
     groups = _ranges(n, rng)
     last = len(GROUP_LEVELS)
     sizes = SIZE_V * (1.0 + (GROWTH - 1.0) * groups / last)
@@ -65,6 +74,7 @@ def _record(drift: str, n: int, rng: np.random.Generator) -> tuple[float, float,
 
 
 def _ranges(n: int, rng: np.random.Generator) -> IntArray:
-    """(n,) range of the current that each sample is in, as often as their levels say."""
+    """(n,) range of the current of each sample, 0 the lowest. Ranges occur with the frequencies by which GROUP_LEVELS
+    divides the currents of a record."""
     drawn = np.searchsorted(GROUP_LEVELS, rng.uniform(size=-(-n // HOLD)))
     return np.repeat(drawn, HOLD)[:n].astype(np.int64)

@@ -1,11 +1,14 @@
-"""Prediction intervals on a series whose best band is known, against the published procedure and MAPIE.
+"""`aesi bench spci`: prediction intervals on a series whose best intervals are known, against published methods.
 
     e[k] = phi e[k-1] + s[k] z[k],    z standard normal,    log(s / s0) = a sin(2 pi k / period)         (1)
 
-Given the past, e[k] is normal, so the oracle's band is phi e[k-1] -+ 1.645 s[k] at alpha = 0.1. Ours is
-calibration and replay of all test steps, compiled code loaded before. Times are processor seconds of one
-thread, so that a busy machine does not show in them. SPCI as published refits its forest at every step, so
-some steps are timed and scaled to all; so are MAPIE's, which is asked step by step as an online method is.
+Given the past, e[k] is normal with mean phi e[k-1] and standard deviation s[k], so that the best (oracle) interval at
+alpha = 0.1 is phi e[k-1] -+ 1.645 s[k]. `score_ratio` is the interval score over that of the oracle.
+
+The time of this package (`ours_s`) covers the calibration and the intervals of all test steps, with compiled code
+already loaded. All times are processor times of one thread, which other work on the machine changes little. SPCI as
+published (Xu & Xie, ICML 2023, arXiv:2212.03463) refits its forest at every step; a few steps are timed and scaled to
+all. So are those of MAPIE, which is asked for one step at a time, as an online method is.
 """
 
 from __future__ import annotations
@@ -25,16 +28,19 @@ from aesi.numerics.compiled import kept_njit
 from aesi.numerics.typing import Array
 
 ALPHA = 0.1
-"""Intervals for 90 %."""
+"""Nominal share of misses: intervals for 90 %."""
 WINDOW = 200
-"""Residuals that a method sees: the default of an experiment."""
+"""Number of past residuals that an interval is predicted from: the default of an experiment."""
 NORMAL_95 = 1.6448536269514722
 """95 % quantile of the standard normal distribution."""
 
 
 @dataclass(frozen=True, eq=False)
 class OracleSeries:
-    """residuals, lower, upper : (n,) V; the bounds of the best band at alpha = 0.1 given the past."""
+    """A series (1) and its best intervals.
+
+    residuals : (n,) V.  lower, upper : (n,) V, bounds of the best interval at alpha = 0.1 given the past.
+    """
 
     residuals: Array
     lower: Array
@@ -49,7 +55,10 @@ def oracle_series(
     swing: float = 0.8,
     period: int = 3000,
 ) -> OracleSeries:
-    """A draw of (1), n samples."""
+    """A random series (1) of n samples.
+
+    phi : autocorrelation at a lag of one sample.  scale_v : s0, V.  swing : a.  period : samples of one period of s.
+    """
     scale = scale_v * np.exp(swing * np.sin(2 * np.pi * np.arange(n) / period))
     residuals: Array = _autoregression(phi, scale * rng.standard_normal(n))
     middle = phi * np.concatenate([[0.0], residuals[:-1]])
@@ -73,12 +82,13 @@ def run(
     peer_steps: NonNegativeInt = 1,
     mapie_steps: NonNegativeInt = 200,
     seed: NonNegativeInt = 0,
-    **_: Any,
 ) -> Iterator[dict[str, Any]]:
-    """One line a method: seconds of ours and of the peer for all test steps, coverage, width, score, memory.
+    """One row per method: processor times of this package and of the peer for all test steps, s; coverage, per cent;
+    width and scores, V; peak memory, MiB.
 
-    peer_steps : steps of the published procedure that are timed (20 s or more each at full size), 0 for none.
-    mapie_steps : steps of MAPIE that are timed.
+    n_calibration, n_test : samples.  methods : keys of METHODS.  peer_steps : steps of the published procedure that are
+    timed (20 s or more each at full size), 0 for none.  mapie_steps : steps of MAPIE that are timed.  seed : of the
+    series.
     """
     from threadpoolctl import threadpool_limits
 
@@ -86,7 +96,7 @@ def run(
     past, future = oracle_series(n_calibration, rng), oracle_series(n_test, rng)
     with threadpool_limits(1):
         lines = [_ours(name, past.residuals, future) for name in methods]
-        # Peers come after, so that the memory above is ours.
+        # The peers run afterwards, so that the peak memory above is that of this package.
         steps_s: dict[str, float] = {}
         for line in lines:
             peer, steps = _peer(line["method"], peer_steps, mapie_steps)
@@ -121,7 +131,7 @@ def _ours(name: str, past: Array, future: OracleSeries) -> dict[str, Any]:
 
 
 def _stream_ms(calibrated: Calibrated, residuals: Array) -> float:
-    """Mean time of a step: interval, then update."""
+    """Mean processor time of one step online, ms: the interval, then the update with the residual."""
     stream = calibrated.stream()
     started = process_time()
     for error in residuals.tolist():
@@ -131,6 +141,7 @@ def _stream_ms(calibrated: Calibrated, residuals: Array) -> float:
 
 
 def _peer(method: str, peer_steps: int, mapie_steps: int) -> tuple[str, int]:
+    """(key of PEERS that a method is compared with, number of its steps that are timed)."""
     if method.startswith("spci"):
         return "SPCI as published", peer_steps
     return ("MAPIE EnbPI" if method == "enbpi" else "MAPIE ACI"), mapie_steps
@@ -149,7 +160,8 @@ def _compared(peer: str, steps: int, step_s: float | None, n_test: int, ours_s: 
 
 
 def _published_step_s(past: Array, future: Array, steps: int) -> float:
-    """Seconds a step of SPCI as published: a forest of ten trees of depth two on all windows, then one row."""
+    """Processor time per step of SPCI as published, s: fit a forest of ten trees of depth two to all windows, then
+    predict the quantiles of one row."""
     from quantile_forest import RandomForestQuantileRegressor
 
     betas = np.linspace(0, ALPHA, 5)
@@ -165,7 +177,8 @@ def _published_step_s(past: Array, future: Array, steps: int) -> float:
 
 
 def _mapie_step_s(method: str, past: Array, future: Array, steps: int) -> float:
-    """Seconds a step of MAPIE's time-series regressor around a prediction of zero: predict, then take it in."""
+    """Processor time per step of MAPIE's time-series regressor around a prediction of zero, s: predict an interval,
+    then update with the residual.  method : 'enbpi' or 'aci'."""
     import warnings
 
     from mapie.regression import TimeSeriesRegressor
@@ -173,7 +186,7 @@ def _mapie_step_s(method: str, past: Array, future: Array, steps: int) -> float:
 
     kept = past[-WINDOW:] if method == "enbpi" else past
     zero = DummyRegressor(strategy="constant", constant=0.0).fit(np.zeros((2, 1)), np.zeros(2))
-    with warnings.catch_warnings(action="ignore"):  # it warns of its own changes at every step
+    with warnings.catch_warnings(action="ignore"):  # MAPIE warns of changes in its interface at every step
         regressor = TimeSeriesRegressor(zero, method=method, cv="prefit").fit(np.zeros((len(kept), 1)), kept)
         x = np.zeros((1, 1))
         started = process_time()
@@ -193,4 +206,5 @@ PEERS: dict[str, Callable[[Array, Array, int], float]] = {
     "MAPIE EnbPI": lambda past, future, steps: _mapie_step_s("enbpi", past, future, steps),
     "MAPIE ACI": lambda past, future, steps: _mapie_step_s("aci", past, future, steps),
 }
-"""Name -> (past residuals, future residuals, steps) -> seconds a step."""
+"""Name of a peer -> function of the past residuals, (n,) V, the future residuals, (m,) V, and the number of timed steps
+that returns the processor time per step, s."""

@@ -1,1 +1,1 @@
-"""The physics: speed and accuracy against PyBaMM, and free runs on every measured cell."""
+"""Benchmarks of the physics models: speed and accuracy against PyBaMM, calibration, and free runs on measured cells."""

@@ -1,10 +1,10 @@
-"""Records of the published archives that entered no calibration and chose nothing: what cell files are judged by.
+"""Records of the published archives that were held out of all calibrations and choices: tests of the cell files.
 
-An archive as its authors publish it has more tests than the sets of the catalogue: other drives and other chamber
-temperatures of the same two cells. None was looked at when the shipped files, the rules of a calibration and their
-constants were made. `aesi.data.catalogue.locate` finds them in an unpacked archive by the names below.
-
-Days are the first time stamps of the published files.
+The archive of a cell, as its authors publish it, has more records than the data set of the catalogue: other drives and
+other chamber temperatures of the same cell. No record below was looked at when the shipped cell files, the rules of a
+calibration and their constants were made; the file fitted in the cold (`cells.COLD`) is the one exception.
+`aesi.data.catalogue.locate` finds the records in an unpacked archive by the names below. The day of a record is the
+first time stamp of its published file.
 """
 
 from __future__ import annotations
@@ -94,16 +94,17 @@ ARCHIVE: Mapping[str, Mapping[str, str]] = {
         "n20degC_us06": "2017-06-25",
     },
 }
-"""Set -> record -> day of its test."""
+"""Data set -> record -> day of the test, YYYY-MM-DD."""
 
 
 def chamber(record: str) -> str:
-    """What a record's name says of its chamber: `-20 degC`, and `-20 degC, rising` where that warms up on the way."""
+    """The chamber temperature that the name of a record gives, in words: `-20 degC`, or `-20 degC, rising` if the
+    chamber warms up during the test."""
     rising = ", rising" if record.partition("_")[2].startswith("trise") else ""
     return f"{degc_of(record):g} degC{rising}"
 
 
 def degc_of(record: str) -> float:
-    """Of the chamber, by the record's name."""
+    """The chamber temperature that the name of a record gives, degC (`n20degC_us06`: -20)."""
     number = record.partition("degC")[0]
     return -float(number[1:]) if number.startswith("n") else float(number)

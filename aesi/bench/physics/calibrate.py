@@ -1,8 +1,9 @@
-"""`aesi bench calibrate`: what a calibration makes of records of a known cell, and of a drive that entered no fit.
+"""`aesi bench calibrate`: what does a calibration recover from records of a known virtual cell?
 
-The truth is an LG M50 as a porous electrode with contacts of its own and slower particles; fitted is the single
-particle from the shipped file, so that a model error of some millivolts is left, as on measured cells. Fitted are a
-drive and a 1C discharge at 25 degC, in a millivolt of noise: little, so that priors and weights count.
+The records are simulated with a porous-electrode model of an LG M50 that has a contact resistance and a slower negative
+electrode than the shipped file. The single-particle model of the shipped file is calibrated on a drive and a 1C
+discharge at 25 degC. It leaves a model error of some millivolts, as on measured cells. The two records contain little
+information, so that the priors and the weights of the fit matter. A second drive is held out.
 """
 
 from __future__ import annotations
@@ -26,13 +27,13 @@ from aesi.physics.cell.relations import scaled
 from aesi.records import Measurement
 
 CONTACT_OHM = 8e-3
+"""Contact resistance of the true cell, ohm. A convention."""
 SLOWER = 0.6
-"""What the true cell has that the start file has not: its contacts, and the factor on its negative electrode's
-diffusivity."""
+"""Diffusivity of the true cell's negative electrode over that of the start file. A convention."""
 NOISE_V = 1e-3
-"""White noise of the voltage. A convention, as the sizes above."""
+"""Standard deviation of the white noise on the voltage, V. A convention."""
 HOLD_S, REST_S = 30, 60
-"""Duration of one current of a drive, and of the rest that it begins with, s."""
+"""Duration of each constant current of a drive, and of the rest at its beginning, s. Conventions."""
 
 
 def run(
@@ -40,9 +41,11 @@ def run(
     evaluations: PositiveInt = EVALUATIONS,
     seed: NonNegativeInt = 0,
 ) -> Iterator[dict[str, Any]]:
-    """One dict a record with its error in mV as declared and calibrated, the last record unseen; then the summary.
+    """One row per record with the RMS error of the declared and of the calibrated model, mV, the held-out record last;
+    then the summary.
 
-    cell : the start file.  evaluations : of the descent, at most.
+    cell : the start file.  evaluations : most evaluations of the fit.  seed : of the drives and of the noise.
+    `contact_mohm` of the summary, with its 95 % interval, is to be compared with CONTACT_OHM.
     """
     start = Cell.from_bpx(Path(cell))
     truth = replace(start, contact_resistance_ohm=CONTACT_OHM)
@@ -78,14 +81,15 @@ def run(
 
 
 def _drive(rng: np.random.Generator, capacity_ah: float) -> Array:
-    """(2400,) A: a rest, then currents of 30 s each, 0.6C in the mean, 1C of charge to 2.4C of discharge."""
+    """A random drive, (2400,) A at 1 Hz, discharge positive: a rest, then constant currents of HOLD_S each, with a mean
+    of 0.6C, between a charge at 1C and a discharge at 2.4C."""
     current = np.repeat(rng.normal(0.6, 0.8, 80), HOLD_S).clip(-1.0, 2.4) * capacity_ah
     current[:REST_S] = 0.0
     return current
 
 
 def _discharge(capacity_ah: float) -> Array:
-    """(3000,) A at 1C between two rests."""
+    """A 1C discharge between two rests, (3000,) A at 1 Hz."""
     current = np.full(3000, capacity_ah)
     current[:REST_S] = current[-300:] = 0.0
     return current

@@ -1,21 +1,26 @@
-"""`aesi bench cells`: the physics alone on every measured cell, record and temperature, in free run.
+"""`aesi bench cells`: how large is the error of the physics models on every measured record, in free run?
 
-Each record is simulated whole, from the state of charge that `initial_state` finds: as the start file of its cell
-declares it (for a cell with published parameters: as published), with the cell file of this project that was calibrated
-on other records of it, with that file at the record's measured temperature, and the same at the state of health that
-the calibration gives the cell for the day of the record (`aged`, see `aesi.bench.physics.tested`): a cell that was
-tested for five months is not the same cell.
-`windows` is ours under a protocol of others: windows of 1,024 rows, each from rest at a state of charge that is given.
+Each record is simulated whole, from the state of charge that `initial_state` finds, with
 
-A model that runs out (a surface or the electrolyte, see `aesi.physics.depletion`) is held at its edge to the end of the
-record and said in `ran_out`; its figure counts all rows. Where a tester holds the lower cut-off voltage, the current is
-what the cell gives there and no longer what was asked of it: by that current a model that has a little more charge goes
-on above, one that has a little less falls to nothing. Such records say from when (`held_from_s`), and what is left of
-the rows before (`until_held_mv`). A record that entered the calibration of its file is marked:
-its figure is no test. What others print is beside ours with its protocol; none of it was run here.
-With `archive` it is the records of the published archives that chose nothing (`aesi.bench.physics.archive`); beside the
-others stands, where there is one, the file that was fitted to loads of the archive in the cold as well, whose figures
-on these are marked and count in no median.
+    declared          the start file of its cell (for a cell with published parameters, the published file)
+    calibrated        the cell file of this project, which was calibrated on other records of the cell
+    with_temperature  the same file, at the measured temperature of the record
+    aged              the same, at the state of health that the calibration gives the cell for the day of the record
+                      (`aesi.bench.physics.tested`); the cells aged during months of tests
+    windows           the calibrated file, or else the published one, under the protocol of a publication: windows of
+                      WINDOW_ROWS rows, each from rest at a given state of charge
+
+The figures are RMS errors of the voltage, mV. A model that runs out of lithium or salt (`aesi.physics.depletion`) is
+held at that limit to the end of the record; `ran_out` gives the time, s, and the figure counts all rows. Where a tester
+holds the lower cut-off voltage, the current is the one that the cell delivers at this voltage. Under that current a
+model with a little more charge continues above the cut-off, and a model with a little less charge collapses. For such
+records `held_from_s` gives the time, and `until_held_mv` the errors over the rows before. A record that entered the
+calibration of its file is marked `fitted`: its figure is no test. Published figures of others stand beside ours with
+their protocol; they were not computed here.
+
+With `archive` the records are those of the published archives (`aesi.bench.physics.archive`). A further figure (`cold`)
+is then that of the file that was also fitted to records of the archive in the cold, where there is one. Its figures on
+these records are marked and are left out of the medians.
 """
 
 from __future__ import annotations
@@ -40,14 +45,14 @@ from aesi.physics import Cell, ModelName, initial_state, simulate
 from aesi.records import Measurement
 
 WINDOW_ROWS = 1024
-"""Rows of a window, as ECM-UDE judges."""
+"""Rows of a window in the protocol of the publication (ECM_UDE)."""
 HELD_WITHIN_V = 0.01
-"""Distance from the cut-off voltage, V, within which a tester holds the rows. Of those of 0degC_cycle_1 98 % are
-within 5 mV below and 9 above it."""
+"""Distance above the lower cut-off voltage, V, within which a row counts as held there by the tester. Of the held rows
+of 0degC_cycle_1, 98 % are within 5 mV below and 9 mV above it."""
 HELD_SHARE, HELD_FROM_THEN_ON = 0.01, 0.1
-"""Shares of held rows among all, and among those from the first of them on: a record with more of both was held from
-then on. Conventions: 8 of 45 of the Panasonic have 1 to 8 % of all, two of these 30 and 40 % from then on, six 3 to
-4 %."""
+"""Least share of held rows among all rows, and among the rows from the first held one on, of a record that the tester
+held at the cut-off. Conventions: of 45 records of the Panasonic, 8 have 1 to 8 % of held rows among all; from the first
+of them on two of these have 30 and 40 %, and six have 3 to 4 %."""
 NMC, LFP, M50T = "about_energy_nmc", "about_energy_lfp", "lg_m50t_w8"
 START = "lg_m50_chen2020"
 ECM_UDE = (
@@ -58,9 +63,11 @@ PUBLISHED = "porous-electrode model, published parameters, full charge taken as 
 
 @dataclass(frozen=True)
 class MeasuredRecord:
-    """A record: its set and file, whether its cell's file was fitted to it, and what others print on it.
+    """A record with the best published figure on it.
 
-    until_s : where it is read to.  others_mv, protocol : the best figure known, and how it was had.
+    data, name : data set and record.  fitted : whether the calibrated file of the cell was fitted to the record.
+    until_s : s, the record is read up to this time; None reads all of it.  others_mv : lowest published RMS error, mV,
+    or None.  protocol : model and protocol of that figure.
     """
 
     data: str
@@ -72,10 +79,11 @@ class MeasuredRecord:
 
 
 FILES = {NCR: (START, NCR), HG2: (START, HG2), NMC: (None, None), LFP: (None, None), M50T: (START, None)}
-"""Set -> start file and calibrated file of `experiments/cells`; None: the file published with the data, or none."""
+"""Data set -> (start file, calibrated file) of `experiments/cells`. None as the start file means the file published
+with the data, None as the calibrated file that there is none."""
 
 COLD = "_cold"
-"""Ends the name of the file of a cell that was fitted to loads in the cold of its archive, too, where there is one."""
+"""Suffix of the name of a calibrated file that was also fitted to records of the archive in the cold."""
 
 RECORDS = (
     *(MeasuredRecord(NMC, name, others_mv=mv, protocol=PUBLISHED) for name, mv in (
@@ -115,12 +123,12 @@ def run(
     archive: bool = False,
     porous: bool = False,
 ) -> Iterator[dict[str, Any]]:
-    """One dict a record, and a last one with `summary`: true.
+    """One row per record, and a last row with `summary`: true.
 
-    cells : folder of the cell files.  only : names of sets or records; all without it.  archive : of the records of the
-    published archives, in place of those of the sets.  porous : add `porous_mv`, the file at the measured temperature
-    with the porous electrode in place of the single particle, some seconds a record.  Raises InputError where a name of
-    `only` is none.
+    cells : folder of the cell files.  only : names of data sets or records; empty takes all.  archive : take the
+    records of the published archives in place of those of the data sets.  porous : add `porous_mv`, the error of the
+    porous-electrode model with the calibrated file at the measured temperature, which takes some seconds per record.
+    Raises InputError if a name in `only` is no data set and no record.
     """
     rows = []
     for record in _chosen([only] if isinstance(only, str) else only, ARCHIVED if archive else RECORDS):
@@ -142,7 +150,8 @@ def run(
 
 
 def _chosen(only: Sequence[str], there: Sequence[MeasuredRecord]) -> list[MeasuredRecord]:
-    """The records of the named sets or names, each of which has to be one; all where none is given."""
+    """The records that `only` names, by data set or by record; all if it is empty.  Raises InputError for an unknown
+    name."""
     names = [name for record in there for name in (record.data, record.name)]
     for one in only:
         some_chosen("cells", [name for name in names if name == one], names)
@@ -150,7 +159,8 @@ def _chosen(only: Sequence[str], there: Sequence[MeasuredRecord]) -> list[Measur
 
 
 def best(row: dict[str, Any]) -> float:
-    """The figure of the fullest model that a row has, the age of the cell not used."""
+    """The RMS error, mV, of the most complete model of a row that does not use the age of the cell: with temperature,
+    else calibrated, else declared."""
     return next(
         row[k] for k in ("with_temperature_mv", "calibrated_mv", "declared_mv") if row.get(k) is not None
     )
@@ -164,10 +174,12 @@ COLUMNS = {
     "windows_mv": "windows",
     "hybrid_mv": "hybrid",
 }
+"""Key of a row -> heading of its column in `table`, RMS errors in mV."""
 
 
 def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Lines of Markdown: the rows, then the protocols of others."""
+    """Lines of a Markdown table with one line per record, RMS errors in mV, then the protocols of the published
+    figures, which the table refers to by number."""
     protocols = list(dict.fromkeys(r["others"] for r in rows if r.get("others")))
     lines = [f"| cell | record | mean degC | {' | '.join(COLUMNS.values())} | others |"]
     lines.append("|---|---|" + "---:|" * (len(COLUMNS) + 1) + "---|")
@@ -184,12 +196,13 @@ def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 HEADINGS = COLUMNS | {"porous_mv": "porous electrode", "cold_mv": "fitted in the cold"}
 JUDGED = ("declared_mv", "with_temperature_mv", "porous_mv", "aged_mv", "cold_mv")
-"""Of a record of an archive: the start file, the calibrated one by both models, and at the state of its day, and the
-one that was fitted to a load in the cold as well."""
+"""Keys of the columns for the records of the archives: start file, calibrated file with the single-particle and with
+the porous-electrode model, calibrated file at the state of health of the day, file fitted in the cold as well."""
 
 
 def archive_table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Lines of Markdown: median and worst of the records of each chamber, mV, then each record in a block to open."""
+    """Lines of Markdown: a table with the median and the largest RMS error, mV, of the records of each cell and chamber
+    temperature, then a table of the records in a block to open."""
     there = sorted(
         (row for row in rows if "error" not in row),
         key=lambda row: (row["cell"], degc_of(row["record"]), row["record"]),
@@ -200,7 +213,8 @@ def archive_table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _by_chamber(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Iterator[str]:
-    """Median and worst of the records of each cell and chamber that were not fitted, mV."""
+    """Lines of the table by cell and chamber temperature: `median / largest` RMS error, mV. Records that a file was
+    fitted to are left out of its column."""
     yield f"| cell | chamber | records | {' | '.join(HEADINGS[key] for key in keys)} | ran out |"
     yield "|---|---|---:|" + "---:|" * (len(keys) + 1)
     for cell, place in dict.fromkeys((row["cell"], chamber(row["record"])) for row in rows):
@@ -237,7 +251,7 @@ def _shown(row: Mapping[str, Any], key: str) -> str:
 
 
 def judged(cells: Path, record: MeasuredRecord, porous: bool = False) -> dict[str, Any]:
-    """RMSE of one record, mV; a record that cannot be had or simulated says why."""
+    """The row of one record; if it is not available or cannot be simulated, the row has the reason in `error`."""
     head: dict[str, Any] = {"cell": record.data, "record": record.name, "fitted": record.fitted}
     try:
         return (
@@ -285,7 +299,11 @@ def _figures(cells: Path, record: MeasuredRecord, porous: bool) -> dict[str, Any
 
 
 def cell_of(cells: Path, data: str, name: str | None) -> Cell:
-    """A cell file of the folder, sized to the set where it is another cell's; None: the one published with the data."""
+    """A cell file of the folder `cells`; None as the name takes the file published with the data set.
+
+    The start file is that of another cell for most sets: its electrode area is scaled to the nominal capacity of the
+    set's cell (NOMINAL_AH).
+    """
     if name is None:
         return Cell.from_bpx(locate(data, "cell.bpx.json"))
     cell = Cell.from_bpx(cells / f"{name}.bpx.json")
@@ -298,13 +316,16 @@ def cell_of(cells: Path, data: str, name: str | None) -> Cell:
 
 
 NOMINAL_AH = {NCR: 2.9, HG2: 3.0}
-"""Capacities as the makers state them, Ah, for cell files of another size of the same chemistry."""
+"""Nominal capacity as the maker states it, Ah, to which the start file of another cell is scaled."""
 
 
 @dataclass(frozen=True, eq=False)
 class FreeRunError:
-    """error_v : (n,) V measured less model.  rmse_mv : of all rows.  ran_out_s : from when on the model was held at an
-    edge; None where it never was."""
+    """The error of one free run.
+
+    error_v : (n,) V, measured minus model.  rmse_mv : over all rows.  ran_out_s : s, time of the first row at which the
+    model was held at the limit of depletion; None if it never was.
+    """
 
     error_v: Array
     rmse_mv: float
@@ -312,14 +333,15 @@ class FreeRunError:
 
 
 def free_run(cell: Cell, data: Measurement, model: ModelName = "espm") -> FreeRunError:
-    """A free run over all rows, held backward as loggers write, from the state of charge of the first."""
+    """A free run over all rows, from the state of charge that `initial_state` finds. The current is constant between
+    rows (hold `backward`), as loggers record it."""
     error, gone = _errors(cell, data, initial_state(cell, data).soc, model)
     out_s = float(data.time_s[int(np.argmax(gone))]) if gone.any() else None
     return FreeRunError(error, round(MV_PER_V * rms(error), 2), out_s)
 
 
 def held_from(cell: Cell, data: Measurement) -> int | None:
-    """The first row at the lower cut-off voltage of a record that a tester held there from then on; None of one that it
+    """Index of the first row at the lower cut-off voltage if the tester held the cell there from then on; None if it
     did not."""
     held = data.voltage_v < cell.lower_voltage_v + HELD_WITHIN_V
     first = int(np.argmax(held))
@@ -327,10 +349,8 @@ def held_from(cell: Cell, data: Measurement) -> int | None:
 
 
 def windows_mv(cell: Cell, data: Measurement, rows: int = WINDOW_ROWS) -> float:
-    """Root mean square error, mV, over windows of `rows` rows, each from rest at the state of charge there.
-
-    That is the record's first less the charge passed since: what one who gives the state of charge has.
-    """
+    """RMS error, mV, over windows of `rows` rows. Each window is simulated from rest at a given state of charge: that
+    of the record's first row minus the charge passed since."""
     soc = initial_state(cell, data).soc - data.discharged_ah("backward") / cell.capacity_ah
     parts = [slice(k, k + rows) for k in range(0, len(data), rows)]
     errors = [_errors(cell, data.take(part), float(soc[part.start]))[0] for part in parts]
@@ -338,7 +358,7 @@ def windows_mv(cell: Cell, data: Measurement, rows: int = WINDOW_ROWS) -> float:
 
 
 def _errors(cell: Cell, data: Measurement, soc0: float, model: ModelName = "espm") -> tuple[Array, BoolArray]:
-    """(n,) V measured less model, and whether the model is held at an edge there."""
+    """(n,) V, measured minus model, and (n,) whether the model is held at the limit of depletion."""
     measured = data.temperature_degc
     run = simulate(
         cell, data.time_s, data.current_a, soc0, (), measured, "backward", on_depletion="clip", model=model

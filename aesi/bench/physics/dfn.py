@@ -1,10 +1,13 @@
-"""The porous electrode against PyBaMM's DFN with IDAKLU: time, difference, and what accuracy costs.
+"""`aesi bench dfn`: accuracy and processor time of the porous-electrode model, against the DFN of PyBaMM (IDAKLU).
 
-One load after another, each held against PyBaMM on a mesh that is fine enough: `reference_moves_mv` says by how much
-the next coarser one is off. Then a line for each number of points across an electrode and in a particle, ours and the
-peer's, with its error and its time. Then the records that the pouch cell's parameters were published with, beside the
-errors printed there. The last line but one times a long drive at 10 Hz, as the single particle's benchmark has it; the
-summary says the worst of everything at the numbers in use.
+The rows are, in this order:
+
+1. For each load, the error and the time of this package and of PyBaMM at several numbers of points across an electrode
+   and in a particle. The reference is PyBaMM on a fine mesh; `reference_moves_mv` is the difference between this mesh
+   and the next coarser one.
+2. The records that the parameters of the NMC pouch cell were published with, beside the published errors.
+3. The times on a long drive at 10 Hz, as in `aesi bench espm`.
+4. The summary: the largest errors of all loads at the numbers of points in use.
 """
 
 from __future__ import annotations
@@ -30,24 +33,30 @@ from aesi.pipeline.cross_check import DEFAULT_MESH, PybammRun, pybamm_run
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
 SOC0 = 0.95
-"""Where a load starts, so that charges stay below full."""
+"""State of charge at which each load starts; below 1, so that charging currents do not exceed the full charge."""
 KELVIN = {"25 degC": 298.15, "0 degC": 273.15}
+"""Temperature in words -> K, of the cell and its surroundings."""
 LARGEST_RATE = {"nmc_30ah": 3.0, "lg_m50_chen2020": 2.0, "lfp_prada2013": 1.0}
-"""C-rate of the hardest load of each cell."""
+"""Name of a shipped cell -> largest C-rate of its loads, 1/h. Conventions."""
 DRIVE_RATE = 3.0
-"""C-rate that `espm.random_load` runs to."""
+"""Largest C-rate of `espm.random_load`, 1/h."""
 OURS = ((3, 6), (5, 8), (7, 12), (10, 18), (14, 24))
-"""(points across an electrode, modes in a particle); the third is in use."""
+"""(points across an electrode, modes in a particle) of this package; the third pair is its default."""
 PEERS = ((10, 10), (20, 20), (40, 40))
-"""(volumes across an electrode, volumes in a particle); the second is its default."""
+"""(volumes across an electrode, volumes in a particle) of PyBaMM; the second pair is its default."""
 FINE, LESS_FINE = (160, 200), (120, 120)
-"""Graded towards the surfaces of the particles, unlike the peer's own."""
+"""The same of the reference and of the next coarser mesh. Unlike PyBaMM's default meshes they are graded towards the
+surfaces of the particles."""
 PEER = "PyBaMM DFN IDAKLU"
 
 
 @dataclass(frozen=True, eq=False)
 class Load:
-    """A current, a straight line between break points, and the samples at which voltages are compared."""
+    """A current profile for one cell.
+
+    content : of the cell's BPX file.  breaks_s, current_a : (k,) s and A (discharge positive), the current is linear
+    between these break points.  time_s : (n,) s, samples at which voltages are compared.
+    """
 
     name: str
     content: CaseRow
@@ -58,12 +67,12 @@ class Load:
 
     @property
     def sampled_a(self) -> Array:
-        """(n,) A at the samples."""
+        """The current at the samples, (n,) A."""
         return np.interp(self.time_s, self.breaks_s, self.current_a)
 
 
 def run(
-    samples: PositiveInt = 88_200,
+    samples: NonNegativeInt = 88_200,
     repeats: PositiveInt = 3,
     cell: str = "",
     seed: NonNegativeInt = 0,
@@ -71,11 +80,12 @@ def run(
     curves: bool = True,
     records: bool = True,
 ) -> Iterator[CaseRow]:
-    """Lines of every load and numbers, then the published records, the timing and the summary.
+    """The rows of the benchmark (see the module).
 
-    samples : of the timed drive at 10 Hz, 0 leaves it out.  cell : one of the shipped cells, or a BPX file; the
-    shipped ones without it.  seconds : of the drives and pulses that are compared.
-    curves : false leaves these out.  records : false leaves the published ones out.
+    samples : of the timed drive at 10 Hz, 0 leaves it out.  repeats : timed runs, of which the median counts.  cell : a
+    key of LARGEST_RATE, or a BPX file; empty takes all of LARGEST_RATE.  seed : of the drives.  seconds : duration of
+    the drives and pulses that are compared, s.  curves : false leaves out the comparison over numbers of points.
+    records : false leaves out the published records.
     """
     worst: dict[str, float] = {}
     names = [cell] if cell else list(LARGEST_RATE)
@@ -98,7 +108,11 @@ def run(
 
 
 def benchmark_loads(name: str, seed: int, seconds: int) -> Iterator[Load]:
-    """Drive, pulses and a discharge of a cell, warm and cold."""
+    """A drive, pulses and a discharge of a cell, each at 25 degC and at 0 degC.
+
+    name : key of LARGEST_RATE, or a BPX file.  seconds : duration of drive and pulses, s.  Raises InputError if there
+    is no such file.
+    """
     path = Path(name) if Path(name).suffix else CELLS / f"{name}.bpx.json"
     if not path.is_file():
         raise InputError(
@@ -126,7 +140,10 @@ def benchmark_loads(name: str, seed: int, seconds: int) -> Iterator[Load]:
 
 
 def pulse_load(current_a: float, seconds: int) -> tuple[Array, Array]:
-    """Break points and current: rests, discharges and charges of half a minute each, with edges of 0.1 s."""
+    """Break points, (k,) s, and current there, (k,) A: rests, discharges and charges of 30 s each, with ramps of 0.1 s.
+
+    current_a : the largest discharge current, A.  seconds : duration, s.
+    """
     edges = np.arange(0.0, seconds + 1.0, 30.0)
     level = np.resize([0.0, 1.0, 0.0, -0.5, 0.3, 1.0, 0.0, 0.6], len(edges) - 1)
     breaks = np.sort(np.concatenate([edges[:1], edges[1:-1], edges[1:-1] + 0.1, edges[-1:]]))
@@ -134,14 +151,19 @@ def pulse_load(current_a: float, seconds: int) -> tuple[Array, Array]:
 
 
 def discharge_load(rate: float, capacity_ah: float) -> tuple[Array, Array]:
-    """Break points and current of 60 % of the capacity at a constant rate, and a rest."""
+    """Break points, (k,) s, and current there, (k,) A: a discharge of 60 % of the capacity at a constant C-rate (1/h)
+    between a rest of 10 s and one of 300 s."""
     end = 0.6 * SECONDS_PER_HOUR / rate
     breaks = np.array([0.0, 10.0, 11.0, end, end + 1.0, end + 300.0])
     return breaks, rate * capacity_ah * np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0])
 
 
 def curve(load: Load, repeats: int) -> Iterator[CaseRow]:
-    """Error and time of one load over numbers of points, ours and the peer's."""
+    """One row per number of points, of this package and of PyBaMM, on one load: RMS and largest difference from the
+    reference, mV, and processor time, s.
+
+    The row of the numbers in use has `in_use`, and in `doubling_mv` the RMS change when both numbers are doubled.
+    """
     fine, less = (_peer(load, *numbers, graded=True).voltage_v for numbers in (FINE, LESS_FINE))
     moves = _errors_mv(less, fine)["rmse_mv"]
     ours = {numbers: _ours(load, *numbers, repeats) for numbers in OURS}
@@ -160,7 +182,8 @@ def curve(load: Load, repeats: int) -> Iterator[CaseRow]:
 
 
 def timing(name: str, samples: int, repeats: int, seed: int) -> CaseRow:
-    """Ours (median, warm) and the peer (its default mesh) on a drive at 10 Hz."""
+    """The row of the times on a drive at 10 Hz: this package (median of `repeats` runs, compiled code loaded), and
+    PyBaMM on its default mesh; `apart_rmse_mv` is the difference between both, mV."""
     load = next(iter(benchmark_loads(name, seed, round(samples * STEP_S))))
     time = np.arange(samples, dtype=np.float64) * STEP_S
     load = replace(load, time_s=time)
@@ -178,7 +201,7 @@ def timing(name: str, samples: int, repeats: int, seed: int) -> CaseRow:
 
 
 def _ours(load: Load, across: int, within: int, repeats: int) -> tuple[Array, float]:
-    """(n,) V and the median of warm seconds of the processor."""
+    """Voltage, (n,) V, and median processor time of `repeats` runs after a first one, s."""
     model = EspmModel(load.cell, electrode_points=across, solid_order=within)
     times, rows = [], np.empty(0)
     for _ in range(repeats + 1):

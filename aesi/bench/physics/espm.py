@@ -1,4 +1,4 @@
-"""The extended single-particle model against PyBaMM's SPMe with IDAKLU: time and difference in one run."""
+"""`aesi bench espm`: processor time and accuracy of the single-particle model, against the SPMe of PyBaMM (IDAKLU)."""
 
 from __future__ import annotations
 
@@ -20,12 +20,14 @@ from aesi.pipeline.cross_check import DEFAULT_MESH, FINE_MESH, pybamm_run
 
 DEFAULT_CELL = Path(__file__).resolve().parents[3] / "experiments" / "cells" / "nmc_30ah.bpx.json"
 STEP_S = 0.1
+"""Time step of the samples, s."""
 BREAK_POINT_S = 1.0
-"""The current is a straight line between break points, so that the peer can be told where they are."""
+"""Time between the break points of the current, s. The current is linear between them, so that PyBaMM can be told at
+which times its slope changes."""
 SOC0 = 0.95
-"""Where the load starts, so that charges stay below full."""
+"""State of charge at which the load starts; below 1, so that charging currents do not exceed the full charge."""
 MEAN_C_RATE, SPREAD_C_RATE, LARGEST_C_RATE, CORRELATION_S = 0.25, 1.0, 3.0, 20.0
-"""Mean, spread and largest rate of the load, 1/h, and its correlation time, s: conventions, as of a drive that
+"""Mean, standard deviation and largest value of the C-rate, 1/h, and its correlation time, s. Conventions: a drive that
 discharges the cell."""
 
 
@@ -35,9 +37,11 @@ def run(
     cell: str | Path = DEFAULT_CELL,
     seed: NonNegativeInt = 0,
 ) -> Iterator[dict[str, Any]]:
-    """One line: seconds of ours (median, warm) and of the peer (its default mesh), and both against a fine mesh.
+    """One row: processor times of this package (median of `repeats` runs, compiled code loaded) and of PyBaMM on its
+    default mesh, s, and the RMS difference of both from PyBaMM on a fine mesh, mV.
 
-    samples : at 10 Hz, of a drive profile up to 3C.  `ours_first_call_s` includes loading the compiled code.
+    samples : of a random drive at 10 Hz with up to 3C.  cell : BPX file.  seed : of the drive.  `ours_first_call_s`
+    includes loading the compiled code.  Raises InputError if there is no such file.
     """
     if not Path(cell).is_file():
         raise InputError(f"there is no cell file {cell}; name a BPX file with cell=...")
@@ -68,7 +72,11 @@ def run(
 
 
 def random_load(samples: int, capacity_ah: float, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Break points (s) and current there (A): a correlated random load, discharging on average, within 3C."""
+    """A correlated random load: break points, (k,) s, and current there, (k,) A, discharge positive.
+
+    The load discharges the cell on average and stays within LARGEST_C_RATE.  samples : number of steps of STEP_S.
+    capacity_ah : current at 1C, A.
+    """
     breaks = np.arange(0.0, samples * STEP_S + BREAK_POINT_S, BREAK_POINT_S)
     keep = np.exp(-BREAK_POINT_S / CORRELATION_S)
     noise = rng.standard_normal(len(breaks)) * np.sqrt(1.0 - keep**2)
@@ -81,6 +89,8 @@ def random_load(samples: int, capacity_ah: float, rng: np.random.Generator) -> t
 
 
 def _timed(cell: Cell, time: Array, current: Array) -> tuple[float, Array]:
+    """Processor time of one simulation, s, and its voltage, (n,) V. Earlier results are forgotten first, so that none
+    is taken from the cache."""
     forget_solutions()
     start = process_time()
     run = simulate(cell, time, current, soc0=SOC0)

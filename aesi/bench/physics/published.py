@@ -1,4 +1,5 @@
-"""The porous electrode on the records that its parameters were published with, beside the figures printed there."""
+"""The porous-electrode model on the records that the parameters of the NMC pouch cell were published with, beside the
+published errors."""
 
 from __future__ import annotations
 
@@ -20,14 +21,15 @@ PUBLISHED_MV = {
     (SET, "1C"): 13.412,
     (f"{SET}_2c", "2C"): 24.688,
 }
-"""Root mean square error by record, as printed in NMC/validation-plots.ipynb of the set's source: PyBaMM's DFN, 16
-volumes a layer and in a particle, the current straight between rows."""
+"""(data set, record) -> published RMS error, mV, from NMC/validation-plots.ipynb of the data set's source: PyBaMM's DFN
+with 16 volumes in each layer and in a particle, the current linear between rows."""
 FULL = 1.0
-"""State of charge at the start, as taken there."""
+"""State of charge at the first row, as taken in the publication."""
 
 
 def published() -> Iterator[CaseRow]:
-    """A row a record: ours, theirs and what is between (mV); a record that is not on this machine says so."""
+    """One row per record: the RMS error of this package's model, the published one, and their absolute difference, mV.
+    If the record is not available or cannot be simulated, the row has the reason in `error`."""
     for (data_set, name), theirs in PUBLISHED_MV.items():
         row: CaseRow = {"record": name, "cell": SET, "published_mv": theirs}
         try:

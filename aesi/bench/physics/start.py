@@ -1,11 +1,13 @@
-"""`aesi bench start`: the state of charge that the first row of a cut record is read as, against counted charge.
+"""`aesi bench start`: how accurate is the state of charge that the first row of a record is read as?
 
-Some of the records are those that the cell files of this project were calibrated on, others of cells whose file was
-published by others and saw none of them. Each is cut at random rows; what remains is read by `initial_state` as if it
-were a record of its own, at rest or under load as it happens to begin. The reference is the reading of the whole
-record, which begins with a rest or a full charge, less the charge that has flowed since; its own error is in all
-figures, and so is the capacity of the file. A state of charge is also given, within `NEAR` of the reference and as far
-off as `WRONG`: each reading says whether its voltage contradicts it.
+Each record is cut at random rows. `initial_state` reads the state of charge of the first row that remains, as if the
+rest were a record of its own; it may begin at rest or under load. The reference is the reading of the whole record,
+which begins with a rest or a full charge, minus the charge passed since over the capacity of the file. The errors of
+this reference and of that capacity are part of all figures. Some records entered the calibration of their cell file;
+for the others the file was published and has seen none of them.
+
+The benchmark also tests whether a given state of charge is recognised as wrong: one within NEAR of the reference should
+not be contradicted by the voltage, one that is off by WRONG should be.
 """
 
 from __future__ import annotations
@@ -28,24 +30,23 @@ from aesi.physics import Cell, initial_state
 from aesi.records import Measurement
 
 FITTED = ((NCR, NCR, "25degC_hppc"), (HG2, HG2, "25degC_cap_1c"), (HG2, HG2, "25degC_mixed1"))
-"""Set, cell file, record: at 25 degC, where the capacity is that of the cell file, and without the slow discharges,
-whose cycler counts some percent of charge too much."""
+"""(data set, cell file, record) of records that the file was fitted to: at 25 degC, where the capacity is that of the
+file, and without the slow discharges, whose cycler counts some per cent of charge too much."""
 PUBLISHED = ((NMC, None, "drive_cycle"), (M50T, START, "n0_hppc"), (M50T, START, "n0_udds"))
-"""Set, cell file and record of the same cases by files that saw none of the records; None is the file published with
-the set."""
+"""(data set, cell file, record) of records that the file has not seen; None takes the file published with the set."""
 NEAR, WRONG = 0.02, 0.2
-"""Errors of a given state of charge: that of a careful user, and a mistake. Conventions of this benchmark."""
+"""Errors of a given state of charge, 0 to 1: of a careful user, and of a mistake. Conventions."""
 LEAST_ROWS = 300
-"""Least rows that have to remain of a record."""
+"""Least number of rows that remain of a record after a cut. A convention."""
 
 
 def run(
     cells: str = "experiments/cells", cuts: PositiveInt = 40, seed: NonNegativeInt = 0
 ) -> Iterator[dict[str, Any]]:
-    """A dict a record, and one with `summary`: true for the files fitted to the records (`fitted`) and for the others,
-    which counts the records that could not be read or cut (`failed`).
+    """One row per record, and one with `summary`: true for the records that the files were fitted to (`fitted`: true)
+    and one for the others. `failed` counts the records that could not be read or cut.
 
-    cells : folder of the cell files.  cuts : rows at which each record is cut.
+    cells : folder of the cell files.  cuts : number of rows at which each record is cut.  seed : of these rows.
     """
     for fitted, records in ((True, FITTED), (False, PUBLISHED)):
         found: list[dict[str, Any]] = []
@@ -64,9 +65,11 @@ def run(
 
 
 def readings(cell: Cell, record: Measurement, cuts: int, rng: np.random.Generator) -> list[dict[str, Any]]:
-    """One dict a cut: on what its reading rests, how far it is off the reference, and what it contradicts.
+    """One entry per cut of the record: what the reading is based on, its error, and which given states it contradicts.
 
-    Raises DataError where the record has fewer rows than cuts to begin at.
+    `basis` is `rest`, `full charge`, `load`, `charge` (a load that charges), or `refused`; `off` is the reading minus
+    the reference, and `sd` the stated standard deviation, both as shares of the capacity.
+    Raises DataError if the record has too few rows for the cuts.
     """
     places = len(record) - LEAST_ROWS
     if places < cuts:
@@ -97,11 +100,13 @@ def _read(cell: Cell, record: Measurement, truth: float) -> dict[str, Any]:
 
 
 def figures(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """By basis how many readings, their root mean square and largest error in points of charge and over what the
-    reading claims; how many were refused; of states given, the percentage of right ones doubted and of wrong ones
-    caught.
+    """The figures of many readings.
 
-    A load that charges stands apart: of a cell with hysteresis the file has the discharge alone.
+    For each basis the number of readings, and their RMS and largest error in percentage points of the state of charge
+    (`points`) and in stated standard deviations (`sds`). `refused` counts records without a reading.
+    `right_doubted_pct` and `wrong_caught_pct` are the shares of nearly right and of wrong given states that the voltage
+    contradicts. Readings under a charging load are separate, since the file of a cell with hysteresis has the potential
+    of the discharge alone.
     """
     out: dict[str, Any] = {"readings": len(rows), "refused": sum(r["basis"] == "refused" for r in rows)}
     read = [r for r in rows if r["basis"] != "refused"]

@@ -1,10 +1,10 @@
-"""When measured records were tested, and the state of health that a calibration gives their cell for that day.
+"""The day on which each measured record was tested, and the state of health of the cell on that day.
 
-It is what `Cell.soh_on` says; records of the days before the first and after the last that it knows are taken as of
-these.
-Dates of the Panasonic NCR18650PF are those in the names of its published files, of the LG 18650HG2 the first time stamp
-of its published files; of 25degC_la92, mixed1 to mixed3, 40degC_la92 and 0degC_mixed1 the day of the tests of the same
-series beside them. They belong to the data, as temperatures do, and nothing was fitted to choose them.
+The state of health is that of `Cell.soh_on`. A day before the first or after the last one that the cell file knows is
+taken as the first or the last. The dates of the Panasonic NCR18650PF are in the names of its published files. Those of
+the LG 18650HG2 are the first time stamps of its published files; for 25degC_la92, mixed1 to mixed3, 40degC_la92 and
+0degC_mixed1 they are the day of the neighbouring tests of the same series. The dates are part of the data, as
+temperatures are; no fit chose them.
 """
 
 from __future__ import annotations
@@ -49,11 +49,12 @@ TESTED = {
         "n10degC_cap_1c": "2018-12-07",
     },
 }
-"""Set -> record -> day."""
+"""Data set -> record -> day of the test, YYYY-MM-DD."""
 
 
 def soh_on_its_day(cell: Cell, data: str, record: str) -> float | None:
-    """State of health (1) of the cell of a set on the day of a record; None where no day or no share is known."""
+    """State of health of the cell on the day of a record, as a share of the file's capacity; None if the day of the
+    record is unknown or the file has no dated states of health."""
     day = TESTED.get(data, {}).get(record) or ARCHIVE.get(data, {}).get(record)
     known = [one for _, one in cell.tested_on]
     if day is None or not known:

@@ -1,4 +1,8 @@
-"""`aesi bench real`: findings on measured cells whose answer is known. `plan` lists the cases, `judged` judges one."""
+"""`aesi bench real`: does the tracer find what a measured cell lacks, where the answer is known?
+
+The answer is known because a fault was added to the record, because a measured quantity was withheld from the tracer,
+or because the cell was measured independently. `plan` lists the cases, `judged` runs one of them.
+"""
 
 from aesi.bench.real.case import RealCase, Take
 from aesi.bench.real.judge import judged, lost

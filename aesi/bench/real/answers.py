@@ -1,4 +1,4 @@
-"""What an answer is worth: the name, the size, and the initial state, against what is known."""
+"""Scores of an answer of the tracer on a measured cell: the named effect, its size, and the initial state of charge."""
 
 from __future__ import annotations
 
@@ -9,16 +9,19 @@ from aesi.physics.effects import CATALOGUE
 from aesi.tracer.case.free_parameter import STATE_OF_CHARGE
 
 GROUP_OF = 2
-"""A name counts where it is given, or is one of a group of so many."""
+"""Most members of a group of look-alikes in which a right effect counts as named. A convention."""
 
 
 def scored(
     answers: tuple[str, ...], truth: Mapping[str, float], content: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """What the answer (as in discovery.json) is worth.
+    """The scores of one answer, as entries of the row of its case.
 
-    named : a right name is given, or is one of a group of two with one that is; with no right name, that none is
-    given.  size_* : of the parameter whose truth is known.
+    answers : effects each of which is right; empty if no effect may be named.  truth : `effect.parameter` -> true
+    value, SI.  content : the answer as in `discovery.json`.
+    `named` : a right effect is named, or is a look-alike of a named one in a group of at most GROUP_OF; if `answers` is
+    empty, no effect is named.  `others` : named effects that are not right.  `size_*` : estimated and true value of the
+    parameter whose truth is known, in its own unit, and the error relative to the distance from no effect.
     """
     effects = list(content["effects"])
     groups = {
@@ -64,8 +67,12 @@ def _size(truth: Mapping[str, float], content: Mapping[str, Any]) -> dict[str, A
 
 
 def initial_state_row(told: float, true: float, content: Mapping[str, Any]) -> dict[str, Any]:
-    """How much of a wrong initial state of charge the fit of the first record took back; nothing of it where the model
-    stayed as declared."""
+    """The `size_*` entries of a wrongly given initial state of charge: its true error, and how much of it the fit of
+    the written model corrected on the first record (nothing if the written model is the declared one).
+
+    told : the state of charge that the tracer was given, 0 to 1.  true : the right one.  content : the answer as in
+    `discovery.json`.
+    """
     rows = content["own_parameters"]["after"]
     moved = next((row["value"] for row in rows if row["effect"] == STATE_OF_CHARGE), told)
     return {

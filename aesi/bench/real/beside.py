@@ -1,11 +1,14 @@
-"""What was measured beside a record, held against the model that the loop ended with.
+"""Independent checks: quantities measured beside a record, compared with the written model of a discovery.
 
-The thermocouple that was kept back, as mean and as course; the charge of a check-up; and the resistances of a spectrum:
+The quantities are the temperature of the thermocouple that was withheld from the tracer, the capacity from a check-up,
+and two resistances from an impedance spectrum:
 
-    R_ohm  real part where the imaginary one crosses zero        R_ct = Re Z(1 Hz) - R_ohm
+    R_ohm = Re Z at the frequency where Im Z crosses zero        R_ct = Re Z(1 Hz) - R_ohm               (1)
 
-Of the model R_ohm is what is left at a high frequency with kinetics without resistance, so that both are defined
-without a double layer. Leads above the crossing are of the measurement, and not in it.
+R_ohm is that of the conductors and the electrolyte, R_ct that of the charge transfer and of what follows it down to
+1 Hz. The model has no double layer, which would bypass the charge transfer at high frequencies. Its R_ohm is therefore
+Re Z at a high frequency with rate constants so large that the kinetics have no resistance. The inductance of the leads,
+above the crossing, is part of the measurement and not of the model.
 """
 
 from __future__ import annotations
@@ -26,27 +29,32 @@ from aesi.records import Measurement, Spectrum
 from aesi.tracer import Discovery
 
 AT_HZ = 1.0
-"""Where resistances of kinetics are read from a spectrum; HIGH_HZ leaves the ohmic one alone."""
+"""Frequency at which the charge-transfer resistance of (1) is read, Hz. A convention."""
 HIGH_HZ = 1e5
+"""Frequency at which the diffusion of the model contributes nothing to its resistance, Hz. A convention."""
 HALF = 0.5
-"""State of charge at which spectra are held against each other."""
+"""State of charge at which spectra are compared."""
 FAST = 1e6
-"""Factor of the rate constants that leaves no resistance of kinetics."""
+"""Factor on the rate constants that makes the resistance of the kinetics negligible. A convention."""
 PERCENT = 100.0
-"""Of one."""
+"""Per cent in a share of one."""
 
 
 @dataclass(frozen=True)
 class Resistances:
-    """Ohm: of conductors and electrolyte, and of the reaction and what follows it down to 1 Hz."""
+    """The two resistances of (1), ohm: R_ohm and R_ct."""
 
     ohmic_ohm: float
     transfer_ohm: float
 
 
 def course_row(found: Discovery, told: Measurement, measured_degc: Array) -> dict[str, float]:
-    """The temperature (n,) degC that the found model runs at against the measured one: difference of the means, and
-    root mean square over the record, K.  told : the record as the finder had it."""
+    """Comparison of the temperature in the written model with the measured one.
+
+    told : the record as the tracer had it, without the temperature.  measured_degc : (n,) degC, the thermocouple.
+    Returns the mean of the measured temperature, degC, and the mean and the RMS of the difference model minus measured,
+    K.
+    """
     run = simulate(
         found.cell, told.time_s, told.current_a, found.soc0, found.model_effects, None, found.hold,
         on_depletion="clip",
@@ -60,8 +68,11 @@ def course_row(found: Discovery, told: Measurement, measured_degc: Array) -> dic
 
 
 def capacity_row(found: Discovery, declared: Cell, lost: float) -> dict[str, float]:
-    """Share of the capacity that is lost, measured and by the found model, per cent, and how far they are apart, in
-    percentage points."""
+    """The capacity loss as measured and in the written model, per cent of the declared capacity, and their absolute
+    difference, percentage points.
+
+    declared : the cell as its file declares it.  lost : measured loss as a share, 0 to 1.
+    """
     capacity_ah = model_with(found.cell, found.model_effects).cell.capacity_ah
     by_model = 1.0 - capacity_ah / declared.capacity_ah
     return {
@@ -72,8 +83,11 @@ def capacity_row(found: Discovery, declared: Cell, lost: float) -> dict[str, flo
 
 
 def witness_row(found: Discovery, declared: Cell, spectra: Sequence[Spectrum]) -> dict[str, float]:
-    """Resistances of the measured spectrum next to half charge, of the found model and of the declared one, mohm, and
-    how far the found ones are off, as a share."""
+    """The resistances (1) of the measured spectrum nearest to half charge, of the written model and of the declared
+    one, mohm, and the relative errors of those of the written model.
+
+    Raises DataError if the resistances cannot be read from the spectrum (`of_spectrum`).
+    """
     spectrum = next_to_half(spectra, declared)
     measured = of_spectrum(spectrum)
     ours, before = (
@@ -93,7 +107,8 @@ def witness_row(found: Discovery, declared: Cell, spectra: Sequence[Spectrum]) -
 
 
 def next_to_half(spectra: Sequence[Spectrum], cell: Cell) -> Spectrum:
-    """The spectrum whose state of charge is nearest to one half."""
+    """The spectrum whose state of charge is nearest to one half; without a stated one it follows from the charge passed
+    since the full charge."""
     return min(spectra, key=lambda spectrum: abs(_soc(spectrum, cell) - HALF))
 
 
@@ -104,7 +119,11 @@ def _soc(spectrum: Spectrum, cell: Cell) -> float:
 
 
 def of_spectrum(spectrum: Spectrum) -> Resistances:
-    """Of a measured spectrum.  Raises DataError where it does not cross zero or does not reach down to 1 Hz."""
+    """The resistances (1) of a measured spectrum, with linear interpolation between its frequencies.
+
+    Raises DataError if the imaginary part does not cross zero, or if the frequencies do not include 1 Hz in their
+    range.
+    """
     order = np.argsort(spectrum.frequency_hz)
     hz, z = spectrum.frequency_hz[order], spectrum.z_ohm[order]
     below = np.flatnonzero((z.imag[:-1] < 0.0) & (z.imag[1:] >= 0.0))
@@ -120,7 +139,10 @@ def of_spectrum(spectrum: Spectrum) -> Resistances:
 
 
 def of_model(cell: Cell, effects: Sequence[Any], soc: float, temperature_degc: float | None) -> Resistances:
-    """Of a cell with effects at a state of charge and a temperature."""
+    """The resistances (1) of a model cell with effects at rest.
+
+    soc : state of charge, 0 to 1.  temperature_degc : degC; None takes 25.
+    """
     degc = 25.0 if temperature_degc is None else temperature_degc
     fast = replace(
         cell,

@@ -1,9 +1,9 @@
-"""Faults put into a measured record, or into the file that describes the cell, as published practice has them.
+"""Faults that are added to a measured record, or to the file that declares the cell.
 
-Constant offsets and gains of the current, offsets of the voltage and lags between channels are the sensor faults of
-the literature on fault detection (Hu et al. 2020, Renew. Sustain. Energy Rev., doi:10.1016/j.rser.2020.110400); an
-added contact drops the measured current times its resistance; lost capacity goes into the file, as more than the cell
-has.
+Constant offsets and gains of the current, offsets of the voltage and lags between channels are the sensor faults of the
+literature on fault detection (Hu et al. 2020, Renew. Sustain. Energy Rev., doi:10.1016/j.rser.2020.110400). An added
+contact resistance lowers the measured voltage by the measured current (discharge positive) times the resistance. A loss
+of capacity is made by a cell file that declares more capacity than the cell has.
 """
 
 from __future__ import annotations
@@ -26,6 +26,9 @@ FaultKind = Literal[
     "contact_resistance",
     "capacity_in_file",
 ]
+"""Kind of a fault. Its size is: current_offset A; current_gain 1 (factor); voltage_offset V; voltage_lag s; wrong_soc0
+1 (the given state of charge is too low by it); contact_resistance ohm; capacity_in_file 1 (share by which the file
+declares too much)."""
 
 
 def _offset(data: Measurement, size: float) -> Measurement:
@@ -41,7 +44,7 @@ def _voltage(data: Measurement, size: float) -> Measurement:
 
 
 def _lag(data: Measurement, size: float) -> Measurement:
-    """Each row holds the voltage of `size` seconds ago."""
+    """Each row gets the voltage of `size` seconds before."""
     return replace(data, voltage_v=np.interp(data.time_s - size, data.time_s, data.voltage_v))
 
 
@@ -59,13 +62,15 @@ IN_THE_RECORD: Mapping[FaultKind, Callable[[Measurement, float], Measurement]] =
 
 
 def with_fault(data: Measurement, kind: FaultKind, size: float) -> Measurement:
-    """The record as a faulty instrument, or a cell with a worse contact, would have written it."""
+    """The record as a faulty instrument, or a cell with a contact resistance, would have recorded it; unchanged for
+    kinds that are not of the record.  size : see `FaultKind`."""
     change = IN_THE_RECORD.get(kind)
     return data if change is None else change(data, size)
 
 
 def declared_with_fault(cell: Cell, kind: FaultKind, size: float) -> Cell:
-    """The file as it would be if it declared a share `size` more of both electrodes than the cell has."""
+    """For the kind `capacity_in_file`, the cell with an electrode area and a nominal capacity larger by the share
+    `size`; for all others the cell unchanged."""
     if kind != "capacity_in_file":
         return cell
     return replace(
@@ -76,5 +81,5 @@ def declared_with_fault(cell: Cell, kind: FaultKind, size: float) -> Cell:
 
 
 def soc0_with_fault(soc0: float | None, kind: FaultKind, size: float) -> float | None:
-    """The state of charge that the finder is told."""
+    """The state of charge at the first row that the tracer is given: too low by `size` for the kind `wrong_soc0`."""
     return soc0 if soc0 is None or kind != "wrong_soc0" else soc0 - size

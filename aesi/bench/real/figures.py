@@ -1,4 +1,4 @@
-"""The figures of the report: the confusion matrix, sizes found against true ones, and residuals of the worst cases."""
+"""Figures of the report: confusion matrix, estimated against true sizes, and residuals of the worst cases."""
 
 from __future__ import annotations
 
@@ -15,15 +15,20 @@ if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
 WORST = 5
+"""Number of cases whose residual is drawn."""
 LINE_PX = 17
-"""Height of a name beside the confusion matrix, px."""
+"""Height of a line of text beside the confusion matrix, px."""
 RATIO = (-1.0, 3.0)
-"""Range of the ratio of found to true size that is drawn; what lies beyond is drawn at the edge."""
-STATES = {"before": "as declared", "recalibrated": "recalibrated", "after": "after"}
+"""Range of the drawn ratio of estimated to true size; values beyond are drawn at its ends."""
+STATES = {"before": "declared model", "recalibrated": "recalibrated model", "after": "written model"}
+"""State of the model -> its name in the figures."""
 
 
 def confusion_figure(matrix: Mapping[str, Mapping[str, int]]) -> Figure:
-    """Right answers down, what was said across, cases in each field."""
+    """The confusion matrix: a row per right answer, a column per given answer, and the number of cases in each field.
+
+    matrix : right answer -> given answer -> number of cases; not empty.
+    """
     asked = sorted(matrix)
     said = sorted({name for counts in matrix.values() for name in counts})
     counts = [[matrix[a].get(s, 0) for s in said] for a in asked]
@@ -31,9 +36,9 @@ def confusion_figure(matrix: Mapping[str, Mapping[str, int]]) -> Figure:
     rows = [a.replace("_", " ").replace(" or ", " or<br>") for a in asked]
     tallest = max(row.count("<br>") for row in rows) + 1
     fig = style.figure(
-        "What was there, and what was said",
-        "Rows: the right name, or one of several; columns: what the loop said, names that it is not sure of after "
-        "'unknown'. Numbers are cases, shades their share of the row.",
+        "Right and given answers",
+        "Rows: the right effect, or several of which each is right. Columns: the answer of the tracer; effects named "
+        "with the verdict 'unknown' follow this word. Numbers count cases; the shade is their share of the row.",
         220 + max(30, LINE_PX * tallest) * len(asked),
     )
     fig.add_heatmap(
@@ -48,7 +53,7 @@ def confusion_figure(matrix: Mapping[str, Mapping[str, int]]) -> Figure:
         showscale=False,
         xgap=1,
         ygap=1,
-        hovertemplate="right: %{y}<br>said: %{x}<br>%{text} cases<extra></extra>",
+        hovertemplate="right: %{y}<br>answer: %{x}<br>%{text} cases<extra></extra>",
     )
     fig.update_xaxes(tickangle=-35)
     fig.update_yaxes(autorange="reversed")
@@ -56,14 +61,17 @@ def confusion_figure(matrix: Mapping[str, Mapping[str, int]]) -> Figure:
 
 
 def sizes_figure(rows: Sequence[CaseRow]) -> Figure:
-    """Found over true distance from 'no effect', one point a case, with its 90 % interval, by parameter."""
+    """Estimated size over true size by parameter, one point per case, with its 90 % interval.
+
+    A size is the distance of the parameter from the value at which its effect vanishes.  rows : with `size_*` entries.
+    """
     fig = style.figure(
-        "Sizes found against true ones",
-        "Distance of the found value from 'no effect', over that of the true one, with its 90 % interval: 1 is right, "
-        "0 is nothing found. What lies beyond the frame is drawn at its edge.",
+        "Estimated against true sizes",
+        "Estimated over true distance of the parameter from the value without an effect, with the 90 % interval: 1 is "
+        "right, 0 means that no effect was found. Values beyond the frame are drawn at its edge.",
         420,
     )
-    for colour, chose, words in ((style.BLUE, False, "chose nothing"), (style.GREY, True, "development")):
+    for colour, chose, words in ((style.BLUE, False, "test"), (style.GREY, True, "development")):
         shown = [r for r in rows if bool(r["development"]) == chose]
         if not shown:
             continue
@@ -86,30 +94,34 @@ def sizes_figure(rows: Sequence[CaseRow]) -> Figure:
             hovertemplate="%{customdata[0]}<br>%{customdata[1]:.4g} of %{customdata[2]:.4g}<extra></extra>",
         )
     fig.add_hline(y=1.0, line={"color": style.INK, "width": 1})
-    fig.update_yaxes(title_text="found / true", range=RATIO)
+    fig.update_yaxes(title_text="estimated / true", range=RATIO)
     return fig
 
 
 def _ratio(row: CaseRow, key: str) -> float:
+    """Ratio to the true size of the estimate (`size_found`) or of an end of its interval, limited to RATIO. Without an
+    interval its ends are the estimate."""
     value = row["size_found"] if row.get(key) is None else row[key]
     ratio = (value - row["size_neutral"]) / (row["size_true"] - row["size_neutral"])
     return float(np.clip(ratio, *RATIO))
 
 
 def worst_of(rows: Sequence[CaseRow]) -> list[CaseRow]:
-    """The cases with the largest error left on unseen data."""
+    """The cases with a residual whose written model has the largest error on held-out data, the largest first; at most
+    WORST."""
     told = [row for row in rows if row.get("after_test_mv") is not None and "residual" in row]
     return sorted(told, key=lambda row: -float(row["after_test_mv"]))[:WORST]
 
 
 def residual_figure(row: CaseRow) -> Figure:
-    """Residual over the record, in the three states of the model; the last part chose nothing."""
+    """Residual of one case over time, measured minus model, mV, with the declared, the recalibrated and the written
+    model. The last part of the record is held out."""
     said = " + ".join(row["effects"]) or "no name"
     answer = " or ".join(row["answer"]) or "no name"
     errors = ", ".join(f"{row[f'{state}_test_mv']:.1f} mV {words}" for state, words in STATES.items())
     fig = style.figure(
         str(row["case"]),
-        f"{row['verdict']}: {said}; right: {answer}. RMSE on unseen data: {errors}.".replace("_", " "),
+        f"{row['verdict']}: {said}; right: {answer}. RMSE on held-out data: {errors}.".replace("_", " "),
         260,
     )
     kept = row["residual"]

@@ -1,4 +1,4 @@
-"""The faults again with good records of the cell beside them, and records without a fault."""
+"""Cases with known-good records of the same cell: the faults of the plan again, and records without a fault."""
 
 from __future__ import annotations
 
@@ -12,17 +12,19 @@ GOOD: dict[str, tuple[str, ...]] = {
     "panasonic_ncr18650pf": ("25degC_cycle_3",),
     "about_energy_nmc": ("C2", "1C"),
 }
-"""Of a cell: another drive of the kind that the faults are put into, or discharges where there is no other."""
+"""Data set -> its known-good records: another drive of the kind that the faults are added to, or discharges if there is
+no other."""
 WITHOUT_FAULT: dict[str, tuple[str, ...]] = {
     "lg_18650hg2": ("25degC_la92", "25degC_us06", "25degC_cap_1c_b"),
     "panasonic_ncr18650pf": ("25degC_hwfet", "25degC_cycle_2", "25degC_us06"),
     "about_energy_nmc": (),
 }
-"""Beside the record that is faulty elsewhere."""
+"""Data set -> records for the cases without a fault. The record that the faults are added to is one in addition."""
 
 
 def beside_good(cases: Sequence[RealCase]) -> list[RealCase]:
-    """Each fault and contact among the cases with the good records of its cell, then the records without a fault."""
+    """Each case with a fault in the record, with the known-good records of its cell added; then the cases without a
+    fault.  cases : of the plan."""
     faulty = [c for c in cases if c.fault is not None and c.fault.kind != "capacity_in_file"]
     first = {c.take.set: c for c in reversed(faulty)}
     return [
@@ -52,7 +54,7 @@ def _without_fault(case: RealCase, file: str) -> RealCase:
         take=replace(case.take, file=file),
         soc0=1.0,
         answers=(),
-        source="the same cell at the same temperature, nothing put in",
+        source="the same cell at the same temperature, nothing added",
         parameters={},
         fault=None,
         good=_good(case),

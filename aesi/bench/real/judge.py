@@ -1,4 +1,4 @@
-"""One case on a measured record: load, put in or withhold, look, and hold the answer against what is known."""
+"""Run of one case on a measured record: read it, add the fault or withhold the column, search, and score the answer."""
 
 from __future__ import annotations
 
@@ -27,18 +27,20 @@ from aesi.records import Measurement, Spectrum
 from aesi.tracer import Discovery, discover
 
 LIMIT_S = 600.0
+"""Limit of the processor time of one case, s. A case that takes longer counts as not answered. A convention."""
 HELD_OUT = 0.3
-"""Last share of a record that chooses nothing, as `aesi discover` has it."""
+"""Last share of a record that is held out, the default of `aesi discover`."""
 MOST_ROWS = 20_000
-"""Rows that a case is read with; more are averaged, as `aesi discover` does."""
+"""Most rows of a record; more are averaged to this number, as `aesi discover` does."""
 DRAWN = 160
-"""Points of a residual that the report draws."""
+"""Number of points of a residual in the report."""
 
 
 def judged(case: RealCase, cells: str, limit_s: float | None = LIMIT_S) -> dict[str, Any]:
-    """The row of one case; `verdict` is 'not run' where its data cannot be had.
+    """Run one case and return its row; the verdict is NOT_RUN if its data are not available.
 
-    cells : folder of the cell files.  limit_s : processor seconds; a case that takes longer is a miss.
+    cells : folder of the cell files.  limit_s : limit of the processor time, s; None sets no limit. A case that takes
+    longer counts as not named.
     """
     spent = Stopwatch()
     row = _asked(case)
@@ -54,7 +56,7 @@ def judged(case: RealCase, cells: str, limit_s: float | None = LIMIT_S) -> dict[
         data = with_fault(data, case.fault.kind, case.fault.size)
         declared = declared_with_fault(declared, case.fault.kind, case.fault.size)
         soc0 = soc0_with_fault(soc0, case.fault.kind, case.fault.size)
-    held = 0.0 if good else HELD_OUT  # what a record has beside good ones is asked of all of it
+    held = 0.0 if good else HELD_OUT  # beside known-good records the whole record is compared with them
     found = answer_of(lambda: discover(declared, [data], soc0=soc0, holdout=held, good=good), limit_s)
     if isinstance(found, NoAnswer):
         answer = found.row | MISSED
@@ -65,12 +67,12 @@ def judged(case: RealCase, cells: str, limit_s: float | None = LIMIT_S) -> dict[
 
 
 def lost(case: RealCase) -> dict[str, Any]:
-    """The row of a case whose process the system ended: a miss. What there was to be seen is not known."""
+    """The row of a case whose process the operating system ended. It counts as not named, and has no detectability."""
     return _asked(case) | LOST.row | MISSED | NO_TIME
 
 
 MISSED: dict[str, Any] = {"effects": [], "named": False}
-"""What a case scores that gave no answer."""
+"""Scores of a case that gave no answer."""
 
 
 def _asked(case: RealCase) -> dict[str, Any]:
@@ -91,15 +93,22 @@ def _asked(case: RealCase) -> dict[str, Any]:
 
 
 def declared_cell(name: str, cells: str) -> Cell:
-    """By the name that a case gives.  cells : folder of the cell files.  Raises DataError where a data set lacks it."""
+    """The declared cell of a case.
+
+    name : of a file in the folder `cells`, or `set:file` of a data set.  Raises DataError if the data set is not
+    available or has no such file, and what `Cell.from_bpx` raises.
+    """
     place, colon, file = name.partition(":")
     return Cell.from_bpx(locate(place, file) if colon else Path(cells) / name)
 
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """What was measured beside a record: parameter of an effect -> true value, the thermocouple's course (n,) degC that
-    the finder was not given, the share of capacity lost, and spectra."""
+    """What is known of the cell and of the record, for the score.
+
+    parameters : `effect.parameter` -> true value, SI.  temperature_degc : (n,) degC, the temperature that was withheld
+    from the tracer.  lost : measured loss of capacity as a share.  spectra : impedance measured beside the record.
+    """
 
     parameters: Mapping[str, float]
     temperature_degc: Array | None = None
@@ -148,16 +157,17 @@ def _held_against(
 
 
 def record(take: Take) -> Measurement:
-    """As the finder is given it.  Raises DataError where it cannot be had."""
+    """The record as the tracer is given it, with at most MOST_ROWS rows.  Raises DataError if it is not available."""
     columns: dict[str, str | None] | None = None if take.temperature else {"temperature_degc": None}
     path = locate(take.set, take.file)
     if take.set in ("about_energy_nmc", "lg_m50t_w8"):
-        columns = None  # these have no such column
+        columns = None  # these data sets have no temperature column to leave out
     return read_measurement(path, columns, max_rows=MOST_ROWS, stop_s=take.stop_s)
 
 
 def _residual(found: Discovery) -> dict[str, list[float]]:
-    """Time in s and residual in mV of each state over the record, thinned for drawing."""
+    """Time, s, and residual measured minus model, mV, of the declared (`before`), the recalibrated and the written
+    model (`after`), at most DRAWN rows each."""
     time_s = np.concatenate([f.time_s for f in found.files])
     kept = np.unique(np.linspace(0, len(time_s) - 1, DRAWN).astype(int))
     out = {"time_s": time_s[kept].round(1).tolist()}

@@ -1,4 +1,4 @@
-"""The cases on measured cells: withheld temperatures, faults put in, ageing, witnesses, and controls."""
+"""The plan of the cases on measured cells: withheld temperatures, added faults, ageing, impedance spectra, controls."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ CELLS = {
     NMC: f"{NMC}:cell.bpx.json",
     M50T: "lg_m50_chen2020.bpx.json",
 }
-"""Files calibrated at 25 degC alone, or published."""
+"""Data set -> the cell file, which was published or calibrated at 25 degC alone."""
 FITTED = frozenset({(HG2, "25degC_mixed1"), (HG2, "25degC_cap_1c")})
-"""Records that a file was calibrated on: what is asked of them says nothing, so that they are no controls."""
+"""(data set, record) that the cell file was calibrated on. They are no controls, since their error is too small."""
 WINDOW_S = 3600.0
-"""Part of a drive that is taken, s: the first hour."""
+"""Only the first hour of a drive is used, s. A convention that limits the processor time."""
 THERMOCOUPLE = "thermocouple on the case"
-PUT_IN = "put in"
+ADDED = "added"
 COLD_AND_HOT: dict[str, tuple[str, ...]] = {
     HG2: ("40degC_la92", "10degC_us06", "0degC_mixed1", "n10degC_cap_1c", "40degC_c20_ocv", "0degC_c20_ocv"),
     PANASONIC: (
@@ -36,13 +36,16 @@ COLD_AND_HOT: dict[str, tuple[str, ...]] = {
         "n10degC_hppc",
     ),
 }
+"""Data set -> records at other temperatures than the file's, of which the temperature is withheld."""
 WARMING: dict[str, tuple[str, ...]] = {
     HG2: ("25degC_us06", "25degC_cap_1c_b"),
     PANASONIC: ("25degC_us06", "25degC_1c_start"),
 }
+"""Data set -> records at 25 degC in which the cell warms up under load, of which the temperature is withheld."""
 SLOW_OR_PULSES = ("c20", "hppc")
+"""Parts of the names of slow discharges and pulse tests, which are used whole."""
 UNTIL_S = {"n10degC_hppc": 78_611.0}
-"""Where nine hours are missing from a record: what the cell did in them is unknown."""
+"""Record -> time up to which it is used, s: nine hours are missing after it, in which the current is unknown."""
 CONTROLS: dict[str, tuple[str, ...]] = {
     HG2: ("25degC_mixed1", "25degC_mixed2", "25degC_mixed3", "25degC_la92", "25degC_us06", "25degC_cap_1c_b"),
     PANASONIC: (
@@ -55,12 +58,15 @@ CONTROLS: dict[str, tuple[str, ...]] = {
     ),
     NMC: ("drive_cycle", "C2", "1C"),
 }
+"""Data set -> records at the temperature of the cell file with nothing added or withheld."""
 COLDER_CONTROLS: dict[str, tuple[str, ...]] = {
     HG2: ("10degC_us06", "0degC_mixed1", "40degC_la92"),
     PANASONIC: ("10degC_cycle_1", "0degC_cycle_1", "n10degC_cycle_1"),
 }
-"""The thermocouple is given: what is left is what a file calibrated at 25 degC lacks there, and no temperature."""
+"""Data set -> records at other temperatures with the temperature column given. They lack no temperature; a file that
+was calibrated at 25 degC has a larger model error there."""
 FAULTY = {HG2: "25degC_mixed2", PANASONIC: "25degC_cycle_1", NMC: "drive_cycle"}
+"""Data set -> the record that faults are added to."""
 FAULTS: dict[FaultKind, tuple[tuple[float, ...], dict[str, float]]] = {
     "current_offset": (
         (0.05, 0.1, 0.3),
@@ -71,29 +77,34 @@ FAULTS: dict[FaultKind, tuple[tuple[float, ...], dict[str, float]]] = {
     "voltage_lag": ((0.3, 1.0, 2.0), {"clock_skew.lag_s": 1.0}),
     "wrong_soc0": ((0.02, 0.05, 0.1), {}),
 }
-"""Kind -> three sizes, and the parameters of the right names as multiples of the size. An initial state that was told
-wrongly is for the finder to correct, without a name."""
+"""Kind of fault -> (three sizes; parameters of the right effects, each as a multiple of the size). The units are those
+of `FaultKind`. A wrong initial state of charge has no right effect: the tracer has to correct it without naming one."""
 RESISTANCES_OHM = {HG2: (0.005, 0.015), PANASONIC: (0.005, 0.015), NMC: (0.0005, 0.002)}
+"""Data set -> contact resistances that are added, ohm."""
 MORE_IN_FILE = 0.05
-"""Share by which both electrodes are larger in a cell file that is made wrong."""
+"""Share by which a wrong cell file declares too much of both electrodes."""
 LOSSES = ("lithium_inventory_loss", "active_material_loss_negative", "active_material_loss_positive")
+"""Effects each of which is a right answer for a cell that has lost capacity."""
 
 
 SPECTRA = {"25degC": "25degC_eis", "10degC": "10degC_eis"}
-"""Start of a Panasonic record's name -> the spectra of the same month."""
+"""First part of a Panasonic record's name -> the impedance spectra of the same month."""
 
 
 DRIVES = ("cycle", "us06", "mixed", "la92")
+"""Parts of the names of the archives' records that are used: drives."""
 RESTS_FIRST = {(PANASONIC, "us06"), (PANASONIC, "la92")}
-"""Drives of the archives that begin with an hour or two of rest, which the first hour would be."""
+"""(data set, drive) of the archives that begin with an hour or two of rest. They are left out, since only the first
+hour is used."""
 WARM = ("25degC", "40degC_562")
-"""Chambers at which nothing is withheld: that of the files, and what the archive of the HG2 has at 24 degC under 40."""
+"""First parts of the names of records near 25 degC, of which withholding the temperature would hide nothing. The
+archive of the HG2 has some of these, measured at 24 degC, under 40 degC."""
 
 
 def plan(archive: bool = False) -> tuple[RealCase, ...]:
-    """All cases in a fixed order; every other one of a group is for development.
+    """All cases, in a fixed order. Every second case of a group, beginning with the first, is for development.
 
-    archive : those of the published archives, other drives at other temperatures of the same cells.
+    archive : take the cases on the published archives instead: other drives of the same cells, at other temperatures.
     """
     if archive:
         cases = list(_archived())
@@ -117,10 +128,11 @@ def chosen(
     every: int = 1,
     archive: bool = False,
 ) -> Sequence[RealCase]:
-    """Cases of the plan; of that of the archives with `archive`.
+    """The selected cases of the plan.
 
-    cases : the first so many.  only : a group, or a substring of names.  development : only those that choose, or only
-    those that do not.  every : take each n-th.  Raises InputError where none is left.
+    cases : number of cases, from the first; None selects all.  only : a group, or a substring of a case's name.
+    development : True selects the development cases, False the test cases.  every : take each n-th case.
+    archive : as for `plan`.  Raises InputError if no case is selected.
     """
     planned = plan(archive)
     found = [c for c in planned if only is None or only == c.group or only in c.name]
@@ -133,7 +145,8 @@ def _stop(file: str) -> float | None:
 
 
 def _soc0(cell: str, file: str) -> float | None:
-    """Every test starts from a full charge but two of the M50T."""
+    """State of charge at the first row. All records begin with a full charge but two of the M50T: its UDDS, and the
+    pulses, of which the tracer has to find it (None)."""
     if cell != M50T:
         return 1.0
     return 0.7816 if file == "n0_udds" else None
@@ -166,7 +179,7 @@ def _control(cell: str, file: str) -> RealCase:
         take=Take(cell, file, _stop(file)),
         soc0=_soc0(cell, file),
         answers=(),
-        source="the same cell at the temperature given, nothing put in",
+        source="the same cell at the temperature given, nothing added",
         spectra=_spectra(cell, file),
     )
 
@@ -210,7 +223,7 @@ def _faults() -> Iterator[RealCase]:
                     take=Take(cell, file, WINDOW_S),
                     soc0=1.0,
                     answers=tuple(name.partition(".")[0] for name in parameters),
-                    source=PUT_IN,
+                    source=ADDED,
                     parameters={name: times * size for name, times in parameters.items()},
                     fault=Fault(kind, size),
                     matched=f"control-{cell}-{file}",
@@ -227,7 +240,7 @@ def _physics() -> Iterator[RealCase]:
                 take=Take(cell, file, WINDOW_S),
                 soc0=1.0,
                 answers=("series_resistance",),
-                source=PUT_IN,
+                source=ADDED,
                 parameters={"series_resistance.resistance_ohm": ohm},
                 fault=Fault("contact_resistance", ohm),
                 matched=f"control-{cell}-{file}",
@@ -239,7 +252,7 @@ def _physics() -> Iterator[RealCase]:
             take=Take(cell, file),
             soc0=1.0,
             answers=(*LOSSES, "current_sensor_gain"),
-            source=f"{PUT_IN} to the file: {MORE_IN_FILE:.0%} more of both electrodes",
+            source=f"{ADDED} to the file: {MORE_IN_FILE:.0%} more of both electrodes",
             parameters={"current_sensor_gain.gain": 1.0 / (1.0 + MORE_IN_FILE)},
             fault=Fault("capacity_in_file", MORE_IN_FILE),
             matched=f"control-{cell}-{file}",

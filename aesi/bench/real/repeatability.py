@@ -1,13 +1,13 @@
-"""How alike does a model err on records of one cell? Measures what the tracer takes for chance beside good records.
+"""How similar are the model errors on two records of one cell? Measures what the tracer assumes beside good records.
 
-Of every two development records of a cell one is taken as known to be good, and each effect is fitted to what the other
-has beside it, to first order. Nothing was put in, so that sizes over their standard deviations scatter by one where the
-model error is weighed rightly.
+Of every two development records of a cell one is taken as known to be good. Each effect is fitted to first order to the
+other record, as a difference between the two. No fault was added, so that the fitted sizes over their standard
+deviations should scatter with a standard deviation of one; they do if the model error has the right size.
 
     python -m aesi.bench.real.repeatability
 
-prints a line a pair, and a last one with the root mean square of those ratios by effect, how many pairs have one beyond
-2.58 (99 % of a normal distribution), and the geometric mean of the model error.
+prints one line per pair and a summary: the RMS of those ratios by effect, the number of pairs with a ratio beyond 2.58
+(99 % of a normal distribution), and the geometric mean of the model error, mV.
 """
 
 from __future__ import annotations
@@ -37,21 +37,26 @@ ALIKE: dict[str, tuple[str, ...]] = {
     PANASONIC: ("25degC_cycle_1", "25degC_cycle_2", "25degC_cycle_3", "25degC_la92"),
     NMC: ("drive_cycle", "C2", "1C"),
 }
-"""Records of development cases of one cell at one temperature. Cases that judge are on them, too: a fault of every kind
-is put into the same drive of its cell, in sizes that choose and sizes that judge."""
+"""Data set -> records of development cases at one temperature. Test cases use some of these records as well: all faults
+of a cell are added to the same drive, in sizes for development and in sizes for the test."""
 BEYOND_SDS = 2.58
-"""99 % of a normal distribution."""
+"""Number of standard deviations that hold 99 % of a normal distribution."""
 
 
 def pairs() -> Iterator[tuple[str, str, str]]:
-    """Data set, good record, other record."""
+    """(data set, known-good record, other record) of every ordered pair."""
     for cell, files in ALIKE.items():
         for good, other in permutations(files, 2):
             yield cell, good, other
 
 
 def scatter(cell: str, good: str, other: str, cells: str = "experiments/cells") -> dict[str, Any]:
-    """Sizes over standard deviations by parameter of an effect, and the size of the model error, mV, of one pair."""
+    """The row of one pair of records.
+
+    cells : folder of the cell files.  `sds` is the fitted size of each effect over its standard deviation,
+    `model_error_mv` the size of the model error, and `soc0_off` the fitted minus the given initial state of charge of
+    each record.  `failed` stands in their place if the model cannot be fitted.
+    """
     problem = inverse_problem(
         declared_cell(CELLS[cell], cells),
         [record(Take(cell, other, WINDOW_S))],
@@ -77,8 +82,8 @@ def scatter(cell: str, good: str, other: str, cells: str = "experiments/cells") 
 
 
 def ratio(one: Grown) -> tuple[str, float]:
-    """(name, size over standard deviation) of the effect's amplitude that is furthest from zero; 0 where all ended
-    there."""
+    """(effect, size over standard deviation) of the last effect of a hypothesis: of its amplitudes the one that is the
+    most standard deviations from zero; 0 if all are zero."""
     effect = one.hypothesis[-1]
     sds = np.sqrt(np.diagonal(one.score.covariance))
     x = one.point.x + one.score.shift
@@ -89,7 +94,7 @@ def ratio(one: Grown) -> tuple[str, float]:
 
 
 def main() -> None:
-    """Print a line a pair and the summary."""
+    """Print one line per pair and the summary."""
     rows = []
     for cell, good, other in pairs():
         rows.append(scatter(cell, good, other))

@@ -1,4 +1,4 @@
-"""The report of a run over measured cells: one HTML file that opens without a network."""
+"""Report of a run of `aesi bench real`: one HTML file that opens without a network."""
 
 from __future__ import annotations
 
@@ -11,40 +11,64 @@ from aesi.bench.real.figures import confusion_figure, residual_figure, sizes_fig
 from aesi.pipeline.report.page import write_page
 
 FIGURES: Mapping[str, tuple[str, str]] = {
-    "withheld_named_pct": ("withheld temperatures named, %", "90 or more"),
-    "withheld_within_2k_pct": ("of all, named and within 2 K of the thermocouple's mean, %", "80 or more"),
-    "withheld_course_rms_k_median": ("course of the temperature where it is named, RMS, K, median", ""),
-    "withheld_error_halved_pct": ("error on unseen data at most halved by it, %", "100"),
-    "warming_named_pct": ("records that warm up: heat or temperature named, %", ""),
-    "fault_named_pct": ("faults put in and named, %", "90 or more"),
-    "fault_seen_named_pct": ("of faults that stand out of what such models err by, named, %", "90 or more"),
-    "beside_named_pct": ("the same and contacts with a good record beside, named, %", "90 or more"),
-    "beside_seen_named_pct": ("of those that stand out of what the good ones leave, named, %", "90 or more"),
-    "beside_size_error_median": ("error of their size, share, median", "0.10 or less"),
-    "beside_size_covered_pct": ("true size within its 90 % interval, %", "85 to 95"),
-    "beside_wrong_soc0_silent_pct": ("wrong initial states beside a good record without a name, %", "100"),
-    "beside_control_silent_pct": ("records without a fault beside a good one without a name, %", "100"),
-    "size_error_median": ("error of their size, share, median", "0.10 or less"),
-    "size_covered_pct": ("true size within its 90 % interval, %", "85 to 95"),
-    "physics_named_pct": ("contacts and capacities put in and named, %", ""),
-    "wrong_soc0_silent_pct": ("wrong initial states without a name, %", "100"),
-    "wrong_soc0_error_median": ("of the wrong initial state left, share, median", "0.10 or less"),
-    "control_silent_pct": ("controls without a name, %", "100"),
-    "control_matched_false_pct": ("controls with the name of a case matched to them, %", "0"),
-    "ageing_named_pct": ("aged and fresh cells told apart, %", ""),
-    "ageing_within_2pp_pct": ("capacity within 2 percentage points of the measured one, %", "100"),
-    "witness_within_15pct_pct": ("resistances within 15 % of the spectra's, %", "100"),
-    "witness_ohmic_off_median": ("ohmic resistance off, share, median", "0.15 or less"),
-    "witness_transfer_off_median": ("charge transfer off, share, median", "0.15 or less"),
+    "withheld_named_pct": ("withheld temperatures that were named, %", "90 or more"),
+    "withheld_within_2k_pct": (
+        "withheld temperatures estimated within 2 K of the thermocouple's mean, %",
+        "80 or more",
+    ),
+    "withheld_course_rms_k_median": ("named temperatures: model minus thermocouple, RMS, K, median", ""),
+    "withheld_error_halved_pct": ("named temperatures: error on held-out data at least halved, %", "100"),
+    "warming_named_pct": ("records that warm up: self-heating or temperature named, %", ""),
+    "fault_named_pct": ("added faults that were named, %", "90 or more"),
+    "fault_seen_named_pct": ("detectable faults (above the model error) that were named, %", "90 or more"),
+    "beside_named_pct": ("faults and contact resistances beside a known-good record, named, %", "90 or more"),
+    "beside_seen_named_pct": ("the detectable ones of these, named, %", "90 or more"),
+    "beside_size_error_median": (
+        "relative error of the size beside a known-good record, median",
+        "0.10 or less",
+    ),
+    "beside_size_covered_pct": (
+        "true size within its 90 % interval, beside a known-good record, %",
+        "85 to 95",
+    ),
+    "beside_wrong_soc0_silent_pct": (
+        "wrong initial states of charge beside a known-good record, nothing named, %",
+        "100",
+    ),
+    "beside_control_silent_pct": (
+        "records without a fault beside a known-good record, nothing named, %",
+        "100",
+    ),
+    "size_error_median": ("relative error of the size of faults and resistances, median", "0.10 or less"),
+    "size_covered_pct": ("true size of these within its 90 % interval, %", "85 to 95"),
+    "physics_named_pct": ("added contact resistances and capacities that were named, %", ""),
+    "wrong_soc0_silent_pct": ("wrong initial states of charge, nothing named, %", "100"),
+    "wrong_soc0_error_median": (
+        "share of the wrong initial state of charge that is left, median",
+        "0.10 or less",
+    ),
+    "control_silent_pct": ("controls, nothing named, %", "100"),
+    "control_matched_false_pct": ("controls with the right answer of a matched case named, %", "0"),
+    "ageing_named_pct": ("aged cells with a loss named, and fresh cells without, %", ""),
+    "ageing_within_2pp_pct": ("capacity loss within 2 percentage points of the measured one, %", "100"),
+    "witness_within_15pct_pct": ("resistances within 15 % of those of the spectra, %", "100"),
+    "witness_ohmic_off_median": ("relative error of the ohmic resistance, median", "0.15 or less"),
+    "witness_transfer_off_median": (
+        "relative error of the charge-transfer resistance, median",
+        "0.15 or less",
+    ),
     "after_worse_pct": ("written model more than 5 % worse than declared or recalibrated, %", "0"),
-    "processor_s_median": ("processor time a case, s, median", ""),
-    "processor_s_total": ("processor time of all, s", ""),
+    "processor_s_median": ("processor time per case, s, median", ""),
+    "processor_s_total": ("processor time of all cases, s", ""),
 }
-"""Key of the summary -> what it is, and what it should be."""
+"""Key of the summary -> (what the figure is, in words; its aim)."""
 
 
 def write_report(path: Path, rows: Sequence[CaseRow], summary: Mapping[str, Any]) -> Path:
-    """Write the page; rows as `judged` gives them, with their residuals."""
+    """Write the report to `path` and return it.
+
+    rows : of `judged`, with their residuals.  summary : of `summary.summary`, over the same rows.
+    """
     sized = [r for r in rows if r.get("size_error") is not None and "size_neutral" in r]
     worst = worst_of(rows)
     figures = {f"worst_{k}": residual_figure(row) for k, row in enumerate(worst)}
@@ -69,7 +93,8 @@ def write_report(path: Path, rows: Sequence[CaseRow], summary: Mapping[str, Any]
 
 
 def _lines(summary: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
-    """What a figure is, of all cases, of those that chose nothing, and its aim; without figures that no case gave."""
+    """Lines of the table: (what the figure is, its value over all cases, over the test cases alone, its aim). Figures
+    without a case are left out."""
     return [
         (words, _told(summary, key), _told(summary["reported"], key), aim)
         for key, (words, aim) in FIGURES.items()
@@ -78,7 +103,7 @@ def _lines(summary: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
 
 
 def _told(rates: Mapping[str, Any], key: str) -> str:
-    """A figure with its 95 % interval and how many cases it is of; '–' where there is none."""
+    """A figure as text, with its 95 % interval and the number of its cases if it is a rate; '–' without a case."""
     value = rates.get(key)
     if value is None:
         return "–"
@@ -91,7 +116,8 @@ def _told(rates: Mapping[str, Any], key: str) -> str:
 
 
 def _by_kind(rows: Sequence[CaseRow]) -> list[dict[str, Any]]:
-    """A row a kind and size of fault: cases by cell, each named or what was said instead."""
+    """One entry per kind and size of an added fault: (data set, whether the answer is right, the answer) of each
+    case."""
     found: dict[str, list[CaseRow]] = {}
     for row in rows:
         if row.get("put_in"):
@@ -103,5 +129,6 @@ def _by_kind(rows: Sequence[CaseRow]) -> list[dict[str, Any]]:
 
 
 def _said(row: CaseRow) -> str:
+    """The named effects, or the verdict if there are none."""
     effects = " + ".join(row.get("effects") or ())
     return effects or str(row["verdict"])

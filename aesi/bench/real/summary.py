@@ -1,4 +1,8 @@
-"""Rates over the cases that ran, each with its interval, and what did not run."""
+"""Summary of `aesi bench real`: rates over the cases that ran, in per cent with 95 % intervals, and other figures.
+
+A key that ends in `_named` is the rate of right answers (entry `named` of a row); one that ends in `_silent` is the
+same of cases in which no effect may be named.
+"""
 
 from __future__ import annotations
 
@@ -15,17 +19,22 @@ from aesi.bench.scoring import rate
 from aesi.tracer.decide.written import AS_GOOD
 
 NEAR_K = 2.0
-"""A temperature, a share of capacity in percentage points, or a share of the right value, that counts as near;
-conventions."""
+"""Largest error, K, of a temperature that counts as near. A convention."""
 NEAR_PP = 2.0
+"""Largest error, percentage points, of a capacity loss that counts as near. A convention."""
 NEAR_SHARE = 0.15
+"""Largest relative error of a resistance that counts as near. A convention."""
 HALVED = 0.5
-"""Share of the declared error that counts as halved."""
+"""Largest error of the written model, over that of the declared one, that counts as halved."""
 SOC0 = "wrong_soc0"
+"""Kind of fault that is a wrongly given initial state of charge."""
 
 
 def summary(rows: Sequence[CaseRow]) -> CaseRow:
-    """Rates of all cases that ran; those of the cases that chose nothing stand under `reported`."""
+    """The summary row: the figures over all cases that ran and, under `reported`, over the test cases alone.
+
+    rows : of `judged`.  `not_run` names the cases whose data were not available; they are in no figure.
+    """
     ran = [r for r in rows if r["verdict"] != NOT_RUN]
     return {
         "summary": True,
@@ -73,7 +82,11 @@ def _rates(rows: Sequence[CaseRow]) -> CaseRow:
 
 
 def _withheld(rows: Sequence[CaseRow]) -> CaseRow:
-    """The size counts that stands beside the name; the course is that of the written model, whatever is named."""
+    """Figures of the withheld temperatures.
+
+    A temperature counts as near if its estimate with the named effect is; a case without such an estimate does not. The
+    RMS difference over time is that of the written model. Both it and the halved error are over right answers only.
+    """
     near = [{"near": "size_found" in r and abs(r["size_found"] - r["size_true"]) <= NEAR_K} for r in rows]
     halved = [{"halved": _at_most(r, HALVED)} for r in rows if r["named"] and _errors(r)]
     return {
@@ -85,12 +98,13 @@ def _withheld(rows: Sequence[CaseRow]) -> CaseRow:
 
 
 def _seen(rows: Sequence[CaseRow]) -> list[CaseRow]:
-    """Of which the right name says enough of unseen data to be admitted."""
+    """The cases whose right answer is detectable: it gains more than SEEN_NATS of log likelihood on held-out data."""
     return [r for r in rows if r.get("seen_nats") is not None and r["seen_nats"] > SEEN_NATS]
 
 
 def _beside(rows: Sequence[CaseRow], controls: Sequence[CaseRow]) -> CaseRow:
-    """Of faults and contacts with good records of the cell beside them, and of records without a fault."""
+    """Figures of the cases with known-good records: of those with a fault or contact resistance (`rows`), and of the
+    controls without."""
     faults = [r for r in rows if r["answer"]]
     sized = [r for r in faults if r.get("size_error") is not None]
     silent = [r for r in rows if not r["answer"]]
@@ -115,8 +129,8 @@ def _initial_state(rows: Sequence[CaseRow]) -> CaseRow:
 
 
 def _controls(controls: Sequence[CaseRow], rows: Sequence[CaseRow]) -> CaseRow:
-    """Silence of the controls, and how often one shows a name that a case matched to it has as its answer, of
-    those that gave an answer."""
+    """Figures of the controls: how often nothing is named, and how often, among those that gave an answer, the right
+    answer of a matched case is named although nothing was added to the control."""
     expected: dict[str, set[str]] = {}
     for row in rows:
         if row.get("matched"):
@@ -134,7 +148,7 @@ def _controls(controls: Sequence[CaseRow], rows: Sequence[CaseRow]) -> CaseRow:
 
 
 def _witnesses(rows: Sequence[CaseRow]) -> CaseRow:
-    """Of the found model's resistances at half charge, at the temperature of the spectra."""
+    """Figures of the written model's resistances at half charge and at the temperature of the spectra."""
     both = [{"off": r[key]} for r in rows for key in ("ohmic_off", "transfer_off")]
     return {
         **_near(both, "off", NEAR_SHARE).named("witness_within_15pct"),
@@ -148,7 +162,7 @@ def _near(rows: Sequence[CaseRow], key: str, limit: float) -> Any:
 
 
 def _by_kind(rows: Sequence[CaseRow]) -> dict[str, str]:
-    """Kind of fault and its size as put in -> 'named of cases'."""
+    """Kind and size of an added fault -> 'NAMED of CASES'."""
     out: dict[str, list[bool]] = {}
     for row in rows:
         out.setdefault(row["put_in"], []).append(bool(row["named"]))
@@ -160,8 +174,8 @@ def _errors(row: CaseRow) -> bool:
 
 
 def _at_most(row: CaseRow, times: float) -> bool:
-    """Whether the error on unseen data is at most so many times that of the declared model, or, for a factor above one,
-    that of the better of declared and recalibrated."""
+    """Whether the written model's error on held-out data is at most `times` that of the declared model or, if `times`
+    is above 1, that of the better of the declared and the recalibrated model."""
     better = row["before_test_mv"]
     if times > 1:
         better = min(better, row["recalibrated_test_mv"])
@@ -174,7 +188,7 @@ def _median(rows: Sequence[Mapping[str, Any]], key: str) -> float | None:
 
 
 def _confusion(rows: Sequence[CaseRow]) -> dict[str, dict[str, int]]:
-    """Answer -> what was said -> cases."""
+    """Confusion matrix: right answer -> given answer -> number of cases."""
     out: dict[str, Counter[str]] = {}
     for row in rows:
         asked = " or ".join(row["answer"]) or "no name"

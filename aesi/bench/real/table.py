@@ -1,4 +1,4 @@
-"""What was found on measured cells as Markdown: a line for each kind of case, then one for each case."""
+"""Results of `aesi bench real` as Markdown tables: one line for each kind of case, then one for each case."""
 
 from __future__ import annotations
 
@@ -18,15 +18,17 @@ NOUNS = {
     "control": "control",
     "control_beside": "control",
 }
+"""Group of a case -> its name in the tables."""
 BESIDE = ("fault_beside", "control_beside")
 STATES = ("before", "recalibrated", "after")
 
 
 def table(rows: Sequence[CaseRow]) -> list[str]:
-    """Lines of Markdown of the cases that ran, those without an answer among them, as misses.
+    """Lines of Markdown over the cases that ran. Cases without an answer count as wrong.
 
-    `named` counts right names, where no name is right that none was given; `could be`: of the cases with a right name,
-    those of which that says more than `SEEN_NATS` of unseen data.
+    `right` counts right answers: a right effect is named or, where there is none, nothing is named. `detectable` counts
+    the cases whose right effect gains more than SEEN_NATS of log likelihood on held-out data. `size error` is that of
+    named effects, relative to the true size.
     """
     ran = [row for row in rows if row["verdict"] != NOT_RUN]
     return [*_by_kind(ran), "", '??? note "Each case"', "", *(f"    {line}" for line in _each(ran))]
@@ -34,8 +36,8 @@ def table(rows: Sequence[CaseRow]) -> list[str]:
 
 def _by_kind(rows: Sequence[CaseRow]) -> Iterator[str]:
     yield (
-        "| put in, or withheld | beside a good record | cases | named | could be | of these named | size off, median | "
-        "in its interval |"
+        "| fault, or withheld quantity | known-good record | cases | right | detectable | of these right "
+        "| size error, median | within its interval |"
     )
     yield "|---|---|---:|---:|---:|---:|---:|---:|"
     kinds: dict[tuple[str, bool], list[CaseRow]] = {}
@@ -60,7 +62,7 @@ def _by_kind(rows: Sequence[CaseRow]) -> Iterator[str]:
 
 
 def _kind(row: CaseRow) -> str:
-    """What a case is about: what was put in, or its group."""
+    """The kind of a case in words: the added fault, or the name of its group."""
     if row["put_in"].startswith(SOC0):
         return "wrong initial state of charge"
     if row["put_in"]:
@@ -71,7 +73,10 @@ def _kind(row: CaseRow) -> str:
 
 
 def _each(rows: Sequence[CaseRow]) -> Iterator[str]:
-    yield "| record | about | verdict | right | nats | true | found | declared, mV | recalibrated | as written |"
+    yield (
+        "| record | case | verdict | right | nats | true size | estimate | declared, mV | recalibrated, mV "
+        "| as written, mV |"
+    )
     yield "|---|---|---|---|---:|---:|---:|---:|---:|---:|"
     for row in rows:
         said = ", ".join(row["effects"])
@@ -89,8 +94,9 @@ def _each(rows: Sequence[CaseRow]) -> Iterator[str]:
 
 
 def _sizes(row: CaseRow) -> tuple[str, str]:
-    """The true one and the one found: of what was put in or withheld, K, A, V, s or ohm; of a witness ohmic resistance
-    and charge transfer, mohm; of ageing the capacity lost, %."""
+    """The true size and its estimate with the 90 % interval, as text: of an added fault or a withheld quantity in its
+    SI unit; for a case with spectra the ohmic and the charge-transfer resistance, mohm; for ageing the capacity loss,
+    %."""
     if "ohmic_found_mohm" in row:
         true, found = (
             " + ".join(f"{row[f'{part}_{of}_mohm']:.1f}" for part in ("ohmic", "transfer"))

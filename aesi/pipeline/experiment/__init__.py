@@ -1,1 +1,1 @@
-"""What an experiment does: config, load, fit, conformalise, evaluate, outputs."""
+"""The stages of an experiment: read its file, load data, fit models, calibrate intervals, evaluate, write outputs."""

@@ -1,4 +1,4 @@
-"""One candidate of the search as it is tracked: the sparse candidate and its intervals on validation."""
+"""Score of one candidate of the search: its losses, and its one-step-ahead intervals on validation data."""
 
 from __future__ import annotations
 
@@ -19,18 +19,19 @@ from aesi.sparse import Candidate, FitnessWeights, Genome, Problem, SparseModel,
 from aesi.sparse.search.genome_space import GenomeSpace
 
 CALIBRATION_RESIDUALS = 26_000
-"""Residuals that a candidate's intervals are calibrated on. Thinned to pieces that each lose their first window,
-these leave the 20,000 rows from which SPCI needs one fit instead of six: 0.5 instead of 1.8 s a candidate at 88,200
-rows."""
+"""Most residuals that the intervals of a candidate are calibrated on. They are taken in pieces, of which each loses its
+first window; 20,000 rows are left. From this number on SPCI needs one fit instead of six: 0.5 s instead of 1.8 s per
+candidate at 88,200 rows."""
 
 
 @dataclass(frozen=True, eq=False)
 class ScoredCandidate:
-    """A candidate with the one-step intervals of its AESI I, and of its AESI II (`stable`).
+    """A candidate with the scores of its one-step-ahead intervals on validation data.
 
-    coverage_pct, width_v : share of validation samples covered, and mean width in V; None where the residuals
-    cannot be calibrated (`note` says why).  seconds : what it took, by the clock.
-    The out-of-fold residuals are not kept: at 88,200 rows they would be nearly all of what is stored of a candidate.
+    candidate : without its out-of-fold residuals, which at 88,200 rows would be nearly all of what is stored of it.
+    coverage_pct, width_v : coverage (per cent) and mean width (V) of the intervals of AESI I; None if they cannot be
+    calibrated.  note : why not.  seconds : wall time of the evaluation, s.
+    stable_coverage_pct, stable_width_v : the same of AESI II.
     """
 
     candidate: Candidate
@@ -43,7 +44,8 @@ class ScoredCandidate:
 
 
 def score(problem: Problem, config: ExperimentConfig, genome: Genome) -> ScoredCandidate | Failed:
-    """Evaluate a genome, calibrate its intervals on out-of-fold residuals, and judge them on validation data."""
+    """Evaluate a genome, calibrate its intervals on out-of-fold residuals, and score them on validation data; Failed if
+    the genome gives no model."""
     started = time.perf_counter()
     outcome = evaluate(problem, genome, weights(config))
     if isinstance(outcome, Failed):
@@ -67,7 +69,7 @@ def _with_intervals(outcome: Candidate, problem: Problem, config: ExperimentConf
 
 
 def _scores(problem: Problem, config: ExperimentConfig, outcome: Candidate, model: SparseModel) -> Scores:
-    """Scores of the intervals of one ensemble on validation."""
+    """Scores of the one-step-ahead intervals of one ensemble on validation data."""
     calibration, judged = _roles(problem, outcome, model)
     conformal = config.conformal
     return validation_scores(
@@ -84,12 +86,16 @@ def _scores(problem: Problem, config: ExperimentConfig, outcome: Candidate, mode
 
 
 _Driven = tuple[Array, Array]
-"""One-step residuals of a record, V, and the current they arose under, A."""
+"""(one-step-ahead residuals of a record, (n,) V; the current at these samples, (n,) A)."""
 
 
 def _roles(problem: Problem, candidate: Candidate, model: SparseModel) -> tuple[list[_Driven], list[_Driven]]:
-    """Residuals to calibrate on and to judge on: the validation records, or where there are none the middle
-    training record, by models and a calibration that have not seen it."""
+    """(residuals for the calibration, residuals for the score) of an ensemble.
+
+    The calibration uses the out-of-fold residuals of the training records. The score is on the validation records;
+    without any it is on the middle training record, which then takes no part in the calibration. A single training
+    record is cut in two.
+    """
     out_of_fold = [
         (each.stable_v if model is candidate.stability else each.one_step_v, record.current_a[1:])
         for each, record in zip(candidate.residuals, problem.split.train, strict=True)
@@ -109,28 +115,29 @@ def _residual(model: SparseModel, record: ErrorSeries) -> _Driven:
 
 
 def scorer(problem: Problem, config: ExperimentConfig) -> partial[ScoredCandidate | Failed]:
-    """`score` with the problem and the experiment bound, which a worker process calls with a genome."""
+    """`score` with the problem and the experiment bound. A worker process calls it with a genome."""
     return partial(score, problem, config)
 
 
 def weights(config: ExperimentConfig) -> FitnessWeights:
-    """Weights (gamma) of the scalar fitness."""
+    """Weights (gamma in the paper) of the losses in the scalar fitness."""
     return FitnessWeights(*config.search.weights)
 
 
 def top_share(config: ExperimentConfig) -> float:
-    """Share of the candidates that are averaged: the same as that of the resamples which make an ensemble.
+    """Share of the candidates, the fittest ones, that are averaged; 0 takes the fittest alone.
 
-    It is one candidate alone where corrections are shrunk by what left-out drives bear out (fade.py), since that takes
-    off what was chance. Over the development splits of the NMC drive in `aesi bench splits` (16 candidates) the mean of
-    the two fittest takes 2.1 points less off the recalibrated model's squared error than the fittest alone, and their
-    mean shrunk as one 1.3 less.
+    It is the share of the resamples that make an ensemble. Where corrections are shrunk to what left-out drives support
+    (fade.py) one candidate is taken, since the shrinking already removes what fits by chance. Over the development
+    splits of the NMC drive in `aesi bench splits` (16 candidates), the mean of the two fittest reduces the recalibrated
+    model's squared error by 2.1 percentage points less than the fittest alone, and their mean shrunk as one by 1.3
+    less.
     """
     return 0.0 if config.library.fade else config.search.top_share
 
 
 def genome_space(problem: Problem, config: ExperimentConfig) -> GenomeSpace:
-    """The ranges of the genes that the experiment names."""
+    """The genes of the search and their ranges, from the experiment file."""
     search, library = config.search, config.library
     return GenomeSpace(
         len(problem.library),
@@ -144,5 +151,5 @@ def genome_space(problem: Problem, config: ExperimentConfig) -> GenomeSpace:
 
 
 def method(config: ExperimentConfig) -> Method:
-    """The conformal method that the experiment names."""
+    """The method for intervals one step ahead, from the experiment file."""
     return METHODS[config.conformal.method]

@@ -1,5 +1,4 @@
-"""The content of one run on the page that compares runs: uncertainty of its figures, its genes and terms, maps of its
-error."""
+"""The part of one run on the page that compares runs: uncertainty of its figures, genes, terms, maps of its error."""
 
 from __future__ import annotations
 
@@ -16,16 +15,18 @@ from aesi.pipeline.report.views import RecordTrace
 
 SCHEMA = "aesi.comparison/1"
 BLOCK_S = 60.0
-"""Length of a bootstrap block, s: errors forget each other within about this time."""
+"""Length of a bootstrap block, s: about the time after which errors are no longer correlated. A convention."""
 DRAWS = 1000
-"""Block-bootstrap resamples: the ends of a 90 % interval are then known to about a percentile."""
+"""Number of block-bootstrap resamples. The ends of a 90 % interval are then known to about one percentile."""
 LEVEL_PCT = 90.0
+"""Nominal coverage of the bootstrap intervals, per cent."""
 BINS = 16
-"""Bins of current, and of state of charge."""
+"""Number of bins of the current, and of the state of charge, in a map. A convention."""
 
 
 def comparison(result: Result) -> dict[str, Any]:
-    """JSON content: 90 % intervals of the test figures by model, and genes, terms and maps of the chosen one."""
+    """JSON content of a run: 90 % intervals of the test figures by model, the genes and terms of the chosen candidate,
+    and maps of the error of the declared and of the chosen model."""
     tests = [trace for trace in result.evaluation.traces if trace.role == "test"]
     chosen = result.best
     shown = published_by(result.loaded.model)
@@ -40,7 +41,8 @@ def comparison(result: Result) -> dict[str, Any]:
 
 
 def _left(trace: RecordTrace, name: str) -> Array:
-    """(n,) V that the model leaves in free run; the error of the physics where the model is not among the traces."""
+    """Error of a model in free run along a record, (n,) V, measured minus model; that of the corrected physics for a
+    name without a prediction in the trace."""
     if name in trace.all_physics_v:
         return trace.measured_v - trace.all_physics_v[name]
     if name not in trace.predictions:
@@ -49,7 +51,9 @@ def _left(trace: RecordTrace, name: str) -> Array:
 
 
 def _intervals(tests: list[RecordTrace], name: str, seed: int) -> dict[str, list[float]]:
-    """Percentiles over resampled blocks of the test records; the same blocks for the model and the declared physics."""
+    """Bootstrap intervals [low, high] of a model's test figures: RMSE, mV, and reduction of the declared model's mean
+    squared error, per cent. The same blocks are drawn for the model and for the declared physics, so that what both
+    have in common cancels in the reduction."""
     squares = np.concatenate([_block_sums(trace, _left(trace, name)) for trace in tests])
     bare = np.concatenate([_block_sums(trace, _left(trace, DECLARED)) for trace in tests])
     rows = np.concatenate([_block_sums(trace, np.ones(len(trace.time_s))) for trace in tests])
@@ -65,14 +69,15 @@ def _intervals(tests: list[RecordTrace], name: str, seed: int) -> dict[str, list
 
 
 def _block_sums(trace: RecordTrace, values: Array) -> Array:
-    """(blocks,) sums of squares over blocks of a record."""
+    """Sums of squares over consecutive blocks of BLOCK_S of a record, (blocks,).  values : (n,)."""
     step = float(np.median(np.diff(trace.time_s)))
     starts = np.arange(0, len(values), max(1, round(BLOCK_S / step)))
     return np.asarray(np.add.reduceat(values**2, starts))
 
 
 def _map(tests: list[RecordTrace], name: str) -> dict[str, Any]:
-    """Mean error in bins over current and state of charge, mV; None where a bin has too few samples."""
+    """Mean error of a model in free run on the test records by bins of current and state of charge, mV; None in a bin
+    with too few samples."""
     current = np.concatenate([trace.current_a for trace in tests])
     soc = np.concatenate([trace.soc for trace in tests])
     error = MV_PER_V * np.concatenate([_left(trace, name) for trace in tests])

@@ -1,8 +1,7 @@
-"""What an experiment is: one validated record read from a YAML file.
+"""The description of an experiment: a validated record that is read from a YAML file.
 
-Files an experiment reads are named relative to its YAML file. What it writes goes below the workspace; an
-experiment's name becomes a folder there and can therefore hold letters, digits, `_` and `-` alone. Its sections are
-in sections.py.
+Paths in the file are relative to its own folder. The results are written below the workspace, in a folder named after
+the experiment; the name therefore has only letters, digits, `_` and `-`. The sections are in sections.py.
 """
 
 from __future__ import annotations
@@ -40,7 +39,7 @@ NO_ROLES = "give `train` and `test` records, or one `record` with `repeats`"
 
 
 def model_names() -> tuple[str, ...]:
-    """Every model that an experiment can compare: the physics, the two ensembles, the baselines."""
+    """Names of all models that an experiment can compare: the physics models, the two ensembles, the baselines."""
     from aesi.pipeline.experiment.physics_models import PHYSICS_NAMES
     from aesi.sparse import ENSEMBLES
     from aesi.sparse.baselines import BASELINES
@@ -51,21 +50,21 @@ def model_names() -> tuple[str, ...]:
 class ExperimentConfig(Section):
     """One experiment.
 
-    name : letters, digits, `_` and `-`; becomes a folder below `runs/`.
-    note : a line on why it is there, for its report and the tracking store.
-    seed : of all that is random in it.
-    data : the records and their roles.
+    name : name of the experiment (letters, digits, `_` and `-`), and of its folder below `runs/`.
+    note : purpose of the experiment in one line, shown in the report and in the tracking store.
+    seed : random seed of the whole experiment.
+    data : the records, and which of them train, validate and test.
     cell : the declared cell.
-    fallback : what to run instead where the measured data cannot be had; of `data.kind: catalogue` alone.
+    fallback : data and cell that are used if the measured data are not available; only with `data.kind: catalogue`.
     library : the candidate terms of the correction.
-    search : the evolutionary search among them.
-    conformal : prediction intervals.
-    models : the models that the tables compare; all of them without it.
-    tracking : where the run is tracked.
-    runner : who evaluates candidates.
-    discover : what `aesi discover` needs beside cell and data.
+    search : the evolutionary search for the terms.
+    conformal : the prediction intervals.
+    models : the models that the tables compare; all of them by default.
+    tracking : where runs are tracked.
+    runner : where candidates are evaluated.
+    discover : what `aesi discover` needs in addition to cell and data.
 
-    `base` is the folder its relative paths start from; it is not part of its identity.
+    `base` is the folder that relative paths start from; it is not part of the file and of the hash.
     """
 
     name: str
@@ -142,18 +141,19 @@ class ExperimentConfig(Section):
         return value
 
     def path(self, name: str) -> Path:
-        """A file the experiment reads: absolute, or relative to the experiment's own folder."""
+        """The path of a file that the experiment reads; relative names start from the folder of the experiment file."""
         path = Path(name).expanduser()
         return path if path.is_absolute() else (self.base / path).resolve()
 
     @property
     def digest(self) -> str:
-        """Content hash of what decides the result; who computes and where it is tracked does not."""
+        """Hash of all settings that influence the result. Runner, tracking, note and limits of resources do not."""
         return self._hash()
 
     @property
     def setting(self) -> str:
-        """The digest without the seed: runs of one setting can be put together as mean and spread."""
+        """The hash without the seed. Runs with the same setting differ by chance alone, so that their mean and spread
+        are meaningful."""
         return self._hash("seed")
 
     def _hash(self, *without: str) -> str:
@@ -164,9 +164,10 @@ class ExperimentConfig(Section):
 
 
 def read_experiment(path: str | Path, overrides: Sequence[str] = ()) -> ExperimentConfig:
-    """The experiment in a YAML file, with `key.subkey=value` overrides laid over it.
+    """The experiment in a YAML file.
 
-    Raises ConfigError in one sentence: file, key, what was found, what is admissible.
+    overrides : `key.subkey=value` texts that replace keys of the file, the values in YAML.
+    Raises ConfigError, one sentence: the file, the key, what was found, and what is admissible.
     """
     from aesi.pipeline.yaml_text import parse_yaml
 
@@ -188,7 +189,7 @@ def read_experiment(path: str | Path, overrides: Sequence[str] = ()) -> Experime
     seen: set[str] = set()
     for override in overrides:
         key = overridden_key(override)
-        if key in seen:  # the last would count, and nobody be told
+        if key in seen:  # otherwise the last one would count without a message
             raise ConfigError(f"{path}: {key!r} is overridden twice; give it once.")
         seen.add(key)
         _override(content, override)
@@ -196,23 +197,30 @@ def read_experiment(path: str | Path, overrides: Sequence[str] = ()) -> Experime
 
 
 def overridden_key(override: str) -> str:
-    """The key, with dots, that an override `key=value` sets."""
+    """The key, such as `search.candidates`, of an override `key=value`."""
     return override.partition("=")[0].strip()
 
 
 def parse_experiment(
     content: Mapping[str, Any], base: Path | None = None, where: str = "experiment"
 ) -> ExperimentConfig:
-    """The experiment in a mapping. Raises ConfigError like `read_experiment`; `where` names the source."""
+    """The experiment in a mapping of keys.
+
+    base : folder that relative paths start from, by default the current one.  where : source of the mapping, for
+    errors. Raises ConfigError as `read_experiment` does.
+    """
     try:
         return ExperimentConfig.model_validate({**content, "base": base or Path.cwd()})
     except ValidationError as error:
         details = error.errors()
-        unknown = (one for one in details if one["type"] == "extra_forbidden")  # why another key is missing
+        unknown = (
+            one for one in details if one["type"] == "extra_forbidden"
+        )  # a misspelt key is missing as well
         raise ConfigError(f"{where}: {_sentence(next(unknown, details[0]))}") from None
 
 
 def _neighbours(path: Path) -> str:
+    """End of the sentence on a missing file: the nearest name in its folder, or the experiment files there."""
     if not path.parent.is_dir():
         return ""
     names = sorted(p.name for p in path.parent.glob("*.yaml"))
@@ -223,7 +231,8 @@ def _neighbours(path: Path) -> str:
 
 
 def _override(content: dict[str, Any], override: str) -> None:
-    """Lay `a.b=value` over the mapping, the value read as YAML."""
+    """Set a key of the mapping in place, from a text `a.b=value` with the value in YAML.  Raises ConfigError if the
+    text cannot be read, or if a part of the key is a value without keys."""
     import yaml
 
     key, equals, text = override.partition("=")
@@ -245,7 +254,7 @@ def _override(content: dict[str, Any], override: str) -> None:
 
 
 def _sentence(detail: ErrorDetails) -> str:
-    """One pydantic error as a sentence that says where, what was found and what to do."""
+    """One validation error of pydantic as a sentence: the key, what was found, and what is admissible."""
     location = [str(part) for part in detail["loc"]]
     key = ".".join(location)
     if detail["type"] == "extra_forbidden":
@@ -268,7 +277,7 @@ def _sentence(detail: ErrorDetails) -> str:
 
 
 def _keys_at(location: Sequence[str]) -> list[str]:
-    """The keys of the section at `location`."""
+    """The keys of the section at a location; empty if there is no section."""
     section: type[BaseModel] = ExperimentConfig
     for part in location:
         field = section.model_fields.get(part)

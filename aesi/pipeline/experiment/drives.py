@@ -1,4 +1,5 @@
-"""Drives: the records, or repeats of one record, that train, validate and test; and the parts left out in turn."""
+"""Assignment of drives to roles: which records, or repeats of one record, train, validate and test, and which parts of
+the training drives are left out in turn."""
 
 from __future__ import annotations
 
@@ -17,7 +18,10 @@ from aesi.records import ROLES, ErrorSeries, Role, Split
 def by_role(
     data: DataConfig, series: Mapping[str, ErrorSeries], roles: Mapping[Role, Sequence[str]]
 ) -> Split:
-    """Whole records, or the repeats of the only one, by role."""
+    """The error series by role: whole records, or the repeats of the only record.
+
+    series : record -> its error series.  roles : role -> its records.
+    """
     if data.repeats:
         return cut_repeats(next(iter(series.values())), data.repeats)
     train, valid, test = (tuple(series[name] for name in roles[role]) for role in ROLES)
@@ -27,14 +31,17 @@ def by_role(
 def training_part(
     data: DataConfig, series: Mapping[str, ErrorSeries], roles: Mapping[Role, Sequence[str]]
 ) -> tuple[ErrorSeries, ...]:
-    """`Split.train` of `by_role`; the series may be those of the training records alone."""
+    """`Split.train` of `by_role`. The series of the training records are sufficient."""
     if data.repeats:
         return cut_repeats(next(iter(series.values())), data.repeats).train
     return tuple(series[name] for name in roles["train"])
 
 
 def cut_repeats(series: ErrorSeries, repeats: RepeatsConfig) -> Split:
-    """Pieces of a record that repeats a schedule; each training repeat gives its last share to validation."""
+    """The repeats of a record, by role. The last `valid_share` of each training repeat validates.
+
+    Raises DataError if the record does not contain a named repeat, or if a repeat has fewer than two rows.
+    """
     train, valid = [], []
     for number in repeats.train:
         piece = _repeat(series, repeats.period_s, number)
@@ -47,6 +54,7 @@ def cut_repeats(series: ErrorSeries, repeats: RepeatsConfig) -> Split:
 
 
 def _repeat(series: ErrorSeries, period_s: float, number: int) -> ErrorSeries:
+    """The repeat with a number, counted from 1, of a record."""
     start = series.time_s[0] + (number - 1) * period_s
     low, high = np.searchsorted(series.time_s, [start, start + period_s])
     if high - low < 2 and period_s < 2 * series.dt_s:
@@ -63,11 +71,11 @@ def _repeat(series: ErrorSeries, period_s: float, number: int) -> ErrorSeries:
 
 
 WHOLE = 0.99
-"""Share of a period from which a repeat counts as whole: a logger's last rows may be missing. A convention."""
+"""Least share of a period that a whole repeat contains. The last rows of a record may be missing. A convention."""
 
 
 def cut_short(time_s: Array, repeats: RepeatsConfig) -> list[str]:
-    """Sentences on the repeats that the record ends in.
+    """One sentence for each named repeat that is incomplete because the record ends in it.
 
     time_s : (n,) s, of the record.
     """
@@ -85,7 +93,7 @@ def cut_short(time_s: Array, repeats: RepeatsConfig) -> list[str]:
 def training_drives(
     data: DataConfig, records: Mapping[str, FitRecord], roles: Mapping[Role, Sequence[str]]
 ) -> list[tuple[str, slice]]:
-    """Record and rows of each training drive, in the order of `Split.train`."""
+    """(record, its rows) of each training drive, in the order of `Split.train`. Rows that validate are excluded."""
     if data.repeats is None:
         return [(name, slice(0, len(records[name].rows))) for name in roles["train"]]
     (name, record), repeats = next(iter(records.items())), data.repeats
@@ -99,20 +107,21 @@ def training_drives(
 
 
 HALVES = 2
-"""Parts in which a repeat is left out: a row of a test repeat between two is no further from trained ones (`cuts`)."""
+"""Number of parts in which a training repeat is left out (see `cuts`)."""
 
 
 def cuts(data: DataConfig) -> int:
-    """Number of parts that a training drive is cut into to be left out in turn.
+    """Number of parts into which each training drive is cut, to be left out in turn.
 
-    Repeats of one record, which lie side by side in the state of charge, are cut in two. A test repeat lies between two
-    training repeats, so that no row of it is further than half a repeat from trained ones; one half of a training
-    repeat is as far from its other half. To leave out whole repeats would ask for more than the test does.
+    It is 1 for drives that are records, and HALVES for repeats of one record, which follow each other in the state of
+    charge. A test repeat lies between two training repeats, so that no row of it is further than half a repeat from a
+    trained row. A left-out half of a training repeat is as far from the other half. A whole repeat that is left out
+    would be further from the trained rows than the test is.
     """
     return HALVES if data.repeats is not None else 1
 
 
 def parts(n: int, count: int) -> list[slice]:
-    """Slices of n rows in consecutive parts of like length."""
+    """Slices that cut n rows into `count` consecutive parts of equal length, to within a row."""
     edges = np.linspace(0, n, count + 1).round().astype(int)
     return [slice(int(a), int(b)) for a, b in pairwise(edges)]

@@ -1,6 +1,6 @@
-"""From a loaded experiment to the models that will be judged.
+"""Fits of the models that an experiment compares: the search problem, the chosen ensembles, the baselines.
 
-Nothing here looks at `Split.test`.
+This module does not read `Split.test`.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from aesi.sparse.yardsticks import Bare
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A model ready to be judged.
+    """A fitted model, ready for the evaluation.
 
-    terms : active terms (0 where counting them makes no sense).  seconds : what its own fit took.
-    intervals, bands : one step ahead, and in free run; None where they could not be calibrated (`notes`).
-    trials : the candidates of its own search, a row each.
-    compared : the same intervals by other methods, by name (of the ensembles alone).
+    terms : number of terms of a sparse model, 0 for others.  seconds : wall time of its own fit, s.
+    intervals : prediction intervals one step ahead.  bands : bands of the free run. Both are None if they could not be
+    calibrated; `notes` say why.  compared : method -> intervals one step ahead, of the ensembles alone.
+    trials : one row for each candidate of the model's own search.
     """
 
     model: ErrorModel
@@ -45,19 +45,24 @@ class Fitted:
 
 
 KeepModel = Callable[[str, Callable[[], Fitted]], Fitted]
-"""Name of a model and its fit -> the model, from an earlier fit to the same where there is one."""
+"""Function of a model's name and its fit that returns the fitted model. It may return that of an earlier fit to the
+same data."""
 
 
 @dataclass(frozen=True, eq=False)
 class FinalModels:
-    """fitted : in the experiment's order.  unfitted : a sentence each baseline that could not be fitted."""
+    """The models of an experiment.
+
+    fitted : in the order of the experiment file.  unfitted : a sentence on each baseline that could not be fitted.
+    """
 
     fitted: tuple[Fitted, ...]
     unfitted: tuple[str, ...] = ()
 
 
 def build_problem(loaded: Loaded, config: ExperimentConfig) -> Problem:
-    """The search problem over the training records: library, resamples, factors."""
+    """The search problem of an experiment on its training records: the library, the bootstrap resamples and their
+    factors, from the sections `library` and `search`."""
     library, search = config.library, config.search
     options = Options(
         inputs=library.inputs,
@@ -71,7 +76,7 @@ def build_problem(loaded: Loaded, config: ExperimentConfig) -> Problem:
         best=search.top_share,
         horizon=search.horizon,
         fold=search.fold,
-        cuts=cuts(loaded.config.data),  # a fallback has drives of its own
+        cuts=cuts(loaded.config.data),  # those of the loaded data, which a fallback replaces
         regime=search.regime,
         feedback=library.feedback,
         fade=library.fade,
@@ -87,11 +92,12 @@ def _anew(name: str, fit: Callable[[], Fitted]) -> Fitted:
 def final_models(
     problem: Problem, chosen: Candidate, config: ExperimentConfig, keep: KeepModel = _anew
 ) -> FinalModels:
-    """The chosen candidate's two ensembles, and the baselines that the experiment names, in its order.
+    """The models that the experiment names, in its order: physics, the two ensembles of the chosen candidate,
+    baselines.
 
-    keep : called for each baseline; the ensembles need no fit.
-    A baseline that cannot be fitted is left out, since it only serves to compare: the search is not lost for it. Raises
-    FitError where nothing else is left to judge.
+    keep : called with the fit of each baseline, whose result it may take from an earlier run. The others need no fit.
+    A baseline that cannot be fitted is left out, so that the result of the search is not lost for it.
+    Raises FitError if no model is left.
     """
     fitted, unfitted = [], []
     for name in config.models:

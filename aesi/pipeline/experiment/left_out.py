@@ -1,18 +1,25 @@
-"""Training drives under physics that has not seen a part of them, and how much of a recalibration carries over to it.
+"""Physics fitted without parts of the training drives, and the share of a recalibration that carries over to them.
 
-    a = median_d <e_d, c_d> / |c_d|**2     within [0, 1]                                                  (1)
+    a = median_d <e_d, c_d> / |c_d|**2     limited to [0, 1]                                              (1)
 
-e_d is what the declared physics leaves of a left-out part d, c_d what a recalibration without d takes off it. Each
-deviation of the recalibrated physics is multiplied by a; for the physics without a part, a comes from the other parts.
-The prior of `recalibrate` allows for noise within drives, (1) for what differs between them: on the LG HG2 two drives
-err with opposite signs over a whole discharge, and what is fitted to some takes nothing off the others.
-A median, since physics that runs a part it has not seen into volts would set a mean for all.
+e_d is the error of the declared physics on a left-out part d, and c_d the change of the voltage by a recalibration that
+was fitted without d. The slope <e_d, c_d> / |c_d|**2 is 1 if the recalibration is right on d, and 0 if it does not
+help there. Each deviation of the recalibrated parameters is multiplied by a; for the physics without a part, a is the
+median over the other parts. The prior of `recalibrate` allows for noise within drives, and (1) for differences between
+drives: on the LG HG2, two drives have errors of opposite signs over a whole discharge, so that a fit to some drives
+does not reduce the error of the others. The median is used because physics can fail by volts on a part that it has not
+seen, which would dominate a mean.
 
-Over the development splits of `aesi bench splits` (16 candidates; per cent taken off the declared model's squared error
-by AESI I, mean and worst), with it and with a recalibration kept whole: NMC 64.1, 32.4 and 65.3, 32.4; Panasonic 54.0,
-44.9 and 50.9, 41.5; LG HG2 19.1, 18.3 and 23.9, 22.3, where left-out drives are 14 and 12 % worse for a recalibration
-and these two tests 13 and 6 % better. The least-squares slope less its standard error, as for a correction (fade.py),
-takes all off two splits of the NMC drive.
+Effect of a, over the development splits of `aesi bench splits` (16 candidates): reduction of the declared model's
+squared error by AESI I, per cent, mean and worst split, with a as in (1) | with a = 1:
+
+    NMC        64.1, 32.4 | 65.3, 32.4
+    Panasonic  54.0, 44.9 | 50.9, 41.5
+    LG HG2     19.1, 18.3 | 23.9, 22.3
+
+On the HG2 a recalibration makes the left-out drives worse by 14 and 12 %, but these two tests better by 13 and 6 %. The
+least-squares slope minus its standard error, as used for a correction (fade.py), gives 0 on two splits of the NMC
+drive.
 """
 
 from __future__ import annotations
@@ -38,11 +45,14 @@ from aesi.records import ErrorSeries, HeldOutDrive, LeftOutDrives, Role
 from aesi.sparse import with_inputs
 
 TrainingDrive = tuple[str, slice]
-"""Record and rows of a training drive."""
+"""(record, its rows) of a training drive."""
 
 
 class Piece(NamedTuple):
-    """drive : place of a training drive among them.  rows : of that drive."""
+    """A part of a training drive that is left out.
+
+    drive : index of the training drive.  rows : counted from the first row of that drive.
+    """
 
     drive: int
     rows: slice
@@ -50,7 +60,10 @@ class Piece(NamedTuple):
 
 @dataclass(frozen=True)
 class Pieces:
-    """folds : what the search leaves out in turn (`cuts`).  drives : whole drives, where the folds are not these."""
+    """All parts that are left out in turn.
+
+    folds : those of the search (`cuts`).  drives : the whole drives, if the folds are parts of drives; else empty.
+    """
 
     folds: tuple[Piece, ...]
     drives: tuple[Piece, ...]
@@ -58,7 +71,10 @@ class Pieces:
 
 @dataclass(frozen=True, eq=False)
 class TrainingDrives:
-    """The records of an experiment, and which rows of them train."""
+    """The records of an experiment, and the rows of them that train.
+
+    drives : in the order of `Split.train`.  roles : role -> records.
+    """
 
     config: ExperimentConfig
     records: Mapping[str, FitRecord]
@@ -67,22 +83,22 @@ class TrainingDrives:
 
     @property
     def of_several_records(self) -> bool:
-        """Whether the drives are of several records. Each record then has a charge of its own, also where one is
-        left out."""
+        """Whether the drives are from several records. Each record may then have an initial state of charge of its own,
+        also in fits without one of them."""
         return len({name for name, _ in self.drives}) > 1
 
     def under(self, physics: PhysicsModels, piece: Piece) -> tuple[ErrorSeries, ...]:
-        """`Split.train` under physics that was fitted without the piece."""
+        """The error series of `Split.train` under physics that was fitted without the piece."""
         records = self._without(piece)
         if not self.config.data.repeats:
             records = {name: records[name] for name in self.roles["train"]}
         return training_part(self.config.data, series_under(physics, records, self.config)[0], self.roles)
 
     def left_out(self, fitted: PhysicsModels) -> tuple[PhysicsModels, LeftOutDrives]:
-        """The share of the recalibrated physics that carries over, and the training drives under physics without each
-        piece in turn.
+        """(the physics with its recalibration multiplied by the share (1); the training drives under physics without
+        each piece in turn).
 
-        fitted : to all training rows.
+        fitted : the physics fitted to all training rows.
         """
         pieces = self.pieces()
         refitted = [self._refitted(fitted, piece) for piece in pieces.folds]
@@ -104,7 +120,7 @@ class TrainingDrives:
         return HeldOutDrive.of(self.under(physics, piece), piece.drive, piece.rows)
 
     def pieces(self) -> Pieces:
-        """The pieces that are left out in turn."""
+        """The pieces of the training drives that are left out in turn."""
         count = cuts(self.config.data)
         lengths = [rows.stop - rows.start for _, rows in self.drives]
         return Pieces(
@@ -113,7 +129,8 @@ class TrainingDrives:
         )
 
     def as_they_are(self, train: tuple[ErrorSeries, ...]) -> LeftOutDrives:
-        """The training drives under the physics that was fitted to all of them, which a single one leaves no other."""
+        """The left-out pieces under the physics that was fitted to all training rows, for a single training drive:
+        there is no other drive to fit the physics to without it."""
         pieces = self.pieces()
         made = [
             tuple(HeldOutDrive.of(train, piece.drive, piece.rows) for piece in each)
@@ -136,9 +153,10 @@ class TrainingDrives:
         )
 
     def _slope(self, physics: PhysicsModels, piece: Piece) -> float:
-        """`slope_on` the piece; only the one record, under the two models that it takes, is simulated.
+        """The slope of (1) on the piece. Only its record is simulated, with the declared and the recalibrated physics.
 
-        Both start by the declared cell's reading: what parameters take off is asked, not what a better start does.
+        Both start from the state of charge that the declared cell reads, so that the slope measures the parameters and
+        not a better initial state.
         """
         name, rows = self._rows(piece)
         record, hold = self.records[name], self.config.data.hold
@@ -149,11 +167,11 @@ class TrainingDrives:
         return slope_on(record.voltage_v[rows] - declared_v, recalibrated_v - declared_v)
 
     def _without(self, piece: Piece) -> dict[str, FitRecord]:
-        """The records as a fit without the piece sees them."""
+        """The records with the rows of the piece closed to fits."""
         return without(self.records, *self._rows(piece))
 
     def _rows(self, piece: Piece) -> TrainingDrive:
-        """The record that a piece is of, and its rows there."""
+        """The record of a piece, and the rows of the piece in that record."""
         name, rows = self.drives[piece.drive]
         return name, slice(rows.start + piece.rows.start, rows.start + piece.rows.stop)
 
@@ -161,12 +179,13 @@ class TrainingDrives:
 def series_under(
     physics: PhysicsModels, records: Mapping[str, FitRecord], config: ExperimentConfig
 ) -> tuple[dict[str, ErrorSeries], list[str]]:
-    """Whole records under the physics, and the names of those that run empty there."""
+    """(record -> error series of the whole record under the physics; names of the records on which the model runs out
+    of lithium or salt)."""
     series: dict[str, ErrorSeries] = {}
     empty = []
     for name, record in records.items():
         whole, ran_empty = physics.series(record, config.data.dt_s, config.data.hold)
-        # Before the record is cut: a filtered current has to know what came before a piece.
+        # Inputs are added before the record is cut, since a filtered current depends on the rows before a piece.
         series[name] = with_inputs(whole, config.library.inputs or whole.input_names)
         if ran_empty:
             empty.append(name)
@@ -174,12 +193,15 @@ def series_under(
 
 
 def slope_on(error: Array, taken_off: Array) -> float:
-    """<e, c> / |c|**2 of (1), both (n,) V; NaN where the recalibration changes nothing."""
+    """The slope <e, c> / |c|**2 of (1); NaN if the recalibration changes nothing.
+
+    error : e, (n,) V, measured minus declared model.  taken_off : c, (n,) V, recalibrated minus declared model.
+    """
     square = float(taken_off @ taken_off)
     return float(error @ taken_off) / square if square > 0.0 else float("nan")
 
 
 def carried_over(slopes: Array) -> float:
-    """a of (1); 1 where no part can tell."""
+    """The share a of (1); 1 if no part has a slope.  slopes : (n,), NaN where there is none."""
     known = slopes[np.isfinite(slopes)]
     return float(np.clip(np.median(known), 0.0, 1.0)) if len(known) else 1.0

@@ -1,7 +1,7 @@
-"""From an experiment's data section to error series by role: measure, simulate, subtract, cut.
+"""Data of an experiment: read the records, simulate them with the physics, and cut the voltage errors by role.
 
-The physics model runs over each whole record from its own start, so that a piece cut out of the middle keeps
-the states that its history gave it.
+The physics model is simulated over each whole record from its first row. A piece that is cut out of the middle
+therefore has the states that its history gives it.
 """
 
 from __future__ import annotations
@@ -43,21 +43,23 @@ from aesi.records import ErrorSeries, Hold, LeftOutDrives, Measurement, Role, Sp
 DFN_NOTE = "The physics is the porous electrode: DFN in tables and figures, where others have ESPM."
 
 TOLD_OFF = 0.05
-"""Steps by which a row is off its stamp, in the mean, from which it is told. A convention."""
+"""Mean distance of the rows from the even time grid, in steps, above which a note says so. A convention."""
 
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """The data that an experiment works on.
+    """The loaded data of an experiment.
 
-    config : the experiment as it is run, with data and cell of the fallback where `fallback` says why.
-    cell, soc0 : of the physics that is corrected (`cell.start`); soc0 is the state of charge at the first row, by
-    record.
-    left_out : the training drives under physics that was fitted without a part of one (`cuts`), or without one, in
-    turn.
-    digests : record name -> content hash of what was measured.  notes : what a reader of the report should know about
-    the data: resampling, dropped rows, a fallback.
-    files : hash of the files that declare the cell.
+    cell : of the physics that is corrected (`cell.start`).  cell_name : its name in reports.  effects : added to it.
+    split : error series by role.
+    left_out : the training drives under physics that was fitted without a part of one (`cuts`), or without a whole one,
+    in turn.
+    soc0 : record -> state of charge at its first row, 0 to 1, of the same physics.
+    digests : record -> hash of the measured columns.  notes : sentences for the reader of the report on the data, such
+    as resampling, dropped rows, a fallback.
+    config : the experiment as it is run; with the data and cell of the fallback if `fallback` is not empty.
+    fallback : why the fallback is used, one sentence.  model : kind of the physics.  files : hash of the files that
+    declare the cell.
     """
 
     cell: Cell
@@ -75,18 +77,18 @@ class Loaded:
 
     @property
     def setting(self) -> str:
-        """Hash of what was run, of which cell and on which data, without the seed: runs that share it differ by chance
+        """Hash of the settings without the seed, of the cell and of the data. Runs that share it differ by chance
         alone."""
         data = "".join(f"|{name} {digest}" for name, digest in sorted(self.digests.items()))
         return hashlib.sha256(f"{self.config.setting}{data}|{self.files}".encode()).hexdigest()[:16]
 
 
 def load(config: ExperimentConfig) -> Loaded:
-    """Measurements, simulated and subtracted, by role.
+    """The data of an experiment: measured minus simulated voltage of each record, by role.
 
-    Where a `fallback` section is given, it replaces data that cannot be had; a note says so, and the experiment's own
-    note, which is about the data that were asked for, is left out. A fault in data that are there is raised.
-    Raises ConfigError or DataError naming the file and what to do.
+    If the data are not available and the experiment has a `fallback` section, this is used instead; a note says so, and
+    the experiment's own note, which is about the named data, is left out. Faults of available data are raised.
+    Raises ConfigError or DataError with the file and the remedy.
     """
     check_roles(config)
     try:
@@ -112,7 +114,7 @@ def load(config: ExperimentConfig) -> Loaded:
 
 
 def _called(config: ExperimentConfig) -> str:
-    """The data of an experiment, in words."""
+    """The data of an experiment in words, for the note on a fallback."""
     if config.data.kind != "virtual":
         return str(config.data.set or config.cell.bpx)
     virtual = config.data.virtual
@@ -167,7 +169,7 @@ def _training(
     records: Mapping[str, FitRecord],
     roles: Mapping[Role, Sequence[str]],
 ) -> TrainingDrives:
-    """The drives that train, whose rows are opened to fits in the records."""
+    """The training drives. In the records, their rows are marked as those that fits may see."""
     drives = training_drives(config.data, records, roles)
     declared = PhysicsStart(given.cell, given.cell, given.effects, model=given.model)
     opened = {name: records[name].as_declared(declared, config.data.hold) for name, _ in drives}
@@ -179,13 +181,16 @@ def _training(
 def _of_starts(
     physics: PhysicsModels, records: Mapping[str, FitRecord], starts: Mapping[str, InitialState], hold: Hold
 ) -> list[str]:
-    """Sentences on where the records start under the physics.  starts : by the declared cell."""
+    """A sentence on the initial state of charge of each record under the physics.
+
+    starts : the initial states that the declared cell reads.
+    """
     own = {name: physics.own_reading(physics.start, record, hold) for name, record in records.items()}
     return [with_keys((own[name] or start).sentence) for name, start in starts.items()]
 
 
 def _of_repeats(config: ExperimentConfig, records: Mapping[str, FitRecord]) -> list[str]:
-    """Sentences on the repeats that a record which is cut into them ends in."""
+    """Sentences on the repeats that are incomplete because the record ends in them (`cut_short`)."""
     if config.data.repeats is None:
         return []
     (cut,) = records.values()
@@ -193,7 +198,7 @@ def _of_repeats(config: ExperimentConfig, records: Mapping[str, FitRecord]) -> l
 
 
 def _of_single(training: TrainingDrives) -> list[str]:
-    """A sentence on fitted physics where there is no second drive to fit it to without the first."""
+    """A sentence on the calibration of fitted physics if there is a single training drive; else empty."""
     config = training.config
     fitted = config.cell.start == "recalibrated" or set(config.models) & set(FREE)
     if len(training.drives) > 1 or not fitted:
@@ -206,8 +211,11 @@ def _of_single(training: TrainingDrives) -> list[str]:
 
 
 def _physics(given: HybridModel, training: TrainingDrives) -> tuple[PhysicsModels, LeftOutDrives | None]:
-    """The physics, and the training drives under physics that has not seen them; None of a single drive, without which
-    there is nothing to fit to. Also where the declared cell is corrected: what is fitted stands beside it."""
+    """(the physics models; the training drives under physics that has not seen them). The second is None for a single
+    training drive, since no other is left to fit to.
+
+    Fits are also made if the declared cell is corrected, because the fitted models stand in the tables beside it.
+    """
     config = training.config
     physics = physics_models(
         given.cell,
@@ -224,9 +232,10 @@ def _physics(given: HybridModel, training: TrainingDrives) -> tuple[PhysicsModel
 
 
 def _series(physics: PhysicsModels, training: TrainingDrives) -> tuple[dict[str, ErrorSeries], list[str]]:
-    """The error series of each record under the physics, with its slopes, and a sentence on each test that runs empty.
+    """(record -> its error series under the physics, with slopes; a sentence on each test record on which the model
+    runs out of lithium or salt).
 
-    Raises SimulationError where another record does.
+    Raises SimulationError if the model runs out on a record that trains or validates.
     """
     records, hold = training.records, training.config.data.hold
     series, empty = series_under(physics, records, training.config)
@@ -241,7 +250,8 @@ def _series(physics: PhysicsModels, training: TrainingDrives) -> tuple[dict[str,
 
 
 def _declared_in(cell: Path, config: ExperimentConfig) -> str:
-    """Hash of the cell's file, or saved model, and of the user's effects: their names stay when they are edited."""
+    """Hash of the contents of the cell file, or saved model, and of the user's own effect files, since a file that is
+    edited keeps its name."""
     sha = hashlib.sha256()
     for held in contents([cell, *(config.path(name) for name in config.cell.effect_files)]):
         sha.update(hashlib.sha256(held).digest())
@@ -251,10 +261,10 @@ def _declared_in(cell: Path, config: ExperimentConfig) -> str:
 def _on_grid(
     config: ExperimentConfig, given: HybridModel, sources: Sources
 ) -> tuple[dict[str, FitRecord], dict[str, InitialState], list[str]]:
-    """The records in even rows, with no row open to a fit yet; where they start by the declared cell; and sentences on
-    what else was assumed and done to them.
+    """(records on an even time grid, with no row open to fits yet; their initial states by the declared cell; sentences
+    on what was assumed about them and done to them).
 
-    Raises DataError where one cannot be of the cell.
+    Raises DataError if a record cannot be of the cell.
     """
     cell, data = given.cell, config.data
     shared = config.cell.soc0 is not None and len(sources.records) > 1
@@ -271,7 +281,7 @@ def _on_grid(
         begins = Beginning(measurement, declared, shared)
         start = starts[name] = begins.under(cell, given.effects, data.hold, given.model)
         held = hold_sentence(measurement.name, data.hold, data.declared_hold is not None, "data.hold: {}")
-        # First, since it refuses a step that would make too many rows, or none.
+        # Resampling comes first, since it refuses a time step that would make too many rows, or none.
         even = to_even(measurement, data.dt_s, data.hold)
         sampled = _of_sampling(measurement, even, data.dt_s, judges=name in judging)
         notes += [
@@ -287,10 +297,10 @@ def _on_grid(
 
 
 def _of_sampling(measurement: Measurement, even: Measurement, dt_s: float, *, judges: bool) -> list[str]:
-    """A sentence on a record whose even rows are not those that were measured.
+    """A sentence on a record whose rows had to be resampled to the even time grid; else empty.
 
-    judges : of a test record, whose free run needs no dense voltage.
-    Raises DataError for another whose rows are so far apart that most of it would be filled in.
+    dt_s : s, step of the grid.  judges : whether it is a test record, whose free run needs no dense voltage.
+    Raises DataError for any other record whose rows are so far apart that most voltages would be interpolated.
     """
     time_s = measurement.time_s
     apart_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else dt_s
@@ -313,7 +323,8 @@ def _of_sampling(measurement: Measurement, even: Measurement, dt_s: float, *, ju
 
 
 def _refuse(physics: PhysicsModels, name: str, record: FitRecord, hold: Hold) -> None:
-    """Raise what a simulation that may not run empty says, with the record and what an experiment can do about it."""
+    """Raises the SimulationError of a record on which the model runs out of lithium or salt, with the name of the
+    record and the remedies that an experiment has."""
     chosen = physics.chosen
     try:
         for data in (record.logged, record.measurement):
@@ -335,6 +346,8 @@ def _refuse(physics: PhysicsModels, name: str, record: FitRecord, hold: Hold) ->
 
 
 def _effects(config: ExperimentConfig) -> tuple[ActiveEffect, ...]:
+    """The effects of `cell.effects`, from the catalogue and the user's files.  Raises ConfigError for an unknown
+    one."""
     files = [config.path(name) for name in config.cell.effect_files]
     try:
         return activated(config.cell.effects.items(), files)

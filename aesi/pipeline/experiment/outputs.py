@@ -32,17 +32,18 @@ from aesi.sparse.ranking import svd_ranking
 SCHEMA = "aesi.summary/1"
 VERSIONS = ("aesi", "numpy", "scipy", "scikit-learn", "optuna", "mlflow", "prefect")
 SHORT: Mapping[ModelName, str] = {"espm": DECLARED, "dfn": "DFN"}
-"""Names of the physics in tables and figures."""
+"""Kind of the physics -> its name in tables and figures."""
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """The end of an experiment.
+    """The result of an experiment.
 
-    candidates : rows with number, oob, valid, terms, fitness, feasible, front, chosen.
-    chosen : the candidates the models come from, as one.  run_id : of the tracked run.  seconds : wall time so far.
-    failed : why further candidates came to nothing -> how many.  unfitted : a sentence on each baseline that could
-    not be fitted.
+    candidates : one row per evaluated candidate, with number, oob (out-of-bag loss), valid (validation loss), terms,
+    fitness, feasible, front, chosen.  chosen : the candidate that the ensembles come from; several are merged to one.
+    fitted : the models.  evaluation : their figures.  run_id : of the tracked run.  seconds : wall time so far, s.
+    failed : reason -> number of candidates that failed for it.  unfitted : a sentence on each baseline that could not
+    be fitted.
     """
 
     config: ExperimentConfig
@@ -59,14 +60,15 @@ class Result:
 
     @property
     def evaluated(self) -> int:
-        """Candidates of the search, those included that failed."""
+        """Number of candidates of the search, including those that failed."""
         return len(self.candidates) + sum(self.failed.values())
 
     @property
     def best(self) -> str:
-        """The ensemble with the lower validation loss, or the last model where that one is not judged.
+        """Name of the chosen model: the ensemble with the lower validation loss. If the experiment names one ensemble,
+        it is that one; if it names none, the last model.
 
-        Without validation records the loss is that on the left-out pieces; the test chooses nothing.
+        Without validation records the loss is that on the left-out pieces. The test records choose nothing.
         """
         names = [str(row["name"]) for row in self.evaluation.rows]
         judged = [name for name in ENSEMBLES if name in names]
@@ -76,23 +78,24 @@ class Result:
 
     @property
     def ensemble(self) -> SparseModel | None:
-        """The one that `best` names; None where that is another model."""
+        """The ensemble that `best` names; None if it is another model."""
         return self.chosen.named(self.best)
 
     @property
     def corrected(self) -> str:
-        """The physics that corrections are learnt on, which a saved model holds."""
+        """Name of the physics that corrections are learnt on and that a saved model contains."""
         return RECALIBRATED if self.loaded.config.cell.start == "recalibrated" else DECLARED
 
     @property
     def kept(self) -> Fitted | None:
-        """`best` where a model folder can hold it: a sparse model, or the physics by itself; its bands go with it."""
+        """The chosen model if a model folder can hold it (a sparse model, or the corrected physics alone); else None.
+        Its bands are saved with it."""
         one = next(fitted for fitted in self.fitted if fitted.model.name == self.best)
         return one if isinstance(one.model, SparseModel) or self.best == self.corrected else None
 
 
 def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
-    """Write everything below `folder`; returns the content of summary.json."""
+    """Write all outputs of an experiment to `folder` and return the content of summary.json."""
     folder.mkdir(parents=True, exist_ok=True)
     shown = published_by(result.loaded.model)
     rows = [finite({**row, "name": shown(row["name"])}) for row in result.evaluation.rows]
@@ -112,7 +115,7 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
         "notes": list(notes(result)),
         "models": rows,
     }
-    # A sentence on another model than the one that is kept would be told of each prediction by that.
+    # Predictions repeat the finding of the saved model; it is left out if it is about another model than the saved one.
     replace(hybrid(result), finding=finding if result.kept else "").save(folder / MODEL)
     for format, name in TABLES.items():
         write_whole(folder / name, tables.render(rows, format))
@@ -123,7 +126,8 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
 
 
 def notes(result: Result) -> tuple[str, ...]:
-    """Sentences on the data, on terms and models left out, and on intervals that were not calibrated."""
+    """The notes of the report: sentences on the data, on terms and models that were left out, on failed candidates, and
+    on intervals that could not be calibrated."""
     without_intervals = (note for one in result.fitted for note in one.notes)
     alone = f"The saved model is the {result.corrected} alone, without bands: {result.best} cannot be kept with it."
     told = () if result.kept else (alone,)
@@ -134,7 +138,8 @@ def notes(result: Result) -> tuple[str, ...]:
 
 
 def published_by(model: ModelName) -> Callable[[str], str]:
-    """Names a model of the error as the hybrid that it makes with that physics; the physics alone by what it is."""
+    """Function of a model's internal name that returns its name in tables and figures: `PHYSICS + NAME` for a model of
+    the error, and the name of the physics for the physics alone."""
     short = SHORT[model]
 
     def published(name: str) -> str:
@@ -148,7 +153,8 @@ def _published_trace(trace: RecordTrace, shown: Callable[[str], str]) -> RecordT
 
 
 def hybrid(result: Result) -> HybridModel:
-    """The product: physics, effects, the chosen ensemble and its bands; the physics alone where that cannot be kept."""
+    """The hybrid model that is saved: physics, effects, the chosen ensemble with its intervals and bands; the physics
+    alone, without bands, if the chosen model cannot be saved."""
     one = result.kept
     return HybridModel(
         cell=result.loaded.cell,
@@ -164,7 +170,7 @@ def hybrid(result: Result) -> HybridModel:
 
 
 def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
-    """The view that the report is made of."""
+    """The content of the report.  rows : of the models, with their names in tables."""
     genome = result.chosen.genome
     shown = published_by(result.loaded.model)
     return RunView(
@@ -201,7 +207,8 @@ def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
 
 
 def finite(value: Any) -> Any:
-    """The value for JSON: numbers that are not finite become null, tuples lists."""
+    """A value that JSON can hold: numbers that are not finite become None, tuples lists, numpy scalars Python
+    numbers."""
     if isinstance(value, Mapping):
         return {str(key): finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -214,7 +221,8 @@ def finite(value: Any) -> Any:
 
 
 def _terms(result: Result) -> list[dict[str, Any]]:
-    """Terms of both ensembles; the importance is that in the ensemble the product is made of, or else in AESI I."""
+    """One row per term of the two ensembles: coefficients, inclusion probability, and importance in the chosen ensemble
+    (in AESI I if another model is chosen)."""
     chosen = result.chosen
     bagging, stability = chosen.bagging.coefficient_table(), chosen.stability.coefficient_table()
     importance = dict(svd_ranking(result.ensemble or chosen.bagging, result.problem.split.train))

@@ -1,19 +1,20 @@
-"""The physics models that a correction stands beside, each from the training rows alone.
+"""The physics models that a correction is compared with, each fitted to the training rows alone.
 
     ESPM                          as declared
     ESPM, one resistor            one contact resistance fitted
     ESPM, initial state fitted    one shift of the state of charge at the start
     ESPM recalibrated             all of `aesi.pipeline.experiment.recalibrate`
 
-The correction is learned on one of them (`cell.start`). Errors that calibrate bands, and the validation figure, have
-to come from drives that the physics had not seen either, so everything is fitted once more without each training drive,
-where there are several.
+The correction is learnt on the declared or on the recalibrated model (`cell.start`). The errors that calibrate bands,
+and the validation figure, have to be from drives that the physics has not seen either. If there are several training
+drives, all models are therefore fitted once more without each of them.
 
-A record that the recalibration has seen starts where the fit has it, one whose start is given there. Any other one
-starts where the recalibrated cell reads it to start, as it will once it is saved: its potentials are nearer than the
-declared ones. Trained on two drives of an LG M50 with an undeclared hysteresis, potential, loss of lithium, diffusivity
-or loss of material, it leaves 3.2, 18.0, 21.2, 8.7 and 5.4 mV RMS of six others that begin at rest; from the declared
-cell's reading 3.6, 28.7, 22.8, 8.9 and 5.4.
+Initial state of charge of a record under the recalibrated model: a given one is used; a record that the fit has seen
+starts at the fitted one; any other record starts where the recalibrated cell reads it from the voltage, as the saved
+model will. The potentials of the recalibrated cell are closer to the true ones than those of the declared cell. On
+virtual LG M50 cells with an undeclared hysteresis, potential, loss of lithium, diffusivity or loss of material, trained
+on two drives, the model leaves 3.2, 18.0, 21.2, 8.7 and 5.4 mV RMS on six other drives that begin at rest; with initial
+states read by the declared cell it leaves 3.6, 28.7, 22.8, 8.9 and 5.4.
 """
 
 from __future__ import annotations
@@ -41,24 +42,27 @@ from aesi.records import ErrorSeries, Hold, Measurement, Run
 DECLARED = "ESPM"
 RECALIBRATED = "ESPM recalibrated"
 FREE = {"ESPM, one resistor": RESISTOR, "ESPM, initial state fitted": INITIAL_STATE, RECALIBRATED: ALL}
-"""Name -> places in PRIORS of the parameters that are fitted."""
+"""Name of a fitted model -> indices in PRIORS of its fitted parameters."""
 PHYSICS_NAMES = (DECLARED, *FREE)
 
 
 @dataclass(frozen=True, eq=False)
 class PhysicsModels:
-    """by_name : the physics of each name.  start : the name of the one that is corrected."""
+    """The physics models of an experiment.
+
+    by_name : name -> model.  start : name of the model that is corrected.
+    """
 
     by_name: Mapping[str, PhysicsStart]
     start: str
 
     @property
     def chosen(self) -> PhysicsStart:
-        """The physics that the correction is learned on."""
+        """The model that the correction is learnt on."""
         return self.by_name[self.start]
 
     def carried(self, share: float) -> PhysicsModels:
-        """The models with this share of each deviation of the recalibrated one."""
+        """The models, with each deviation of the recalibrated one multiplied by `share`, 0 to 1."""
         whole = self.by_name[RECALIBRATED]
         if share == 1.0:
             return self
@@ -68,36 +72,42 @@ class PhysicsModels:
         return replace(self, by_name={**self.by_name, RECALIBRATED: moved})
 
     def begin(self, name: str, record: FitRecord, hold: Hold) -> tuple[float, float]:
-        """State of charge at the first row, in the windows of the named physics, and its standard deviation where it
-        was read from a voltage, else zero."""
+        """(state of charge at the first row, in the stoichiometry windows of the named model; its standard deviation if
+        it was read from a voltage, else 0)."""
         if (read := self.own_reading(name, record, hold)) is not None:
             return read.soc, read.read_sd
         return self.by_name[name].soc0(record.soc0), record.soc0_sd
 
     def own_reading(self, name: str, record: FitRecord, hold: Hold) -> InitialState | None:
-        """Where the named physics itself reads the record to start; None where it starts as declared.
+        """The initial state that the named model itself reads from the voltage of the record; None if the state that
+        the declared cell reads is used.
 
-        Baselines start as declared: what is fitted of them may be the shift of just this reading. So does a record
-        whose start is given, and one whose voltage belongs to no state of the cell as recalibrated.
+        Only the recalibrated model reads it itself. The other fitted models have few free parameters, one of which may
+        be the shift of just this reading. The declared reading is also used for records that the fit has seen, and for
+        a record whose voltage belongs to no state of the recalibrated cell.
         """
         if name != RECALIBRATED or record.begins is None or record.rows.any():
             return None
         each = self.by_name[name]
         try:
             return record.begins.under(each.cell, each.effects, hold, each.model)
-        except DataError:  # by the declared cell it does
+        except DataError:  # the voltage belongs to a state of the declared cell only
             return None
 
     def run(self, name: str, record: FitRecord, hold: Hold, rows: Measurement | None = None) -> Run:
-        """The record under the named physics, from where that has it start; at the given rows of it, its even ones by
-        default."""
+        """A simulation of the record with the named model, from its initial state (`begin`).
+
+        rows : the rows to simulate, by default those on the even time grid.
+        """
         soc0, _ = self.begin(name, record, hold)
         return self.by_name[name].run(record.measurement if rows is None else rows, soc0, hold)
 
     def series(self, record: FitRecord, dt_s: float, hold: Hold) -> tuple[ErrorSeries, bool]:
-        """The error of the chosen physics along a record, what the others say beside it, and whether it ran empty.
+        """(error series of the chosen model along a record, with the voltages of the other models; whether the chosen
+        model ran out of lithium or salt).
 
-        Voltages are simulated at the rows as they were logged; what a correction reads, at the even ones.
+        Voltages are simulated at the rows as they were logged and then resampled as the measured ones were. The inputs
+        of a correction are simulated at the rows of the even grid.
         """
         runs = {name: self.run(name, record, hold, record.logged) for name in self.by_name}
         says = {name: each.voltage_v for name, each in runs.items()}
@@ -105,7 +115,7 @@ class PhysicsModels:
         series = replace(error_series(record.logged, read[0], dt_s), physics=says)
         if record.logged is not record.measurement:
             read.append(self.run(self.start, record, hold))
-            # No correction is asked at these rows.
+            # No correction is evaluated at the logged rows, so that their inputs do not matter.
             own = replace(series, inputs=record.logged.current_a[:, None], input_names=("I",))
             series = as_resampled(error_series(record.measurement, read[1], dt_s), own)
         series = replace(
@@ -118,10 +128,11 @@ class PhysicsModels:
         return series, any(_ran_out_s(run) is not None for run in read)
 
     def with_slopes(self, series: ErrorSeries, record: FitRecord, hold: Hold) -> ErrorSeries:
-        """The series of the record with what each parameter of the chosen physics, and its start, is worth along it."""
+        """The series of the record with the change of the voltage by one prior standard deviation of each parameter of
+        the chosen model (`slopes_v`), and by one of an initial state that was read from a voltage (`start_v`)."""
         chosen, data = self.chosen, record.measurement
         soc0, soc0_sd = self.begin(self.start, record, hold)
-        # Neighbours are told apart at the even rows, where each is simulated.
+        # Differences are taken at the rows of the even grid, where the changed models are simulated as well.
         model_v = chosen.run(data, soc0, hold).voltage_v
         slopes = slopes_v(chosen.cell, chosen.effects, data, soc0, hold, chosen.model, model_v)
         begins_v = None
@@ -131,7 +142,7 @@ class PhysicsModels:
 
 
 def _ran_out_s(run: Run) -> float | None:
-    """s, when a run is first held where it ran empty or full; None where it never is."""
+    """Time of the first row at which a run is held at the limit of depletion, s; None if it never is."""
     out = run.series["depleted"] > 0.0
     return float(run.time_s[np.argmax(out)]) if out.any() else None
 
@@ -147,9 +158,10 @@ def physics_models(
     *,
     own_charges: bool,
 ) -> PhysicsModels:
-    """All physics models, fitted to the rows that the records admit; start : "declared" or "recalibrated".
+    """All physics models, fitted to the open rows of the records.
 
-    begin : fitted to nearly the same rows.  own_charges : see `recalibrate`.
+    start : the model that is corrected, "declared" or "recalibrated".  begin : models fitted to nearly the same rows,
+    from which the fits begin.  model : kind of the physics.  own_charges : see `recalibrate`.
     """
     known = {} if begin is None else begin.by_name
     fitted = {
@@ -161,7 +173,7 @@ def physics_models(
 
 
 def without(records: Mapping[str, FitRecord], name: str, rows: slice) -> dict[str, FitRecord]:
-    """The records with the given rows of one of them kept from the fit."""
+    """The records with the given rows of one of them closed to fits."""
     seen = records[name].rows.copy()
     seen[rows] = False
     return {**records, name: replace(records[name], rows=seen)}
@@ -170,5 +182,5 @@ def without(records: Mapping[str, FitRecord], name: str, rows: slice) -> dict[st
 def no_rows(
     measurement: Measurement, soc0: float, soc0_sd: float = 0.0, begins: Beginning | None = None
 ) -> FitRecord:
-    """A record of which no fit sees anything yet."""
+    """A record all of whose rows are closed to fits.  The arguments are those of `FitRecord`."""
     return FitRecord(measurement, soc0, np.zeros(len(measurement), dtype=bool), soc0_sd, begins)

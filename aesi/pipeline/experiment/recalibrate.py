@@ -1,31 +1,35 @@
-"""The physics model refitted to the training part of an experiment: what any correction has to be better than.
+"""Recalibration: the physics refitted to the training data of an experiment, which a correction has to outdo.
 
-    minimise  sum_k (V_k - V(x)_k)**2 dt / (s**2 T)  +  sum_j (x_j / d_j)**2
+    minimise  sum_k (V_k - V(x)_k)**2 dt / (s**2 T)  +  sum_j (x_j / d_j)**2                              (1)
 
-over the initial state of charge (one shift for all records), the contact resistance, factors of the solid
-diffusivities, of the reaction rates and of the electrolyte's conductivity and diffusivity, the balance of the
-electrodes, and the shape of their potentials over the state of charge. d_j is what a parametrisation leaves open that
-is to serve other drives as well (`deviations.PRIORS`), s what the model misses anyway, about what the fit leaves but
-no less than 10 mV, T the time over which it misses the same.
+over the initial state of charge (one shift for all records), the contact resistance, factors on the solid
+diffusivities, on the rate constants and on the electrolyte's conductivity and diffusivity, the balance of the
+electrodes, and the shape of their potentials over the state of charge. d_j is the prior standard deviation of a
+parameter: what a parametrisation leaves open that is to serve other drives as well (`deviations.PRIORS`). s is the
+model error, about what the fit leaves but at least 10 mV. T is the correlation time of the model error.
 
-All of it was measured by the squared error that it takes off drives not trained on, over the ten development splits
-of the NMC drive in `aesi bench splits` (mean, worst). A drive says little of the charge until it ends, so the initial
-state and the balance are held tightly: 0.003 instead of 0.001 and 0.001 instead of 0.0003 lose 8 and 1 points, and a
-balance held to 0.01 ran parts of a discharge that no training drive had reached into volts. Without the potentials,
-what these lack goes into the rates, which then err elsewhere: 37 and 5 % with rates of 0.3 and salt of 0.3 and no
-potentials, 48 and -2 % with them, 52 and 10 % with rates of 0.2, 55 and 29 % with rates of 0.15 and a diffusivity of
-the salt of 0.5. From there it is flat: 54 to 56 and 25 to 33 % for rates of 0.1 to 0.2, salt of 0.5 to 1, and
-potentials of 0.5 to 0.7.
+The priors were chosen by the reduction of the squared error on drives that were not trained on, over the ten
+development splits of the NMC drive in `aesi bench splits`; pairs of figures below are its mean and its worst value.
 
-Records of other days are of a cell with another charge. Near empty, where potentials fall, that is tens of millivolts
-of either sign, which no parameter of the cell explains and all of them would follow. So each of several records may
-have a charge of its own, x_r ~ N(0, OWN_CHARGE**2), integrated out: what is squared is
+- A drive determines the state of charge poorly before its end. The initial state and the balance of the electrodes
+  therefore have narrow priors: 0.003 instead of 0.001 and 0.001 instead of 0.0003 lose 8 and 1 percentage points. With
+  0.01 for the balance, the model failed by volts on parts of a discharge that no training drive had reached.
+- If the potentials are not fitted, their error is attributed to the rate constants, which are then wrong elsewhere. The
+  reduction is 37 and 5 % with priors of 0.3 on the rate constants and 0.3 on the electrolyte and without the
+  potentials, 48 and -2 % with them, 52 and 10 % with 0.2 on the rate constants, 55 and 29 % with 0.15 on these and 0.5
+  on the electrolyte's diffusivity. Around these it is flat: 54 to 56 and 25 to 33 % for 0.1 to 0.2 on the rate
+  constants, 0.5 to 1 on the electrolyte, and 0.5 to 0.7 on the potentials.
 
-    (1 + g_r g_r')**(-1/2) residual_r
+Records of different days may begin with different charges. Near empty, where the potentials are steep, the difference
+is tens of millivolts of either sign. No parameter of the cell explains it, and a fit would move all parameters to
+follow it. Each of several records therefore has an initial state of charge of its own, x_r ~ N(0, OWN_CHARGE**2), which
+is integrated out analytically: the squared residual in (1) is that of
 
-with g_r the slope of its weighted residual on x_r / OWN_CHARGE by the declared physics. Where all drives are of one
-record nothing is taken out: they have the charge that was fitted. Nor is it where a single parameter is open: that is a
-baseline, as strong as the records make it, and an initial state that is fitted is that charge.
+    (1 + g_r g_r')**(-1/2) residual_r                                                                     (2)
+
+where g_r is the derivative of the weighted residual by x_r / OWN_CHARGE with the declared physics. (2) is not used if
+all drives are from one record, which has one initial state. Nor is it used for a fit of a single parameter. Such a fit
+is a baseline, which should be as strong as the records allow, and a fitted initial state already is this charge.
 """
 
 from __future__ import annotations
@@ -54,39 +58,43 @@ from aesi.pipeline.product.deviations import (
 from aesi.records import Hold, Measurement
 
 MODEL_ERROR_V = 0.01
-"""Least s, V. Models of measured cells leave 4 to 13 mV, geometric mean 9, on eight development records of `aesi
-bench real`."""
+"""Least model error s of (1), V. Models of measured cells leave 4 to 13 mV, with a geometric mean of 9, on eight
+development records of `aesi bench real`."""
 MEMORY_S = 100.0
-"""T, s, within the integral correlation times of those errors, 45 to 670 s. Over the splits above a recalibration
-takes 4.1 points less off the squared error (3.6 at worst) with half of it, 3.0 (6.3) with twice."""
+"""Correlation time T of (1), s. It is within the integral correlation times of those errors, 45 to 670 s. Over the
+splits above a recalibration reduces the squared error by 4.1 percentage points less (3.6 on the worst split) with half
+of it, and by 3.0 less (6.3) with twice."""
 EVERY_S = 5.0
-"""s between the rows that are fitted, short against T."""
+"""Time between the rows that are fitted, s; short against T."""
 ROUNDS = 8
 ROUNDS_AGAIN = 3
-"""Gauss-Newton steps at most, from the declared cell and from a fit to nearly the same rows: with four no split of the
-NMC drive or the M50T's changes by 0.1 %."""
+"""Most Gauss-Newton steps of a fit that begins with the declared cell, and of one that begins with a fit to nearly the
+same rows. With four of the latter no split of the NMC's or the M50T's drive changes by 0.1 %."""
 OWN_CHARGE = LOSS_SD
-"""Deviation of the state of charge of a record, by what a day makes of a cell. Over the drives that train the
-development splits of `aesi bench splits`, each left out in turn, a recalibration takes 45.7 % off the declared model's
-squared error on the Panasonic (24.6 at worst) and 7.0 on the LG HG2 (-13.9), without it 38.1 (8.7) and -16.5 (-58.7);
-off the tests of these splits 39.6 and 17.7 %, without it 40.5 and 18.7. With 0.003 and 0.01 the HG2's drives without
-the LA92 are left with 361 and 327 mV**2 instead of 330 (before the share that carries over), the Panasonic's with 828
-and 819 instead of 818."""
+"""Standard deviation of a record's own initial state of charge, (2): that of the loss of a cell within a day. Over the
+drives that train the development splits of `aesi bench splits`, each left out in turn, a recalibration reduces the
+declared model's squared error by 45.7 % on the Panasonic (24.6 on the worst drive) and by 7.0 % on the LG HG2 (-13.9);
+without (2) by 38.1 (8.7) and -16.5 (-58.7). On the test drives of these splits it is 39.6 and 17.7 %, without (2) 40.5
+and 18.7. With 0.003 and 0.01 instead, the HG2's drives other than the LA92 are left with 361 and 327 mV**2 instead of
+330 (before the share that carries over), the Panasonic's with 828 and 819 instead of 818."""
 SETTLED = 1.1
-"""s has settled once a fit leaves no more than this many times the s that it was made with. Held at 10 mV, a fit to the
-drive of an LFP cell, whose declared model misses 67, moved the start by 9 deviations and its C/20 from 30 to 216 mV
-off; with s of what is left, by less than 1.2 and to 74. Of ten development splits of the NMC drive and two of the LG
-HG2 one changes: parts 4 and 5 take 60.0 instead of 57.2 % off the others."""
+"""s is accepted once the error that a fit leaves is at most this many times the s that it was made with; otherwise the
+fit is repeated with a larger s. With s fixed at 10 mV, a fit to the drive of an LFP cell, on which the declared model
+errs by 67 mV, moved the initial state by 9 prior standard deviations and the error on the C/20 discharge from 30 to 216
+mV; with the s of this rule it is less than 1.2 standard deviations, and 74 mV. Of ten development splits of the NMC
+drive and two of the LG HG2 one changes: training on parts 4 and 5 reduces the squared error on the others by 60.0
+instead of 57.2 %."""
 GAIN = 0.05
-"""Least gain of a step, as a share of the cost, before a descent ends. With ten times less no split changes by 0.1
+"""Least gain of a step, as a share of the cost; a descent ends below it. With a tenth of it no split changes by 0.1
 %."""
 
 
 @dataclass(frozen=True, eq=False)
 class Beginning:
-    """What tells where a record starts.
+    """What the initial state of a record is read from.
 
-    measured : its rows as they were logged.  given : the state of charge that was given, or None; shared : for several.
+    measured : the record as logged.  given : the given state of charge at its first row, 0 to 1, or None.
+    shared : whether it was given for several records.
     """
 
     measured: Measurement
@@ -96,18 +104,20 @@ class Beginning:
     def under(
         self, cell: Cell, effects: tuple[ActiveEffect, ...], hold: Hold, model: ModelName
     ) -> InitialState:
-        """Where it starts by that cell.  Raises DataError where its voltage belongs to no state of it."""
+        """The initial state of the record by a cell.  Raises DataError if its voltage belongs to no state of the
+        cell."""
         return initial_state(cell, self.measured, self.given, hold, effects, shared=self.shared, model=model)
 
 
 @dataclass(frozen=True, eq=False)
 class FitRecord:
-    """An evenly sampled record, its state of charge at the start by the declared cell, and the rows that a fit may look
-    at.
+    """A record on an even time grid, and the rows of it that fits may see.
 
-    soc0_sd : standard deviation of a start that was read from a voltage; 0 for others.
-    begins : for another cell to tell where it starts; None where soc0 is all that is known.
-    lost_v : (n,) V that resampling takes from the voltage of the declared model, see `as_declared`; None where nothing.
+    soc0 : state of charge at the first row by the declared cell, 0 to 1.  rows : (n,), True where a fit may see the
+    row.
+    soc0_sd : standard deviation of soc0 if it was read from a voltage, else 0.
+    begins : what another cell reads its own initial state from; None if only soc0 is known.
+    lost_v : (n,) V, change of the declared model's voltage by the resampling (`as_declared`); None if there is none.
     """
 
     measurement: Measurement
@@ -119,22 +129,23 @@ class FitRecord:
 
     @property
     def logged(self) -> Measurement:
-        """The rows as they were logged; the even ones where these are all that is known."""
+        """The record as logged; that on the even grid if no other is known."""
         return self.measurement if self.begins is None else self.begins.measured
 
     @property
     def voltage_v(self) -> Array:
-        """(n,) V for a simulation of the even rows to give: as measured, less what resampling did to it."""
+        """The voltage that a simulation on the even grid should give, (n,) V: the measured one minus the change by the
+        resampling."""
         return self.measurement.voltage_v - (0.0 if self.lost_v is None else self.lost_v)
 
     def as_declared(self, declared: PhysicsStart, hold: Hold) -> FitRecord:
-        """The record with what resampling does to the declared model: its voltage at the rows as logged, brought to the
-        stamps as the measured one was, less its voltage by a simulation of the stamps.
+        """The record with the change of the voltage by the resampling (`lost_v`), computed with the declared model: its
+        voltage at the logged rows, resampled as the measured one was, minus its voltage when simulated on the grid.
 
-        Other physics are fitted with the same, so that a fit need not simulate all rows. Two drives of a Panasonic
-        18650PF in rows of 0.1 s, simulated one deviation off in everything with 1 mV of noise, and fitted in steps of
-        1 s: this leaves 1.1 to 1.2 mV RMS at the rows of them and of three others, worked out again for what was
-        fitted 1.1 to 1.15, and nothing taken off 1.4 to 2.6.
+        All fits use this change, so that they need not simulate the logged rows. Test: two drives of a Panasonic
+        18650PF with rows of 0.1 s, simulated with all parameters one standard deviation off and 1 mV of noise, and
+        fitted in steps of 1 s. The fit leaves 1.1 to 1.2 mV RMS at the rows of these and of three other drives; with
+        the change computed again for the fitted model 1.1 to 1.15, and without it 1.4 to 2.6.
         """
         if self.logged is self.measurement:
             return self
@@ -156,11 +167,12 @@ def recalibrate(
     *,
     own_charges: bool = False,
 ) -> PhysicsStart:
-    """The declared physics with its free parameters fitted to the records' rows and to what was known of them.
+    """The declared physics with its free parameters fitted to the open rows of the records and to the priors, (1).
 
-    begin : a fit of the same parameters to nearly the same rows, from which few rounds are enough.
-    own_charges : the training drives are of several records, each with a charge of its own.
-    The declared physics comes back where no row may be looked at, or nothing can be simulated.
+    free : indices in PRIORS of the fitted parameters.  begin : a fit of the same parameters to nearly the same rows,
+    from which fewer steps are sufficient.  model : kind of the physics.  own_charges : whether the training drives are
+    from several records, each with an initial state of charge of its own, (2).
+    Returns the declared physics if no row is open, or if it cannot be simulated.
     """
     fit = _Fit(
         declared,
@@ -198,30 +210,34 @@ class _Fit:
     error_v: float = MODEL_ERROR_V
 
     def missed_v(self, z: Array) -> float:
-        """V RMS that the model misses, at deviations z (n_free,) that it can be simulated at."""
+        """RMS error of the model at the deviations z, V.
+
+        z : (n_free,) in prior standard deviations, at which the model can be simulated.
+        """
         left = self._left(z)
         assert left is not None
-        _, every_s = _spacing(self.records[0].measurement)  # all are evenly sampled alike
+        _, every_s = _spacing(self.records[0].measurement)  # all records have the same time step
         return self.error_v * float(np.sqrt(np.mean(left**2) * MEMORY_S / every_s))
 
     def bounds(self) -> tuple[Array, Array]:
-        low, high = np.full(len(PRIORS), -np.inf), np.full(len(PRIORS), np.inf)  # the prior is bound enough
+        low, high = np.full(len(PRIORS), -np.inf), np.full(len(PRIORS), np.inf)  # the priors limit the others
         contact = RESISTOR[0]
         low[contact] = -self.declared.contact_resistance_ohm / self._ohm()
         return low[self.free], high[self.free]
 
     def physics(self, z: Array) -> PhysicsStart:
-        """z : (n_free,) deviations."""
+        """The physics with its parameters changed by z, (n_free,) prior standard deviations."""
         moved = deviating(self.declared, self.effects, self.free, z, self.model)
         return replace(moved, missed_v=self.error_v)
 
     def residual(self, z: Array) -> Array | None:
-        """(m + n_free,): what is left of the voltages and of what was known, in deviations."""
+        """Residuals of the voltages and of the priors, (m + n_free,) in standard deviations; None if the model cannot
+        be simulated."""
         left = self._left(z)
         return None if left is None else np.concatenate([left, z])
 
     def slopes(self, z: Array, residual: Array) -> Array | None:
-        """(m + n_free, n_free) of the residual."""
+        """Derivatives of the residual, (m + n_free, n_free); None if the model cannot be simulated nearby."""
         left = residual[: -len(z)]
         slopes = np.empty((len(left), len(z)))
         for j, bounds in enumerate(zip(*self.bounds(), strict=True)):
@@ -232,7 +248,7 @@ class _Fit:
         return np.vstack([slopes, np.eye(len(z))])
 
     def _left(self, z: Array) -> Array | None:
-        """Residual of the voltages, in deviations; None where the model fails."""
+        """Residuals of the voltages, (m,) in standard deviations; None if the model cannot be simulated."""
         try:
             physics = self.physics(z)
             parts = [self._of(physics, record) for record in self.records]
@@ -252,7 +268,8 @@ class _Fit:
 
     @cached_property
     def _own_v(self) -> dict[str, Array]:
-        """Record -> (n,) V a deviation of a charge of its own, by the declared physics."""
+        """Record -> change of the voltage by one standard deviation of its own initial state of charge, (n,) V, with
+        the declared physics."""
         step = OWN_CHARGE / PRIORS[INITIAL_STATE[0]].prior_sd
         more, less = (
             deviating(self.declared, self.effects, INITIAL_STATE, np.array([z]), self.model)
@@ -267,19 +284,19 @@ class _Fit:
         }
 
     def _ohm(self) -> float:
-        """One deviation of the contact resistance."""
+        """One prior standard deviation of the contact resistance, ohm."""
         return PRIORS[RESISTOR[0]].prior_sd / self.declared.nominal_capacity_ah
 
 
 def _spacing(data: Measurement) -> tuple[int, float]:
-    """(number of rows, time in s) between two fitted rows."""
+    """Number of rows, and time in s, from one fitted row to the next."""
     dt_s = float(data.time_s[1] - data.time_s[0])
     every = max(1, round(EVERY_S / dt_s))
     return every, every * dt_s
 
 
 def _without_own(left: Array, own: Array) -> Array:
-    """(m,) `left` scaled along `own`, of which it holds a multiple that is a standard normal deviate."""
+    """The residual of (2), (m,).  left : (m,) weighted residual.  own : g_r of (2), (m,)."""
     square = float(own @ own)
     if not square > 0.0:
         return left

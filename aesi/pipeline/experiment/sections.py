@@ -1,7 +1,7 @@
-"""The sections of an experiment file: what each may say, and what of it cannot be.
+"""The sections of an experiment file: their keys, defaults and admissible values.
 
-The docstring of a section describes each of its keys, `key : unit, meaning`; the table of keys in the documentation is
-made of these and of the fields.
+The docstring of a section describes each of its keys as `key : unit, meaning`. The table of keys in the documentation
+is generated from these descriptions and from the fields.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ Positive = Annotated[float, Field(gt=0)]
 Weight = Annotated[float, Field(ge=0)]
 Count = Annotated[int, Field(ge=1)]
 SHORT_FOR = {"cell": "bpx"}
-"""Section that may be a text alone, in a file or below `fallback` -> the key that the text is the value of."""
+"""Section that may be written as a single text, also below `fallback` -> key that the text is the value of."""
 
 
 class Section(BaseModel):
-    """Base of all sections: frozen, and unknown keys are refused."""
+    """Base of all sections: immutable; unknown keys and values that are not finite are refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     @field_validator("*", mode="wrap")
     @classmethod
     def _true_is_no_number(cls, value: Any, validated: ValidatorFunctionWrapHandler) -> Any:
-        """Refuse true and false, which are 1 and 0 to Python, where numbers are asked for."""
+        """Refuse true and false where a number is required; Python would take them as 1 and 0."""
         taken = validated(value)
         if (said := _taken_for_a_number(value, taken)) is not None:
             raise ValueError(f"{str(said).lower()} is no number; give one")
@@ -49,7 +49,7 @@ class Section(BaseModel):
 
 
 def _taken_for_a_number(given: object, taken: object) -> bool | None:
-    """The first truth value of what was given that was taken for something else; None without one."""
+    """The first true or false in `given` that validation has turned into another type in `taken`; None without one."""
     if isinstance(given, bool):
         return None if isinstance(taken, bool) else given
     pairs: Iterable[tuple[object, object]] = ()
@@ -62,13 +62,14 @@ def _taken_for_a_number(given: object, taken: object) -> bool | None:
 
 
 class RepeatsConfig(Section):
-    """One record that repeats a schedule, cut into its repeats (numbered from 1).
+    """One record that repeats a schedule, cut into its repeats, which are numbered from 1.
 
-    period_s : s, length of a repeat.
-    train : repeats that are trained on.  test : repeats that the finished models meet.
-    valid_share : the last share of every training repeat, which validates, so that validation spans the state of
-    charge; with 0 the search validates on contiguous pieces of the training repeats in turn, each by models that have
-    not seen it.
+    period_s : s, duration of a repeat.
+    train : numbers of the repeats that are trained on.
+    test : numbers of the repeats that the finished models are tested on.
+    valid_share : share of every training repeat, at its end, that validates, so that validation spans the state of
+    charge. With 0 the search validates on contiguous pieces of the training repeats in turn, each predicted by models
+    that have not seen it.
     """
 
     period_s: Positive
@@ -91,15 +92,16 @@ class RepeatsConfig(Section):
 
 
 class VirtualConfig(Section):
-    """How a virtual measurement is made, of kind `virtual`: the paper's profiles on a cell that has more than the ESPM.
+    """How virtual measurements are made (`data.kind: virtual`): PyBaMM simulates the paper's profiles on a cell with
+    effects that the declared cell lacks.
 
-    model : what PyBaMM simulates, the porous electrode or one particle an electrode.
-    effects : what the cell has beyond its declared parameters; None for the laboratory's default mix.
-    magnitude : size of these effects; 1 is typical.
-    values : parameters of an effect, by its id and their names, in place of the typical ones.
+    model : model of the virtual cell, `DFN` (porous electrode) or `SPMe` (single particle).
+    effects : ids of the effects that the virtual cell has and the declared cell lacks; None takes the default mix.
+    magnitude : factor on the size of these effects; 1 is typical.
+    values : parameters of effects, as `{id: {parameter: value}}`, in place of the typical ones.
     pulse_c : C, rate of the charge pulse after each training schedule.
-    other_load : times the vehicle's current in the validation and test schedules; 2 takes them to 3.1C.
-    seed : of the sensor's noise.
+    other_load : factor on the vehicle's current in the validation and test schedules; 2 takes them to 3.1C.
+    seed : random seed of the sensor noise.
     """
 
     model: Literal["DFN", "SPMe"] = "DFN"
@@ -112,33 +114,33 @@ class VirtualConfig(Section):
 
 
 READING_KEYS = ("columns", "units", "sign", "state_words", "duplicates", "from_s", "to_s")
-"""Keys of a data section that say how its files are read."""
+"""Keys of the section `data` that say how files are read."""
 
 
 class DataConfig(Section):
-    """Records by role, or one record cut by repeats.
+    """The records by role, or one record that is cut into repeats.
 
-    kind : where records are from: `files`, paths of measurement files; `catalogue`, names of records of a data set;
-    `virtual`, the paper's profiles on a simulated cell, which have their roles already.
-    set : the data set, of kind `catalogue` (`aesi data list`).
+    kind : source of the records: `files` (paths of measurement files), `catalogue` (names of records of a data set), or
+    `virtual` (the paper's profiles on a simulated cell, whose roles are fixed).
+    set : name of the data set, with kind `catalogue` (`aesi data list`).
     record : the one file or record that `repeats` cuts, in place of `train`, `valid` and `test`.
-    repeats : how `record` is cut into what trains and what tests.
+    repeats : how `record` is cut into repeats that train and test.
     train : files or records that are trained on.
-    valid : those on which the search validates its candidates; without any it takes parts of the training records.
-    test : those that the finished models meet once.
-    dt_s : s, step to which the records are brought, which is that of the correction and of its bands.
-    hold : how the current runs between rows. A discovery takes it where it is given here, unless `discover.hold` says
-    otherwise.
-    columns : quantity, or `state`, `cycle`, `step`, and the file's name for it; `state` is the column that gives a
-    current its sign, None leaves out the temperature, and a number states it.
-    units : quantity and unit of the file's column (`mA`, `mV`, `h`, `K`, `h:m:s`, `date` or a pattern).
-    sign : which direction of the file's current is positive; None takes that of a known export, else discharge.
-    state_words : words of the state column that are not known, and what each means.
-    duplicates : which of several rows with one stamp is kept; None takes the first in a known export and refuses
-    others.
-    from_s : s, rows from this time on, by record (`{drive.csv: 600}`), as `--from-s` takes them.
-    to_s : s, rows up to this time, by record, as `--to-s` takes them.
-    virtual : the virtual cell, of kind `virtual`.
+    valid : files or records on which the search validates its candidates; without any, parts of the training records.
+    test : files or records that the finished models are tested on, once.
+    dt_s : s, time step to which the records are resampled; also that of the correction and of its bands.
+    hold : current between rows, `backward` (constant since the row before) or `linear`. A discovery uses it only if it
+    is given here, and `discover.hold` takes precedence.
+    columns : columns of the files, as `{quantity: name}`, for a quantity, `state`, `cycle` or `step`. `state` is the
+    column that gives a current its sign. For the temperature, None leaves it out and a number states it, degC.
+    units : units of columns, as `{quantity: unit}` (`mA`, `mV`, `h`, `K`, `h:m:s`, `date` or a strptime pattern).
+    sign : direction in which the files' current is positive; None takes that of a known export, else discharge.
+    state_words : meaning of unknown words in the state column, as `{word: charge}`, `discharge` or `rest`.
+    duplicates : which of several rows with the same time is used; None takes the first in a known export, and refuses
+    them in any other file.
+    from_s : s, rows from this time on are used, as `{drive.csv: 600}` by record (`--from-s` of the commands).
+    to_s : s, rows up to this time are used, by record (`--to-s` of the commands).
+    virtual : the virtual measurements, with kind `virtual`.
     """
 
     kind: Literal["files", "catalogue", "virtual"]
@@ -194,7 +196,7 @@ class DataConfig(Section):
         return self
 
     def reading(self, name: str) -> Reading:
-        """How the file of a record is read."""
+        """The options with which the file of a record is read."""
         return Reading(
             self.columns,
             self.units,
@@ -207,34 +209,35 @@ class DataConfig(Section):
 
     @property
     def listed(self) -> tuple[str, ...]:
-        """The records that it names, of whatever role."""
+        """All records that the section names, in any role."""
         return (self.record,) if self.record else (*self.train, *self.valid, *self.test)
 
     @property
     def declared_hold(self) -> Hold | None:
-        """How the current runs between rows where that is said; None where the default stands."""
+        """`hold` if the file gives it; None if it has its default."""
         return self.hold if "hold" in self.model_fields_set else None
 
     @property
     def has_roles(self) -> bool:
-        """Whether there is something to train on and something to test on."""
+        """Whether the section has training and test records."""
         return self.kind == "virtual" or self.repeats is not None or bool(self.train and self.test)
 
 
 class CellConfig(Section):
-    """The cell: what it is declared to be, and the physics that a correction starts from.
+    """The declared cell, and the physics that a correction is learnt on.
 
-    bpx : a BPX file, the folder of a saved model (its cell and effects), or `catalogue` for the cell that belongs to
-    the data set; `cell: PATH` alone is short for it.
-    soc0 : state of charge at the first row, of several records that of all whose voltage does not contradict it; None
-    finds it from the voltage.
-    soh : share of the file's capacity that the cell had when it was measured, or that day; None takes all of it.
-    model : `espm`, one particle an electrode, or `dfn`, the porous electrode; None takes that of a saved model, or
-    that the file was fitted with, else `espm`.
-    effects : effects added to the declared cell, by id, each with its parameters.
-    effect_files : Python files that hold effects of the user's own; they are run, so name only files that you trust.
-    start : the physics that the correction is learned on: the cell as declared, or recalibrated on the training
-    records. The tables show both.
+    bpx : a BPX file, the folder of a saved model (its cell and effects), or `catalogue` for the cell file of the data
+    set. `cell: PATH` is short for `cell: {bpx: PATH}`.
+    soc0 : state of charge at the first row, 0 to 1; with several records, of all whose voltage does not contradict it.
+    None reads it from the voltage.
+    soh : state of health, as a share of the file's capacity or as the day of the measurement; None takes the file's
+    capacity.
+    model : `espm` (single particle) or `dfn` (porous electrode); None takes that of a saved model, or the one that the
+    file was fitted with, else `espm`.
+    effects : effects added to the declared cell, as `{id: {parameter: value}}`.
+    effect_files : Python files with the user's own effects. They are run: name only files that you trust.
+    start : physics that the correction is learnt on, the cell as declared or recalibrated on the training records. The
+    tables show both.
     """
 
     bpx: str = "catalogue"
@@ -248,25 +251,25 @@ class CellConfig(Section):
     @model_validator(mode="before")
     @classmethod
     def _path_alone(cls, value: object) -> object:
-        """`cell: found/model` is short for `cell: {bpx: found/model}`."""
+        """Accept `cell: found/model`, which is short for `cell: {bpx: found/model}`."""
         return {SHORT_FOR["cell"]: value} if isinstance(value, str) else value
 
 
 class LibraryConfig(Section):
-    """The candidate terms that the search may choose from.
+    """The library: the candidate terms that the search may choose from.
 
-    p_c : range of the highest order of a polynomial of one variable; its upper end makes the library.
-    d : range of the total degree of a product; its upper end makes the library.
-    factors : most variables in a product.
-    special : whether there are trigonometric and hyperbolic functions.
-    mixed : whether there are their products with first-order terms.
-    inputs : variables of the terms, `I` among them; None takes the paper's (`I`, `c_sp`, `c_sn`, `c_e0`,
-    `c_eL`). Beside these there are `soc`, `I_next`, the current that flows while the predicted error arises, and such
-    as `I_60s`, the current through a low-pass of so many seconds.
-    feedback : whether terms may hold the error itself, which then feeds back in free run.
-    fade : whether a correction without such terms gives way to the physics where left-out drives do not bear it out.
+    p_c : range of the highest order of a polynomial in one variable; its upper end limits the library.
+    d : range of the total degree of a product; its upper end limits the library.
+    factors : largest number of variables in a product.
+    special : whether the library has trigonometric and hyperbolic functions.
+    mixed : whether it has products of these functions with first-order terms.
+    inputs : variables of the terms, `I` (current) among them; None takes those of the paper (`I`, `c_sp`, `c_sn`,
+    `c_e0`, `c_eL`). Further ones are `soc`, `I_next` (the current that flows while the predicted error arises), and the
+    current through a low-pass filter, such as `I_60s` with a time constant of 60 s.
+    feedback : whether terms may contain the error itself, which then feeds back in free run.
+    fade : whether a correction without feedback gives way to the physics where left-out drives do not support it.
 
-    The defaults are for measured cells, all alike; they were chosen over the development splits of `aesi bench splits`.
+    The defaults are for all measured cells. They were chosen over the development splits of `aesi bench splits`.
     `experiments/virtual_30ah.yaml` has the paper's library.
     """
 
@@ -295,30 +298,30 @@ class LibraryConfig(Section):
 
 
 class SearchConfig(Section):
-    """The evolutionary search, in the paper's symbols.
+    """The evolutionary search for a correction, with the symbols of the paper.
 
-    candidates : how many are evaluated.
-    population : candidates in a generation.
-    resamples : bootstrap resamples, which every candidate is fitted to.
-    block : rows, of a bootstrap block; None takes 500, or a tenth of the training rows where these are few.
-    horizon : rows, of a free run inside the losses; None takes a block.
-    fold : rows, of the pieces that validate in turn where no records are set aside for it; None takes whole training
-    records, halves of training repeats, or an eighth of a single record.
-    regime : what the losses measure, errors in free run or one step ahead.
-    top_share : share of the resamples, the best of which make an ensemble, and of the candidates, the fittest of which
-    are averaged where corrections are not shrunk (`library.fade`).
+    candidates : number of candidates that are evaluated.
+    population : number of candidates in a generation.
+    resamples : number of bootstrap resamples that every candidate is fitted to.
+    block : rows, length of a bootstrap block; None takes 500, or a tenth of the training rows if these are few.
+    horizon : rows, length of a free run in the losses; None takes that of a block.
+    fold : rows, length of the pieces that validate in turn if there are no validation records; None takes whole
+    training records, halves of training repeats, or an eighth of a single record.
+    regime : errors that the losses measure, in free run (`free_run`) or one step ahead (`one_step`).
+    top_share : share of the resamples, the best ones, that make an ensemble; also share of the candidates, the fittest
+    ones, that are averaged if corrections do not fade (`library.fade`).
     lambda1 : range of the ridge.
     lambda2 : range of the threshold below which a coefficient is dropped, in scaled units.
     tau : range of the share of an ensemble that has to keep a term (AESI II).
-    pearson_train : least correlation of a candidate with the error on training rows, epsilon of the paper; -1 asks for
-    none (a correction that left-out drives do not bear out fades by itself).
+    pearson_train : least correlation of a correction with the error on training rows, epsilon in the paper; -1 sets
+    no limit (a correction that left-out drives do not support fades by itself).
     pearson_valid : the same on the validation records.
-    weights : gamma of the losses (out-of-bag, validation, sparsity) in the scalar fitness.
-    warm_start : whether it begins with a few plain candidates (strong ridge on the whole library).
-    timeout_s : s, what one candidate may take before it counts as failed.
-    memory_mb : MB, what one candidate may take before it counts as failed; on Linux, and under Dask for each thread
-    of a worker, whose threads share what they may take together.
-    workers : processes that evaluate candidates.
+    weights : weights of the losses (out-of-bag, validation, sparsity) in the scalar fitness, gamma in the paper.
+    warm_start : whether the search begins with a few simple candidates (strong ridge, whole library).
+    timeout_s : s, time after which one candidate counts as failed.
+    memory_mb : MB, memory above which one candidate counts as failed; on Linux only. Under Dask it is the limit of each
+    thread of a worker, whose threads share the sum of their limits.
+    workers : number of processes that evaluate candidates.
     """
 
     candidates: Count = 40
@@ -358,14 +361,14 @@ class SearchConfig(Section):
 class ConformalConfig(Section):
     """Prediction intervals one step ahead, and bands of the free run.
 
-    method : how intervals one step ahead are made.
-    alpha : share of misses that is aimed at; 0.1 for intervals of 90 %.
-    window : rows, the residuals that an interval looks back at.
-    horizons_s : s, times since the last measured voltage for which bands are calibrated, beside the whole record, in
-    whole steps of `data.dt_s`; None takes those of 1, 10 and 60 s that are. One that the records are too short for has
-    no band, which is noted.
-    compare : methods that the tables show beside it, calibrated on the same residuals; `spci_refitted`, the paper's
-    forest refitted as it goes, can stand here alone.
+    method : method of the intervals one step ahead.
+    alpha : nominal share of misses; 0.1 for intervals of 90 %.
+    window : rows, number of past residuals that an interval is predicted from.
+    horizons_s : s, times since the last measured voltage for which bands are calibrated, in addition to the whole
+    record; multiples of `data.dt_s`. None takes those of 1, 10 and 60 s that are such multiples. A horizon that the
+    records are too short for has no band, and a note says so.
+    compare : methods that the tables show beside it, calibrated on the same residuals. `spci_refitted`, the paper's
+    forest that is refitted as it goes on, can be given here but not as `method`.
     """
 
     method: str = "spci_boosted"
@@ -405,10 +408,10 @@ class ConformalConfig(Section):
 class TrackingConfig(Section):
     """Where runs are tracked.
 
-    uri : of an MLflow store; None takes the SQLite store of the workspace.
-    log_model : whether the chosen model is logged so that MLflow can serve it.
-    register_model : whether it is registered under the experiment's name.
-    system_metrics : whether the load of processor and memory is logged while a run goes on.
+    uri : address of an MLflow store, such as `http://HOST:5000`; None takes the SQLite store of the workspace.
+    log_model : whether the chosen model is logged in a form that MLflow can serve.
+    register_model : whether the chosen model is registered under the name of the experiment.
+    system_metrics : whether the use of processor and memory is logged during a run.
     """
 
     uri: str | None = None
@@ -418,13 +421,13 @@ class TrackingConfig(Section):
 
 
 class RunnerConfig(Section):
-    """Who evaluates candidates.
+    """Where candidates are evaluated.
 
-    kind : worker processes on this machine, or workers of Dask.
-    address : of Dask's scheduler; None starts a cluster on this machine.
-    storage : a database URL where several `aesi worker` processes share the candidates of one study.
-    stage_timeout_s : s, wall time after which a stage of the run (the search, the report) has failed; None for no
-    limit.
+    kind : `local` (processes on this machine) or `dask` (workers of a Dask cluster).
+    address : address of the Dask scheduler, such as `tcp://HOST:8786`; None starts a cluster on this machine.
+    storage : URL of a database in which several `aesi worker` processes share the candidates of one study.
+    stage_timeout_s : s, wall time after which a stage of the run (the search, the report) counts as failed; None sets
+    no limit.
     """
 
     kind: Literal["local", "dask"] = "local"
@@ -440,17 +443,17 @@ class RunnerConfig(Section):
 
 
 class DiscoverConfig(Section):
-    """What `aesi discover` needs beyond cell and data.
+    """What `aesi discover` needs in addition to cell and data.
 
-    fit : records in which it is sought what the cell lacks; kind `virtual` has them by role.
-    test : records that choose nothing; one in both goes on where the fit ends.
-    good : records of the cell that are known to be good; what is sought is what those in `fit` have beside them.
-    fit_until_s : s, by record the time up to which fits see it.
-    until_s : s, what comes later is left out of every test record.
-    holdout : the last share of each record, kept back where there are no test records; None takes 0.3.
-    hold : how the current runs between rows (of `data.kind: virtual` it is known); None takes `data.hold` where that is
-    given, else that of each record as its rows show, like `aesi discover` of a file.
-    max_effects : most effects that are named.
+    fit : records in which missing effects are searched; kind `virtual` has its own.
+    test : held-out records; a record that is in `fit` as well is tested on the part after `fit_until_s`.
+    good : known-good records of the cell; the search is then for what differs in the records of `fit`.
+    fit_until_s : s, time up to which a record of `fit` is fitted, as `{record: time}`.
+    until_s : s, time up to which every test record is used.
+    holdout : share of each record, at its end, that is held out if there are no test records; None takes 0.3.
+    hold : current between rows, `backward` or `linear` (known with `data.kind: virtual`). None takes `data.hold` if the
+    file gives it, else `backward` for a record with rows more than 5 s apart and `linear` for others.
+    max_effects : largest number of effects that are named.
     """
 
     fit: tuple[str, ...] = ()
@@ -464,7 +467,7 @@ class DiscoverConfig(Section):
 
     @property
     def listed(self) -> tuple[str, ...]:
-        """The records that it names, of whatever role."""
+        """All records that the section names, in any role."""
         return *self.fit, *self.test, *self.good
 
     @model_validator(mode="after")
@@ -478,10 +481,10 @@ class DiscoverConfig(Section):
 
 
 class FallbackConfig(Section):
-    """What to run instead where the measured data cannot be had.
+    """Data and cell that are used if the measured data are not available.
 
-    data : records in their place, as in the section `data`.
-    cell : their cell, as in the section `cell`.
+    data : the records, with the keys of the section `data`.
+    cell : their cell, with the keys of the section `cell`.
     """
 
     data: DataConfig

@@ -1,4 +1,4 @@
-"""Where the records of an experiment come from: files, the catalogue, or the virtual laboratory; and its cell file."""
+"""Sources of an experiment: its records, from files, the catalogue or the virtual laboratory, and its cell file."""
 
 from __future__ import annotations
 
@@ -33,21 +33,25 @@ KEYS = {
     "--from-s": "data.from_s",
     "--soh": "cell.soh",
 }
-"""Option of a command that reads files -> the key of an experiment file that says the same."""
+"""Option of a command that reads files -> the key of an experiment file with the same meaning."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sources:
-    """Every record once, with its state of charge at the start where that is known; and names by role."""
+    """The records of an experiment.
+
+    records : name -> (record; state of charge at its first row, None if unknown).  roles : role -> names of records.
+    """
 
     records: dict[str, tuple[Measurement, float | None]]
     roles: dict[Role, tuple[str, ...]]
 
 
 def sources_of(config: ExperimentConfig, cell: Path) -> Sources:
-    """The records that the experiment names; cell : the BPX file from which virtual records are made.
+    """The records that the experiment names.
 
-    Raises DataError where a record that judges is fitted or chosen on as well.
+    cell : the BPX file from which virtual records are simulated.
+    Raises DataError if two records have rows in common, unless both are test records.
     """
     if config.data.kind == "virtual":
         return _virtual(config, cell)
@@ -66,14 +70,14 @@ def sources_of(config: ExperimentConfig, cell: Path) -> Sources:
 
 
 def check_roles(config: ExperimentConfig) -> None:
-    """Raises ConfigError where the experiment has nothing to train on or to test on."""
+    """Raises ConfigError if the experiment has no training or no test records."""
     if not config.data.has_roles:
         raise ConfigError(f"{config.name}: data: {NO_ROLES}; as it is, it is for `aesi discover` alone.")
 
 
 def named_files(config: ExperimentConfig) -> dict[str, Path]:
-    """The files of one's own that an experiment and its fallback name (a saved model is a folder), by the key that
-    names them."""
+    """Key of the experiment file -> file, or folder of a saved model, of the user that it and its fallback name. Files
+    of the catalogue are not included."""
     names = _named(config)
     if config.fallback is not None:
         names |= {f"fallback: {key}": name for key, name in _named(config.fallback).items()}
@@ -81,7 +85,7 @@ def named_files(config: ExperimentConfig) -> dict[str, Path]:
 
 
 def _named(sections: ExperimentConfig | FallbackConfig) -> dict[str, str]:
-    """`named_files` of one cell and its data, as they are written."""
+    """`named_files` of one cell and its data, with the paths as written."""
     cell, data = sections.cell, sections.data
     names = {} if cell.bpx == "catalogue" else {"cell": cell.bpx}
     names |= {f"cell: effect_files: {name}": name for name in cell.effect_files}
@@ -91,14 +95,16 @@ def _named(sections: ExperimentConfig | FallbackConfig) -> dict[str, str]:
 
 
 def check_had(config: ExperimentConfig) -> None:
-    """Raises DataError where a file of the catalogue that the experiment names cannot be had."""
+    """Raises DataError if a file of the catalogue that the experiment names is not available."""
     if config.data.kind == "catalogue":
         catalogue_files(config)
 
 
 def catalogue_files(config: ExperimentConfig) -> list[Path]:
-    """The files of the catalogue that an experiment works on: records, then the cell; fetched where they are not on
-    this machine.  Raises ConfigError or DataError where one cannot be had."""
+    """The files of the catalogue that an experiment uses: its records, then the cell. Missing ones are fetched.
+
+    Raises ConfigError or DataError if one is not available.
+    """
     where = _locator(config)
     records = config.data.listed if config.data.kind == "catalogue" else ()
     cell = [cell_path(config)] if config.cell.bpx == "catalogue" else []
@@ -106,9 +112,8 @@ def catalogue_files(config: ExperimentConfig) -> list[Path]:
 
 
 def check_there(config: ExperimentConfig) -> None:
-    """Raises ConfigError, with the nearest name, for a file of the user's own that the experiment names and that is
-    not there: this can be known before anything is started. Files of a fallback are checked where it is fallen back
-    to."""
+    """Raises ConfigError, with the nearest name, for a missing file of the user that the experiment names. The check
+    runs before anything is started. Files of a fallback are checked when it is used."""
     for what, name in _named(config).items():
         path = config.path(name)
         if not path.exists() and not (what == "cell" and config.fallback):
@@ -121,10 +126,10 @@ def check_there(config: ExperimentConfig) -> None:
 def discovery_records(
     config: ExperimentConfig, wanted: DiscoverConfig, cell: Path
 ) -> tuple[tuple[Measurement, ...], tuple[Measurement, ...], tuple[Measurement, ...]]:
-    """The records that a discovery looks at, those that judge it, and those that are known to be good; of a virtual
-    cell its training and test records.
+    """(records that are searched, test records, known-good records) of a discovery; of a virtual cell its training and
+    test records.
 
-    cell : the BPX file from which virtual records are made.
+    wanted : the section `discover`.  cell : the BPX file from which virtual records are simulated.
     """
     if config.data.kind == "virtual":
         experiment = virtual_experiment(config, cell)
@@ -153,7 +158,7 @@ def discovery_records(
 
 
 def virtual_experiment(config: ExperimentConfig, cell: Path) -> VirtualExperiment:
-    """The records of kind: virtual, made by the laboratory from the cell file, or found in its cache."""
+    """The records of `data.kind: virtual`, simulated by the laboratory from the cell file or taken from its cache."""
     from aesi.data.virtual import Laboratory, paper_experiment
 
     wanted = config.data.virtual
@@ -172,7 +177,10 @@ def _virtual(config: ExperimentConfig, cell: Path) -> Sources:
 
 
 def cell_path(config: ExperimentConfig) -> Path:
-    """The BPX file of the experiment's cell. Raises ConfigError or DataError where there is none."""
+    """The BPX file, or folder of a saved model, of the experiment's cell.
+
+    Raises ConfigError or DataError if there is none in the data set of the catalogue.
+    """
     if config.cell.bpx != "catalogue":
         return config.path(config.cell.bpx)
     from aesi.data.catalogue import locate
@@ -183,34 +191,35 @@ def cell_path(config: ExperimentConfig) -> Path:
 
 
 def _placed(where: Callable[[str], Path], names: Sequence[str]) -> dict[str, tuple[Path, str]]:
-    """Name in the experiment -> file of the record, and the record's own name. No two of these are alike, since
-    results are kept by them and files of several folders may share a name."""
+    """Name in the experiment -> (file, name of the record). The names of the records are all different, also where
+    files of several folders share a name, because results are stored by them."""
     paths = {name: where(name) for name in names}
     called = record_names(list(paths.values()))
     return {name: (path, one) for (name, path), one in zip(paths.items(), called, strict=True)}
 
 
 def _record(path: Path, reading: Reading, called: str | None = None) -> Measurement:
-    """A record of a file.  Raises DataError that names, beside the options of a command, the keys of an experiment.
+    """The record in a file, with all its rows.
 
-    called : None calls it as its file is.
+    called : its name; None takes that of the file.
+    Raises DataError that names the keys of an experiment file beside the options of a command.
     """
     try:
         return read(
             path, reading, None, called
-        )  # with all rows, whose averages are taken once, on the step asked for
+        )  # all rows are read, since they are averaged once, to the step of the experiment
     except DataError as error:
         raise DataError(with_keys(str(error))) from None
 
 
 def with_keys(sentence: str) -> str:
-    """A sentence with the keys of an experiment file beside the options of a command that it names."""
+    """The sentence, with the keys of an experiment file added that mean the same as the options it names."""
     keys = [key for option, key in KEYS.items() if option in sentence]
     return f"{sentence.removesuffix('.')} (in an experiment file: {', '.join(keys)})." if keys else sentence
 
 
 def _locator(config: ExperimentConfig) -> Callable[[str], Path]:
-    """Finds the file of a record by its name in the experiment."""
+    """Function from the name of a record in the experiment to its file."""
     if config.data.kind != "catalogue":
         return config.path
     from aesi.data.catalogue import locate

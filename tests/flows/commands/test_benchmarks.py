@@ -96,6 +96,16 @@ def test_the_options_of_every_benchmark_are_checked():
             next(benchmarks.run(name, no_such_option=1))
 
 
+def test_a_benchmark_offered_an_option_without_a_name():
+    for name in benchmarks.BENCHMARKS:
+        with pytest.raises(InputError, match=r"it has: [a-z]\w*(, [a-z]\w*)*\.$"):
+            next(benchmarks.run(name, no_such_option=1))
+
+
+def test_the_timed_drive_of_the_porous_electrode_could_not_be_left_out():
+    assert list(benchmarks.run("dfn", samples=0, curves=False, records=False)) == [{"summary": True}]
+
+
 def test_a_benchmark_that_was_killed_was_tracked_as_running_for_ever(tracked):
     store = Store()
     killed = store.create_run(store.experiment("small"), "small, seed 0", {KIND: "run"})

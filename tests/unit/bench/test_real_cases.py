@@ -175,7 +175,7 @@ def test_the_report_is_one_file_with_what_was_said(tmp_path):
         "group": "fault",
         "development": False,
         "answer": ["current_sensor_offset"],
-        "source": "put in",
+        "source": "added",
         "put_in": "current_offset 0.1",
         "seen_nats": 9.0,
         "record": "x/drive",

@@ -1,6 +1,6 @@
-"""Free-run bands of a model, from records that it was not fitted to.
+"""Calibration data of the free-run bands of a model: the errors of its predictions on samples it was not fitted to.
 
-Nothing here looks at `Split.test`.
+This module does not read `Split.test`.
 """
 
 from __future__ import annotations
@@ -21,21 +21,24 @@ from aesi.sparse import SparseModel
 from aesi.sparse.yardsticks import Bare
 
 Unseen = tuple[ErrorModel, ErrorSeries, slice]
-"""A model, a record, and the samples of it that the model was not fitted to."""
+"""(model, error series of a record, rows of it that the model was not fitted to)."""
 WHOLE = slice(1, None)
-"""All samples but the first, which is given."""
+"""All samples of a record but the first, whose voltage is given."""
 
 
 @dataclass(frozen=True, eq=False)
 class OutOfSampleErrors:
-    """Errors left by predictions on samples that their models had not seen, one (n_i,) array a record.
+    """Errors of predictions on samples that their models have not seen. Lists have one entry of (n_i,) per record.
 
-    records : their names; a record is here once for each part of it that was left out.
-    by_horizon : s (WHOLE_DRIVE: from the first sample) -> V, NaN where there is no prediction, or a seen one.
-    current_a, soc : A and 1.  inside : True where the model had been trained on such inputs, at such temperatures.
-    excess : `FreeRun.excess` of each model.  spread : V, what the rows that each was fitted to leave open there.
-    seen, root : what a model fitted to all training records has seen, and what they leave open (parameter_spread.py).
-    reach : as by_horizon, `reach` of each prediction, V.
+    dt_s : s, time step.  records : names; a record occurs once for each part of it that was left out.
+    by_horizon : horizon, s (WHOLE_DRIVE: from the first sample) -> errors, V, measured minus predicted; NaN where the
+    model was fitted to the sample or there is no prediction so early.
+    current_a : A, discharge positive.  soc : state of charge, 0 to 1.
+    inside : whether inputs and temperature are within the range that the model was trained on.
+    excess : `FreeRun.excess`, distance from the trained rows.  spread : V, standard deviation of the prediction by the
+    uncertainty that the fitted rows leave in the physical parameters (parameter_spread.py).
+    seen : charges and temperatures of all training records.  root : root of the parameters' covariance by all training
+    records; None without slopes.  reach : as by_horizon, the function `reach`, V.
     """
 
     dt_s: float
@@ -54,7 +57,10 @@ class OutOfSampleErrors:
     def of(
         cls, pairs: Sequence[Unseen], train: Sequence[ErrorSeries], horizons_s: Sequence[float]
     ) -> OutOfSampleErrors:
-        """train : the training records of all the models of the pairs, pieces left out included."""
+        """The errors of the models of `pairs` on their unseen rows.
+
+        train : the training records of all these models, left-out pieces included.  horizons_s : s.
+        """
         runs = [model.free_run(series) for model, series, _ in pairs]
         by_horizon = {h: [error_ahead(model, series, h) for model, series, _ in pairs] for h in horizons_s}
         by_horizon[WHOLE_DRIVE] = [
@@ -78,10 +84,11 @@ class OutOfSampleErrors:
         )
 
     def bands(self, alpha: float, stretches: int | None = None) -> FreeRunBands:
-        """Bands calibrated on these errors.  stretches : how many stretches err independently over a whole drive; by
-        default as many as there are pieces.
+        """Bands calibrated on these errors.
 
-        Raises FitError where they are too few, or zero.
+        alpha : nominal share of misses.  stretches : number of stretches whose errors over a whole drive are
+        independent; by default the number of pieces.
+        Raises FitError if there are too few pieces, or if all errors are zero.
         """
         return FreeRunBands.fit(
             self.by_horizon,
@@ -101,10 +108,11 @@ class OutOfSampleErrors:
 def bands_of_horizons(
     errors: OutOfSampleErrors, alpha: float, stretches: int | None = None
 ) -> tuple[FreeRunBands, tuple[str, ...]]:
-    """The bands of those horizons that can be calibrated, and why each of the others cannot: the records may be too
-    short for one of them alone.  alpha, stretches : as in `OutOfSampleErrors.bands`.
+    """(bands of the horizons that can be calibrated; a sentence on each horizon that cannot). The records may be too
+    short for one horizon and long enough for others.
 
-    Raises FitError where the band of the whole drive cannot, or for errors that are zero.
+    alpha, stretches : as in `OutOfSampleErrors.bands`.
+    Raises FitError if the band of the whole drive cannot be calibrated, or if all errors are zero.
     """
     told: list[str] = []
     while True:
@@ -119,7 +127,8 @@ def bands_of_horizons(
 
 
 def error_ahead(model: ErrorModel, series: ErrorSeries, horizon_s: float) -> Array:
-    """(n,) V left by predictions from a measurement `horizon_s` earlier; NaN where there is none so early."""
+    """Error of predictions that start from the measured voltage `horizon_s` earlier, (n,) V, measured minus predicted;
+    NaN at the beginning, where there is no measurement so much earlier."""
     steps = series.steps(horizon_s)
     left = series.error_v - model.k_step(series, steps)
     left[:steps] = np.nan
@@ -127,15 +136,15 @@ def error_ahead(model: ErrorModel, series: ErrorSeries, horizon_s: float) -> Arr
 
 
 def reach(model: ErrorModel, series: ErrorSeries, horizon_s: float = WHOLE_DRIVE) -> Array:
-    """(n,) V, how far predictions that far ahead would move if the model went on beyond its trained range; zero for
-    models that hold nothing at an edge."""
+    """Change of the predictions at a horizon, (n,) V, if the model extrapolated beyond its trained range instead of
+    holding its inputs at the edge of the range; zero for models that hold no inputs."""
     if not isinstance(model, SparseModel):
         return np.zeros(len(series))
     return model.reach(series, None if horizon_s == WHOLE_DRIVE else series.steps(horizon_s))
 
 
 def error_of_free_run(series: ErrorSeries, run: FreeRun) -> Array:
-    """(n,) V left by a free run from the first sample; NaN from a divergence on."""
+    """Error of a free run, (n,) V, measured minus predicted; NaN after a divergence."""
     left = series.error_v - run.error_v
     if run.diverged_at is not None:
         left[run.diverged_at :] = np.nan
@@ -143,21 +152,22 @@ def error_of_free_run(series: ErrorSeries, run: FreeRun) -> Array:
 
 
 def _inside(model: ErrorModel, series: ErrorSeries, rows: slice, train: Sequence[ErrorSeries]) -> BoolArray:
-    """(n,) True where the model had been trained at such temperatures, and on such inputs.
+    """Whether each row is within the range of inputs and temperatures that the model was trained on, (n,).
 
-    The models behind left-out pieces share the scaling of the whole training set and cannot tell by themselves: for a
-    piece of a training record, the range is that of the training rows outside it.
-    Inputs beyond that range do not count as outside for physics, or for a correction that fades into it: there these do
-    what they will do in use. Temperatures beyond it do, for every model: the band adds there what the fitted rows
-    cannot tell (`FreeRunBands.thermal`), so an error there is not one of the calibrated width alone.
+    A model that was fitted without a piece shares the scaling of the whole training set, so that it does not know the
+    range itself: it is that of the training rows outside the piece.
+    For the physics, and for a correction that fades into it, inputs beyond the range count as inside, since these
+    models behave there as they will in use. Temperatures beyond the range count as outside for every model: the band is
+    widened there for what the fitted rows cannot determine (`FreeRunBands.thermal`), so that an error there does not
+    measure the calibrated width.
     """
-    # The first sample of a record is predicted by none: it is left out with the one after it.
+    # No model predicts the first sample of a record; it is left out together with the second.
     held = slice(0, rows.stop) if rows.start == 1 else rows
     others = [
         _others(len(record), held) if record.name == series.name else np.ones(len(record), dtype=bool)
         for record in train
     ]
-    if not any(kept.any() for kept in others):  # of physics that was fitted to nothing
+    if not any(kept.any() for kept in others):  # the physics was fitted to no row
         return np.ones(len(series), dtype=bool)
     near = _seen(train, others).knows(series.degc_or_nan)
     faded = isinstance(model, SparseModel) and model.fade is not None
@@ -168,7 +178,7 @@ def _inside(model: ErrorModel, series: ErrorSeries, rows: slice, train: Sequence
 
 
 def _seen(train: Sequence[ErrorSeries], rows: Sequence[BoolArray]) -> Visited:
-    """Charges and temperatures visited by those rows of each record."""
+    """The charges and temperatures in the given rows of each record.  rows : (n_i,) each."""
     pairs = list(zip(train, rows, strict=True))
     return Visited.of(
         np.concatenate([record.soc[kept] for record, kept in pairs]),
@@ -182,10 +192,10 @@ def _root(
     left_out: ErrorSeries | None = None,
     rows: slice = WHOLE,
 ) -> Array | None:
-    """Root of the parameters' covariance by the training records, without the given rows of one of them where that is
-    one; None without slopes.
+    """Root of the parameters' covariance by the training records; None without slopes.
 
-    missed_v : what a fit to these rows allowed for; None where none was made, which would begin with the least.
+    missed_v : V, model error that the fit to these rows assumed; None if there was no fit, for MODEL_ERROR_V.
+    left_out, rows : a record and its rows that the fit did not see, if it is one of the training records.
     """
     slopes = []
     for record in train:
@@ -197,27 +207,31 @@ def _root(
 
 
 def _spread(train: Sequence[ErrorSeries], series: ErrorSeries, rows: slice) -> Array:
-    """(n,) V along a record, by the slopes of the physics that is served, of the fit to the other rows that the series
-    is under; 0 without."""
+    """Standard deviation of the voltage along a record by the uncertainty of the physical parameters, (n,) V, after a
+    fit to all training rows but `rows`; 0 without slopes.
+
+    The slopes are those of the physics that is served, which are in `train`.
+    """
     root = _root(train, series.missed_v, series, rows)
     slopes = next((each.slopes_v for each in train if each.name == series.name), series.slopes_v)
     return np.zeros(len(series)) if root is None or slopes is None else spread(slopes[:, : len(root)], root)
 
 
 def _unfitted(model: ErrorModel, rows: slice, train: Sequence[ErrorSeries]) -> slice:
-    """The rows of a piece that the physics it is predicted by was not fitted to.
+    """The rows of a piece that count as not fitted by its physics, for the spread of the parameters.
 
-    There is no other drive to fit the physics of a single one to: alone it has the errors of a fit to all its rows, and
-    in use it is as open as that leaves it, so it has to be in calibration. On virtual cells of misdeclared rates,
-    diffusivities and contacts (32 drives of 8 cells, one other drive each for training, known starts) the bands of the
-    declared model cover 98 % at a score of 130.5 mV, and 55 % at 222.3 with all that the drive tells taken from the
-    calibration alone; those of the recalibrated one 85 % at 52.0 and 70 % at 87.5.
+    With a single training drive there is no other one to fit the physics to, so that its calibration errors are those
+    of a fit to all its rows. In use the parameters are as uncertain as this fit leaves them, and so they have to be in
+    the calibration: no row counts as left out. On virtual cells with wrongly declared rate constants, diffusivities and
+    contacts (32 drives of 8 cells, one other drive each for training, known initial states), the bands of the declared
+    model cover 98 % with a score of 130.5 mV, and those of the recalibrated one 85 % with 52.0 mV. If the calibration
+    ignored what the drive determines, it would be 55 % with 222.3 mV and 70 % with 87.5 mV.
     """
     return slice(0, 0) if isinstance(model, Bare) and len(train) == 1 else rows
 
 
 def _others(n: int, rows: slice) -> BoolArray:
-    """(n,) True outside of `rows`."""
+    """(n,) True outside `rows`."""
     other = np.ones(n, dtype=bool)
     other[rows] = False
     return other

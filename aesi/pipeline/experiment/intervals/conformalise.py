@@ -1,6 +1,6 @@
-"""Intervals for the models that will be judged, calibrated on records that they were not fitted to.
+"""Calibration of the prediction intervals and bands of the fitted models, on rows that the models were not fitted to.
 
-Nothing here looks at `Split.test`.
+This module does not read `Split.test`.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ def conformalise(
     config: ExperimentConfig,
     left_out: LeftOutDrives | None = None,
 ) -> tuple[Fitted, ...]:
-    """The models with intervals and bands, calibrated on residuals of records they were not fitted to.
+    """The models with intervals one step ahead and bands of the free run.
 
-    For every model these are the validation records; for the ensembles also each training piece, by a model fitted
-    without it; for physics models also the training records.
-    left_out : training drives under physics fitted without some rows of them; by default the drives as they are. Bands
-    are calibrated on parts of them and on whole ones.
+    All models are calibrated on the validation records; the ensembles also on each training piece, predicted by a model
+    fitted without it; the physics models also on the training records.
+    left_out : the training drives under physics that was fitted without some of their rows; by default they are under
+    the physics as it is. Bands are calibrated on left-out parts of drives and on whole left-out drives.
     """
     return tuple(_conformalised(one, problem, chosen, config, left_out or LeftOutDrives()) for one in models)
 
@@ -59,8 +59,8 @@ def _conformalised(
 def _unseen_predictions(
     model: ErrorModel, problem: Problem, chosen: Candidate, left_out: LeftOutDrives
 ) -> tuple[list[Unseen], list[Unseen], ErrorModel]:
-    """Validation records and left-out parts, and whole left-out drives, each with a model that has not seen it; and the
-    model as it is served."""
+    """(validation records and left-out parts; whole left-out drives; the model as it is served). Each record or part is
+    paired with a model that has not seen it."""
     pairs: list[Unseen] = []
     drives: list[Unseen] = []
     if isinstance(model, SparseModel) and model.name in ENSEMBLES:
@@ -73,14 +73,17 @@ def _unseen_predictions(
         drives += [(model, each.series, each.rows) for each in left_out.drives]
         if not left_out.parts:
             pairs += [(model, series, WHOLE) for series in problem.split.train]
-    # By the model that is served: its leverage takes part in how a correction fades.
+    # Validation records are predicted by the served model, whose leverage determines how its correction fades.
     return [(model, series, WHOLE) for series in problem.split.valid] + pairs, drives, model
 
 
 def _calibrated(
     one: Fitted, pairs: Sequence[Unseen], drives: Sequence[Unseen], problem: Problem, config: ExperimentConfig
 ) -> Fitted:
-    """The model with the intervals and bands that can be calibrated, and a note on those that cannot."""
+    """The model with the intervals and bands that can be calibrated, and a note on each that cannot.
+
+    pairs : for intervals and bands.  drives : whole left-out drives, for the bands alone.
+    """
     intervals, bands, notes = None, None, []
     compared: dict[str, Calibrated | RefittedIntervals] = {}
     try:
@@ -108,8 +111,11 @@ def _calibrated(
 def _bands(
     unseen: Sequence[Unseen], stretches: int, problem: Problem, config: ExperimentConfig
 ) -> tuple[FreeRunBands, tuple[str, ...]]:
-    """The bands, and why a horizon has none.  stretches : how many stretches err independently; whole drives are the
-    same rows as their parts."""
+    """(bands of the free run; a sentence on each horizon without one).
+
+    stretches : number of stretches of `unseen` with independent errors. Whole drives do not count, since they have the
+    same rows as their parts.
+    """
     train, horizons_s = problem.split.train, config.conformal.horizons_s
     errors = OutOfSampleErrors.of(
         unseen, train, in_whole_steps(train[0].dt_s) if horizons_s is None else horizons_s

@@ -1,1 +1,1 @@
-"""The scores of an experiment's models: on each record, and on drives that were left out of every choice."""
+"""Scores of the models of an experiment: on each record, and on training drives that were left out of every choice."""

@@ -1,6 +1,6 @@
-"""Judge models that are already chosen: each regime by itself, each figure beside its baseline.
+"""Evaluation of the chosen models, in free run and one step ahead, with the baseline of each figure beside it.
 
-This is the only place that reads `Split.test`.
+This is the only module that reads `Split.test`.
 """
 
 from __future__ import annotations
@@ -33,7 +33,10 @@ from aesi.sparse import SparseModel
 
 @dataclass(frozen=True, eq=False)
 class EvaluatedModels:
-    """rows : one a model, as in summary.json.  traces : every record with every model's prediction."""
+    """The evaluation of all models.
+
+    rows : one per model, as in summary.json.  traces : one per record, with the predictions of all models.
+    """
 
     rows: tuple[dict[str, Any], ...]
     traces: tuple[RecordTrace, ...]
@@ -41,9 +44,11 @@ class EvaluatedModels:
 
 @dataclass(frozen=True, eq=False)
 class _Judged:
-    """One model on one record, (n,) V each; bounds relative to the prediction, None where not calibrated.
+    """The predictions of one model on one record.
 
-    one_step : the measured rows, to which `intervals` and `compared` belong.
+    free : the free run.  one_step : the predictions one step ahead, at the rows as measured.
+    intervals, compared : intervals one step ahead of the model and of other methods, at the rows of `one_step`.
+    bands : of the free run. Bounds are relative to the prediction, V; None if they were not calibrated.
     """
 
     series: ErrorSeries
@@ -57,9 +62,10 @@ class _Judged:
 def evaluate_models(
     fitted: Sequence[Fitted], split: Split, validation: Mapping[str, float] | None = None
 ) -> EvaluatedModels:
-    """Figures of every model on train, validation and test records, and the traces that the report draws.
+    """The figures of every model on the training, validation and test records, and the traces for the report.
 
-    validation : model -> reduction over drives that chose nothing, per cent (`judging.validation`).
+    validation : model -> reduction of the declared model's mean squared error on left-out training drives, per cent
+    (`judging.validation`).
     """
     traces: dict[tuple[Role, str], dict[str, ModelVoltage]] = {}
     rows = []
@@ -90,7 +96,7 @@ def _judge(one: Fitted, series: ErrorSeries, role: Role) -> _Judged:
     free = replace(free, outside=outside_trained(free.outside, series, trained_on(one.model, one.bands)))
     ahead = rows_ahead(one.model, series)
     residual = ahead.left_v
-    residual[0] = np.nan  # the first sample has no step before it
+    residual[0] = np.nan  # the first sample cannot be predicted one step ahead
     return _Judged(
         series=series,
         free=free,
@@ -98,13 +104,14 @@ def _judge(one: Fitted, series: ErrorSeries, role: Role) -> _Judged:
         intervals=None if one.intervals is None else one.intervals.intervals(residual, ahead.current_a),
         bands=None if one.bands is None else one.bands.intervals(series, free, reach(one.model, series)),
         compared={name: each.intervals(residual, ahead.current_a) for name, each in one.compared.items()}
-        if role == "test"  # the tables show no other
+        if role == "test"  # tables show these methods on the test records alone
         else {},
     )
 
 
 def _row(one: Fitted, judged: Mapping[Role, Sequence[_Judged]], seconds: float) -> dict[str, Any]:
-    """A model's row in summary.json: each regime on every part, all else on the test part alone."""
+    """The row of a model in summary.json: the errors in free run and one step ahead by role, and all other figures on
+    the test records alone."""
     test = judged["test"]
     ahead = _ahead(one, test)
     return {
@@ -121,8 +128,12 @@ def _row(one: Fitted, judged: Mapping[Role, Sequence[_Judged]], seconds: float) 
 
 
 def _free_run(judged: Mapping[Role, Sequence[_Judged]]) -> dict[str, float]:
-    """Figures in free run, by part: per cent taken off the squared error of each physics, and the error left, over
-    the rows before a simulation ran out by itself; and how the test went."""
+    """Figures in free run.
+
+    By role, over all its records: the reduction of the mean squared error of the declared and of the recalibrated
+    physics, per cent; the RMSE, mV; and, if a simulation ran out of lithium or salt, the RMSE over the rows before.
+    Of the test records also the number of diverged runs and the share of rows outside the trained range, per cent.
+    """
     figures: dict[str, float] = {}
     for role, records in judged.items():
         if records:
@@ -143,7 +154,7 @@ def _free_run(judged: Mapping[Role, Sequence[_Judged]]) -> dict[str, float]:
 
 
 def _one_step(judged: Mapping[Role, Sequence[_Judged]]) -> dict[str, float]:
-    """Figures one step ahead, by part: the error left; and the error of holding the last one, on the test part."""
+    """RMSE one step ahead, mV, by role, and that of persistence (repeating the last error) on the test records."""
     figures = {}
     for role, records in judged.items():
         if records:
@@ -153,7 +164,8 @@ def _one_step(judged: Mapping[Role, Sequence[_Judged]]) -> dict[str, float]:
 
 
 def _one_step_intervals(one: Fitted, test: Sequence[_Judged]) -> dict[str, Any]:
-    """Scores of the model's intervals one step ahead and of the methods beside them; nothing where it has none."""
+    """Scores of the model's intervals one step ahead and of other methods, on the test records; empty if it has
+    none."""
     if one.intervals is None:
         return {}
     rows = [r.one_step for r in test]
@@ -170,7 +182,10 @@ def _one_step_intervals(one: Fitted, test: Sequence[_Judged]) -> dict[str, Any]:
 def _free_run_intervals(
     one: Fitted, test: Sequence[_Judged], ahead: Mapping[float, Sequence[Array]]
 ) -> dict[str, Any]:
-    """Scores of the model's bands, over a whole drive and by horizon; nothing where it has none.  ahead : `_ahead`."""
+    """Scores of the model's bands on the test records, over whole drives and by horizon; empty if it has none.
+
+    ahead : the errors of `_ahead`.
+    """
     if one.bands is None:
         return {}
     residuals = [r.series.error_v - r.free.error_v for r in test]
@@ -189,15 +204,15 @@ def _free_run_intervals(
 
 
 def _start_figures(test: Sequence[_Judged]) -> dict[str, float]:
-    """What a standard deviation of the states of charge that the records start from is worth, V RMS; nothing where all
-    of them are known."""
+    """RMS change of the voltage, V, by one standard deviation of the initial states of charge of the test records;
+    empty if all of these are known."""
     worth = [np.zeros(len(r.series)) if r.series.start_v is None else r.series.start_v for r in test]
     start_v = rms(_joined(worth))
     return {"start_v": start_v} if start_v > 0.0 else {}
 
 
 def _record_figures(one: Fitted, record: _Judged) -> dict[str, float | None]:
-    """Figures of one record in free run, and how far it lies from what a correction was trained on."""
+    """Figures of one record in free run, and how far it lies outside the range that a correction was trained on."""
     series, model = record.series, one.model
     left, declared = series.error_v - record.free.error_v, series.left_by(DECLARED)
     kept = model.kept(series) if isinstance(model, SparseModel) else np.ones(len(series))
@@ -214,15 +229,15 @@ def _record_figures(one: Fitted, record: _Judged) -> dict[str, float | None]:
 
 
 def _ahead(one: Fitted, test: Sequence[_Judged]) -> dict[float, list[Array]]:
-    """Horizon of each band in s -> (n,) V a test record: what a prediction from a measurement that long before left of
-    the error; NaN where there is none so early."""
+    """Horizon of each band, s -> errors along each test record, (n,) V, of predictions from the voltage measured that
+    long before; NaN at the beginning (`error_ahead`)."""
     finite = () if one.bands is None else (b.horizon_s for b in one.bands.horizons if isfinite(b.horizon_s))
     return {h: [error_ahead(one.model, r.series, h) for r in test] for h in finite}
 
 
 def _k_step(one: Fitted, test: Sequence[_Judged]) -> dict[str, dict[str, float]]:
-    """Errors of measured rows on the test part by horizon, and those of holding the last error for so long, at the
-    horizons of the tables that the records' step divides."""
+    """RMSE on the test records by horizon, mV, at the rows as measured, and that of persistence. The horizons are those
+    of the tables that are multiples of the records' time step."""
     ours, held = {}, {}
     for horizon in in_whole_steps(test[0].series.dt_s):
         rows = [rows_ahead(one.model, r.series, r.series.steps(horizon)) for r in test]
@@ -243,7 +258,8 @@ def _horizon_figures(
 
 
 def _inside_coverage(intervals: Sequence[Intervals | None], residuals: Sequence[Array]) -> dict[str, float]:
-    """Coverage of the rows inside the trained range, where alone the band is calibrated; NaN without such rows."""
+    """Coverage over the rows within the trained range, per cent, for which alone the band is calibrated; NaN without
+    such rows."""
     covered = [
         each.covers(residual)[each.warm & np.isfinite(residual)]
         for each, residual in zip(intervals, residuals, strict=True)
@@ -254,7 +270,8 @@ def _inside_coverage(intervals: Sequence[Intervals | None], residuals: Sequence[
 
 
 def _left_out(band: HorizonBand) -> dict[str, float]:
-    """Scores of the calibration pieces, each with the scale of the others: what to expect of one drive."""
+    """Number of calibration pieces, and the lowest coverage of one of them, per cent, with bands scaled by the others.
+    It says what to expect of a single drive."""
     return {
         "pieces": len(band.by_piece),
         "worst_piece_coverage_pct": 100.0 * min(band.by_piece),
@@ -262,7 +279,7 @@ def _left_out(band: HorizonBand) -> dict[str, float]:
 
 
 def _rms_mv(left_v: Iterable[Array]) -> float:
-    """mV, RMS over all records of what is scored of them; NaN where nothing is."""
+    """RMS over all finite errors of all records, mV; NaN without any.  left_v : (n_i,) V per record."""
     joined = _joined(left_v)
     scored = joined[np.isfinite(joined)]
     return MV_PER_V * rms(scored) if scored.size else float("nan")
@@ -274,7 +291,8 @@ def _interval_figures(
     residuals: Sequence[Array],
     alpha: float,
 ) -> dict[str, float]:
-    """Scores over all test records together, so that a bin spread over records is one bin."""
+    """Scores of intervals over all test records together: coverages in per cent, widths and scores in V. A bin of
+    current and state of charge can have samples of several records."""
     known = [each for each in intervals if each is not None]
     together = Intervals(
         lower_v=_joined(each.lower_v for each in known),
@@ -301,7 +319,7 @@ def _interval_figures(
 
 def _prediction(record: _Judged) -> ModelVoltage:
     model_v, ahead = record.series.model_v, record.one_step
-    # What is drawn at a stamp is what was said of the next measured row.
+    # A time of the even grid shows the prediction of the next measured row.
     at = np.minimum(np.searchsorted(ahead.stamps, np.arange(len(model_v))), len(ahead.stamps) - 1)
     free_v, step_v = model_v + record.free.error_v, model_v + ahead.predicted_v[at]
     bands, intervals = record.bands, record.intervals

@@ -1,10 +1,10 @@
-"""The reduction of the squared error by a candidate, for each physics model in the tables, in free run.
+"""The reduction of the squared error in free run by a candidate, relative to each physics model in the tables.
 
     r_p = 100 - (100 - r) E / E_p                                                                         (1)
 
-A search judges by r, per cent of the squared error E of the physics that it corrects. The tables say r_p, per cent of
-the error E_p of the declared model or of the recalibrated one on the same samples: those of the validation records, or
-of the left-out pieces where there are none.
+A search judges candidates by r, the reduction in per cent of the squared error E of the physics that is corrected. The
+tables show r_p, the reduction of the squared error E_p of the declared or of the recalibrated model. Both are over the
+same samples: the validation records, or the left-out pieces if there are no validation records.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from aesi.sparse.search.fold_models import fold_samples
 from aesi.sparse.search.unseen import refits_physics_per_fold
 
 AGAINST = {"mser_pct": DECLARED, "mser_recalibrated_pct": RECALIBRATED}
-"""Name of a reduction -> the physics whose error it is taken off, in the rows of models and of candidates alike."""
+"""Key of a reduction -> physics model whose squared error it is relative to, in the rows of models and candidates."""
 
 
 def valid_shares(problem: Problem, left_out: LeftOutDrives) -> dict[str, float]:
-    """Name of a reduction -> E / E_p of (1); NaN where that physics is exact."""
+    """Key of a reduction -> E / E_p of (1); NaN if the error of that physics is zero."""
     pieces = tuple(_judged_pieces(problem, left_out))
     corrected = sum(float(np.sum(piece.error_v**2)) for piece in pieces)
     squares = {
@@ -34,14 +34,17 @@ def valid_shares(problem: Problem, left_out: LeftOutDrives) -> dict[str, float]:
 
 
 def valid_reductions(candidate: Candidate, shares: Mapping[str, float]) -> dict[str, float]:
-    """Name of a reduction -> (1) of AESI I, per cent; shares : those of its problem."""
+    """Key of a reduction -> r_p of (1) for AESI I, per cent.
+
+    shares : of `valid_shares` for the problem of the candidate.
+    """
     left = 100.0 - candidate.free_run_valid_mser_pct
     return {key: 100.0 - left * share for key, share in shares.items()}
 
 
 def _judged_pieces(problem: Problem, left_out: LeftOutDrives) -> Iterator[ErrorSeries]:
-    """The samples on which candidates are judged, without the measured ones that free runs start from; left-out pieces
-    under physics that has not seen them, where the search judges so."""
+    """The samples on which candidates are judged, without the first one of each record, which a free run starts from.
+    Left-out pieces are under physics that has not seen them, if the search judges them so."""
     if problem.split.valid:
         yield from (record.take(slice(1, None)) for record in problem.split.valid)
         return

@@ -1,17 +1,18 @@
-"""The validation figure that stands beside the test figure: from drives that chose nothing.
+"""The validation figure, which predicts the test figure of a model from the training drives alone.
 
     figure = 1 - median_d S_d / E_d                                                                       (1)
 
-S_d is what a model leaves of the squared error E_d of the declared physics on a left-out piece d, with physics, search
-and fit repeated without it. Pieces are drives, and where the search leaves out parts of drives these too: a part lies
-closer to the rest of its drive than a test drive does, and a whole one further from the others than a test drive does
-that has one on either side. A median, since the ratio of sums is that of the one piece on which the physics errs most,
-or which physics that has not seen it runs into volts.
+E_d is the squared error of the declared physics on a left-out piece d, and S_d that of the model; the fit of the
+physics, the search and the fit of the model are repeated without the piece. The pieces are whole drives and, if the
+search leaves out parts of drives, these parts as well. A part lies closer to the rest of its drive than a test drive
+does; a whole drive lies further from the others than a test drive does that has a training drive on either side. The
+figure uses the median, because a ratio of sums would be dominated by one piece: the one with the largest error of the
+physics, or one on which physics that has not seen it fails by volts.
 
-Over the ten development splits of the NMC drive in `aesi bench splits` (16 candidates) the figure of AESI I is off by
-2.8 points in the median and 49 at worst; by sums over the parts alone it was off by 6.5 and 75. With a share that grows
-with the distance from the nearest fitted charge, which the test's rows would set, it was off by 16 or more: that shares
-grow so fast between parts and drives is not borne out further away.
+Over the ten development splits of the NMC drive in `aesi bench splits` (16 candidates), the figure of AESI I differs
+from the test figure by 2.8 percentage points in the median and by 49 at worst. With sums over the parts alone it
+differed by 6.5 and 75. With a share S_d / E_d that grows with the distance of the test's rows from the nearest fitted
+state of charge it differed by 16 or more: the growth between parts and drives does not continue further away.
 """
 
 from __future__ import annotations
@@ -31,14 +32,14 @@ from aesi.sparse.search.fold_models import fold_models, fold_samples
 from aesi.sparse.search.pick.nested import nested_shares, picked
 
 SquaresLeft = dict[str, float]
-"""Model -> sum of squares, V**2, that it leaves on a left-out piece."""
+"""Model -> sum of its squared errors on a left-out piece, V**2."""
 
 
 def validation_mser(loaded: Loaded, problem: Problem, candidates: Sequence[Candidate]) -> dict[str, float]:
-    """Model -> reduction of the squared error against the declared physics, per cent, on a typical left-out piece.
+    """Model -> the figure (1), per cent: the reduction of the declared physics' squared error on the median piece.
 
-    Physics is refitted without each piece, and the ensembles are chosen without it (`picked`).
-    Empty where the search left out other pieces than drives or their parts.
+    The physics is refitted without each piece, and the ensembles are chosen without it (`picked`).
+    Empty if the search leaves out other pieces than drives or parts of them.
     """
     if len(problem.folds) < 2 or not problem.folds_are_drives:
         return {}
@@ -50,8 +51,8 @@ def validation_mser(loaded: Loaded, problem: Problem, candidates: Sequence[Candi
 
 
 def _parts(loaded: Loaded, problem: Problem, candidates: Sequence[Candidate]) -> Iterator[SquaresLeft]:
-    """Squares left on the folds of the search. What the ensembles leave of the error of physics that saw a fold
-    stands for what they leave of the error of physics that did not."""
+    """Squared errors on each fold of the search. The ensembles are fitted to the error of physics that saw the fold;
+    the share of that error which they leave is applied to the error of physics that did not see it."""
     shares = [nested_shares(problem, candidates, number) for number in range(len(ENSEMBLES))]
     for d, ((a, b), out) in enumerate(zip(problem.folds, loaded.left_out.parts, strict=True)):
         rows = fold_samples(problem, a, b)[1]
@@ -63,7 +64,7 @@ def _parts(loaded: Loaded, problem: Problem, candidates: Sequence[Candidate]) ->
 
 
 def _drives(loaded: Loaded, problem: Problem, candidates: Sequence[Candidate]) -> Iterator[SquaresLeft]:
-    """Whole drives, where folds are parts of them."""
+    """Squared errors on each whole left-out drive, if the folds are parts of drives."""
     for out, span in zip(loaded.left_out.drives, problem.spans, strict=False):
         rows = slice(1, len(out.series))
         part = out.series.take(rows)
@@ -77,8 +78,11 @@ def _drives(loaded: Loaded, problem: Problem, candidates: Sequence[Candidate]) -
 def _without(
     problem: Problem, candidates: Sequence[Candidate], ensemble: int, out: HeldOutDrive, span: Span
 ) -> Array:
-    """(n,) V in free run by the model that the other drives choose, fitted to them; zero where they cannot choose
-    one."""
+    """Correction in free run of a left-out drive, (n,) V, by the model that the other drives choose and are fitted
+    with; zero if they cannot choose one.
+
+    ensemble : number of the ensemble in ENSEMBLES.  span : rows of the left-out drive in the problem.
+    """
     apart = np.array([not span[0] <= a < span[1] for a, _ in problem.folds])
     pick = picked(problem, candidates, ensemble, apart)
     if pick is None:
@@ -93,4 +97,5 @@ def _without(
 
 
 def _by_physics(part: ErrorSeries) -> SquaresLeft:
+    """Squared errors of all physics models on a piece."""
     return {name: float(np.sum(part.left_by(name) ** 2)) for name in PHYSICS_NAMES}
