@@ -125,7 +125,8 @@ def _settled(problem: InverseProblem, path: Path, searches: _Searches, verdict: 
     if verdict.word == "unknown":
         ages = of_several_ages(problem, archive)
         return _unexplained(replace(problem, ages=ages), path, verdict, searches)
-    recalibrations = _recalibrations(problem, searches.paths["tight"], archive)
+    tight = searches.paths["tight"]
+    recalibrations = _recalibrations(problem, tight, archive, Option.declared(problem, tight.blocks))
     return _adopted(path, searches.paths, with_confidence(verdict), _recalibrated(problem, recalibrations))
 
 
@@ -158,19 +159,19 @@ def _unexplained(problem: InverseProblem, path: Path, verdict: Verdict, searches
     path, verdict : the search that is believed, and its verdict `unknown`.
     """
     archive, tight = searches.archive, searches.paths["tight"]
-    recalibrations = _recalibrations(problem, tight, archive)
     measured, blocks = searches.at(problem, "measured"), path.blocks
+    declared = Option.declared(problem, blocks)
+    recalibrations = _recalibrations(problem, tight, archive, declared)
     lasting = _by_what_lasts(problem, measured, archive)
-    options = [*recalibrations, Option.of(lasting.problem, blocks, lasting.base)]
+    options = [*recalibrations, Option.of(lasting.problem, blocks, lasting.base, declared)]
     if path.beyond_reach_v is not None and len(problem.records) > 1:
-        options += _with_stand_ins(searches.at(problem, "loose"), blocks)
+        options += _with_stand_ins(searches.at(problem, "loose"), blocks, declared)
     named: list[Option] = []
     if path.beyond_reach_v is not None:
         path = measured  # no other search tried an effect
     if measured.chosen.hypothesis:
         path, verdict = measured, partly(measured, verdict, searches.thresholds)
-        named = named_options(lasting, tight, blocks, archive)
-    declared = Option.of(problem, blocks, None)
+        named = named_options(lasting, tight, blocks, archive, declared)
     after, why = written(declared, options, named)
     if after.values is None or not after.hypothesis:
         why = "; ".join(filter(None, (of_refit(declared, recalibrations, options, after), why))) or None
@@ -266,7 +267,9 @@ def with_confidence(verdict: Verdict) -> Verdict:
     return replace(verdict, confidence=frequency_maps()[kind].frequency(verdict.margin))
 
 
-def named_options(path: Path, tight: Path, blocks: Blocks, archive: Archive) -> list[Option]:
+def named_options(
+    path: Path, tight: Path, blocks: Blocks, archive: Archive, declared: Option
+) -> list[Option]:
     """The models with the named effects: (1) own parameters as declared; (2) activation energies as declared too, where
     they are open; (3) own parameters fitted within their tight spreads.
 
@@ -276,7 +279,7 @@ def named_options(path: Path, tight: Path, blocks: Blocks, archive: Archive) -> 
     alone, which one record determines only near its own temperature, five of eleven development drives of its archive
     without their temperature were written as declared that are not with the file's.
 
-    blocks : by which all options are compared.
+    blocks : by which all options are compared.  declared : the declared model, compared by the same blocks.
     """
     named, held = [path], replace(path.problem, energies=False)
     hypothesis = path.chosen.hypothesis
@@ -285,7 +288,7 @@ def named_options(path: Path, tight: Path, blocks: Blocks, archive: Archive) -> 
         found = refitted(problem, path, archive)
         if found is not None:
             named.append(found)
-    return [Option.of(one.problem, blocks, one.chosen) for one in named]
+    return [Option.of(one.problem, blocks, one.chosen, declared) for one in named]
 
 
 def _by_what_lasts(problem: InverseProblem, measured: Path, archive: Archive) -> Path:
@@ -299,26 +302,25 @@ def _by_what_lasts(problem: InverseProblem, measured: Path, archive: Archive) ->
     return measured if found is None else found
 
 
-def _with_stand_ins(wide: Path, blocks: Blocks) -> list[Option]:
+def _with_stand_ins(wide: Path, blocks: Blocks, declared: Option) -> list[Option]:
     """The recalibrated models with added effects, from the steps of a search at the trust `loose`."""
     taken = [step.admitted for step in wide.steps if step.admitted is not None]
     fits = {one.hypothesis: one for one in (*taken, wide.chosen) if one.hypothesis}
-    return [Option.of(wide.problem, blocks, one) for one in fits.values()]
+    return [Option.of(wide.problem, blocks, one, declared) for one in fits.values()]
 
 
-def _recalibrations(problem: InverseProblem, tight: Path, archive: Archive) -> list[Option]:
+def _recalibrations(problem: InverseProblem, tight: Path, archive: Archive, declared: Option) -> list[Option]:
     """The declared model with its own parameters fitted, within their tight and their loose spreads; only fits that do
     no worse than the declared values on the fitted rows."""
     loose = replace(problem, trust="loose")
     wide = base_of(loose, blocks_of(loose), archive)
-    declared = ModelState(problem)
     errors = [
-        (record.thin.voltage_v - declared.simulated(record, k, thin=True).voltage_v)[: record.n_fit]
+        (record.thin.voltage_v - declared.state.simulated(record, k, thin=True).voltage_v)[: record.n_fit]
         for k, record in enumerate(problem.records)
     ]
     most = rms(np.concatenate(errors))
     fits = [(tight.problem, tight.base), *([] if wide is None else [(loose, wide)])]
-    return [Option.of(one, tight.blocks, fit) for one, fit in fits if fit.rmse_v <= most]
+    return [Option.of(one, tight.blocks, fit, declared) for one, fit in fits if fit.rmse_v <= most]
 
 
 def _recalibrated(problem: InverseProblem, recalibrations: Sequence[Option]) -> ModelState:

@@ -235,11 +235,12 @@ def test_at_one_current_there_are_no_ranges_of_it_and_own_parameters_are_not_wri
     assert "rate" not in blocks.folds
     assert "charge" in blocks.folds
     base = base_of(one, blocks, archive)
-    assert not Option.of(one, blocks, base).tested
+    declared = Option.declared(one, blocks)
+    assert not Option.of(one, blocks, base, declared).tested
     held = replace(one, trust="measured")
-    assert Option.of(held, blocks, base_of(held, blocks_of(held), archive)).tested
-    moved = Option.of(one, blocks, base)
-    declared = replace(Option.of(one, blocks, None), left_out=LeftOut((1.0,), (1.0,)))
+    assert Option.of(held, blocks, base_of(held, blocks_of(held), archive), declared).tested
+    moved = Option.of(one, blocks, base, declared)
+    declared = replace(declared, left_out=LeftOut((1.0,), (1.0,)))
     assert written(declared, [moved])[0] is declared.state
     assert of_refit(declared, [moved], [moved], declared.state) == f"the recalibrated model: {UNTESTED}"
     assert of_refit(declared, [moved], [moved], moved.state) is None
@@ -370,8 +371,8 @@ def test_all_that_may_be_written_is_held_against_each_other_on_the_same_rows(cel
     tight = searched(problem, 1, archive)
     measured = searched(replace(problem, trust="measured"), 0, archive)
     assert len(measured.blocks) != len(tight.blocks)
-    declared = Option.of(problem, tight.blocks, None)
-    options = named_options(measured, tight, tight.blocks, archive)
+    declared = Option.declared(problem, tight.blocks)
+    options = named_options(measured, tight, tight.blocks, archive, declared)
     assert [one.state.problem.trust for one in options] == ["measured", "tight"]
     assert {len(one.left_out.by_range) for one in options} == {len(declared.left_out.by_range)}
     assert written(declared, [], options)[1] is None

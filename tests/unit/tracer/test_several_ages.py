@@ -12,6 +12,7 @@ from aesi.tracer.case.blocks import blocks_of
 from aesi.tracer.case.free_parameter import CAPACITY_SHARE
 from aesi.tracer.case.problem import SHARE_SD, InverseProblem, share_of
 from aesi.tracer.case.records import prepare_all, prepare_test
+from aesi.tracer.decide.carry_over import LeftOut
 from aesi.tracer.decide.evidence import of_several_ages
 from aesi.tracer.decide.in_use import foretold_in_use
 from aesi.tracer.decide.written import Option
@@ -120,5 +121,10 @@ def test_what_says_nothing_of_ordinary_use_is_not_written(cell, few, discharge):
     share, as_believed = (foretold_in_use(problem, blocks, one, MEASURED_V) for one in (fit, untold))
     assert as_believed < 0.5 < share < 1.0
     assert foretold_in_use(problem, blocks, untold, 10.0) == pytest.approx(1.0, abs=1e-3)
-    assert Option.of(problem, blocks, fit).tested
-    assert not Option.of(problem, blocks, untold).tested
+    declared = Option.declared(problem, blocks)
+    assert Option.of(problem, blocks, fit, declared).tested
+    assert not Option.of(problem, blocks, untold, declared).tested
+    volts_off = replace(declared, left_out=LeftOut((10.0, 10.0), (10.0,)))
+    assert Option.of(problem, blocks, untold, volts_off).tested  # it may err by as much
+    nowhere = replace(declared, left_out=LeftOut((10.0, np.inf), (10.0,)))
+    assert not Option.of(problem, blocks, untold, nowhere).tested
