@@ -22,13 +22,14 @@ from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.laboratory.cache import cached, key_of
 from aesi.data.laboratory.change import Change
 from aesi.data.laboratory.changes import CONTACT_RESISTANCE, find_change
+from aesi.data.laboratory.mixing import porous_electrode
 from aesi.data.laboratory.sizes import gauss_sizes
 from aesi.data.profiles.profile import Profile
 from aesi.errors import DataError, SimulationError
 from aesi.numerics.typing import Array
 
 LaboratoryModel = Literal["SPMe", "DFN"]
-VERSION = 5
+VERSION = 6
 """Increased with every change of this package that changes a voltage, so that old cache entries are not used."""
 
 EDGE_SHARE = 0.15
@@ -286,7 +287,10 @@ def _options(asked: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 def _solve(setup: Setup, profile: Profile, time: Array, values: Any, options: dict[str, Any]) -> Any:
     import pybamm
 
-    model = getattr(pybamm.lithium_ion, setup.model)(options)
+    if setup.model == "DFN" and "heat of mixing" in options:
+        model = porous_electrode(options)
+    else:
+        model = getattr(pybamm.lithium_ion, setup.model)(options)
     length = float(profile.time_s[-1])
     row = float(np.median(np.diff(profile.time_s)))
     tolerance = COARSE_TOLERANCE if setup.radial_points else TOLERANCE[setup.model]

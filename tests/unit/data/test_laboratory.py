@@ -8,7 +8,8 @@ import pytest
 
 from aesi.data.laboratory.changes import CHANGES, find_change
 from aesi.data.laboratory.instrument import Instrument
-from aesi.data.laboratory.simulator import Applied, Setup, TrueRun, edges, simulate_truth
+from aesi.data.laboratory.mixing import porous_electrode
+from aesi.data.laboratory.simulator import Applied, Setup, TrueRun, edges, parameter_values, simulate_truth
 from aesi.data.profiles.profile import Bench, Profile
 from aesi.errors import DataError, SimulationError
 from aesi.physics import Cell, simulate
@@ -201,3 +202,27 @@ def test_the_instrument_writes_noise_and_steps(rng):
     np.testing.assert_allclose(record.voltage_v, np.round(record.voltage_v, 3), atol=1e-12)
     assert record.temperature_degc is not None
     assert Instrument().write(trace, "x", rng, temperature=False).temperature_degc is None
+
+
+def test_the_heat_of_mixing_as_an_unknown_is_that_of_pybamm(nmc):
+    import pybamm
+
+    options = {"thermal": "lumped", "heat of mixing": "true"}
+    time = np.arange(0.0, 61.0)
+    current = np.where(time < 20.0, 0.0, 60.0)
+    few = {"x_n": 5, "x_s": 5, "x_p": 5, "r_n": 10, "r_p": 10}
+
+    def run(model):
+        values = parameter_values(nmc, 0.7)
+        values["Current function [A]"] = pybamm.Interpolant(time, current, pybamm.t)
+        solver = pybamm.IDAKLUSolver(rtol=1e-8, atol=1e-8)
+        simulation = pybamm.Simulation(model, parameter_values=values, solver=solver, var_pts=few)
+        solution = simulation.solve(time, t_interp=time)
+        names = ("Voltage [V]", "Volume-averaged cell temperature [C]")
+        return [np.asarray(solution[name](time)) for name in names]
+
+    ours, theirs = run(porous_electrode(options)), run(pybamm.lithium_ion.DFN(options))
+    without = run(pybamm.lithium_ion.DFN({"thermal": "lumped"}))
+    assert np.abs(ours[0] - theirs[0]).max() < 1e-6
+    assert np.abs(ours[1] - theirs[1]).max() < 1e-5
+    assert np.abs(without[1] - theirs[1]).max() > 1e-2
