@@ -154,12 +154,8 @@ def test_the_newest_recorded_run_on_measured_cells_is_that_of_the_table():
             *(re.findall(r"[\d.]+", row[key]) for key in ("true size", "estimate")), strict=True
         )
     ]
-    # The table has tenths of a milliohm: a pair at the limit may be on either side of it.
-    least, most = (
-        sum(abs(found / true - 1.0) <= NEAR_SHARE + way * 0.1 / true for true, found in pairs)
-        for way in (-1, 1)
-    )
-    assert 100.0 * least / len(pairs) <= last["witness_within_15pct_pct"] <= 100.0 * most / len(pairs)
+    near = sum(abs(found / true - 1.0) <= NEAR_SHARE for true, found in pairs)
+    assert last["witness_within_15pct_pct"] == pytest.approx(100.0 * near / len(pairs))
     said = text_of("docs/benchmarks.md")
     assert (
         f"took {last['processor_s_total']:,.0f} s of processor time ({last['processor_s_median']:.0f} s"

@@ -99,7 +99,7 @@ def _sizes(row: CaseRow) -> tuple[str, str]:
     %."""
     if "ohmic_found_mohm" in row:
         true, found = (
-            " + ".join(f"{row[f'{part}_{of}_mohm']:.1f}" for part in ("ohmic", "transfer"))
+            " + ".join(f"{row[f'{part}_{of}_mohm']:.2f}" for part in ("ohmic", "transfer"))
             for of in ("measured", "found")
         )
         return f"{true} mohm", f"{found} mohm"
