@@ -29,7 +29,7 @@ from aesi.errors import DataError, SimulationError
 from aesi.numerics.typing import Array
 
 LaboratoryModel = Literal["SPMe", "DFN"]
-VERSION = 6
+VERSION = 5
 """Increased with every change of this package that changes a voltage, so that old cache entries are not used."""
 
 EDGE_SHARE = 0.15
