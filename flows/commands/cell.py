@@ -20,13 +20,7 @@ def simulate(
     *,
     reading: Any,
     cell: options.CellOption,
-    current: Annotated[
-        Path,
-        typer.Option(
-            help="Current profile: CSV with time_s (s) and current_a (A, discharge positive) and, if measured, "
-            "voltage_v (V) and temperature_degc (degC)."
-        ),
-    ],
+    current: options.CurrentOption,
     out: Annotated[
         Path, typer.Option(help="CSV to write: time, current, voltage and the states of the model.")
     ],
@@ -66,13 +60,7 @@ def predict(
         Path,
         typer.Option("--model", "--cell", help="Folder of a saved hybrid model, such as runs/NAME/model."),
     ],
-    current: Annotated[
-        Path,
-        typer.Option(
-            help="Current profile: CSV with time_s (s) and current_a (A, discharge positive) and, if measured, "
-            "voltage_v (V) and temperature_degc (degC)."
-        ),
-    ],
+    current: options.CurrentOption,
     out: Annotated[
         Path,
         typer.Option(

@@ -25,6 +25,13 @@ Value = TypeVar("Value")
 _CELL = typer.Option("--cell", help="Cell file: BPX, or the folder of a saved model, such as found/model.")
 CellOption = Annotated[Path, _CELL]
 CellUnlessExperiment = Annotated[Path | None, _CELL]
+CurrentOption = Annotated[
+    Path,
+    typer.Option(
+        help="Current profile: CSV with time_s (s) and current_a (A, discharge positive) and, if measured, voltage_v "
+        "(V) and temperature_degc (degC)."
+    ),
+]
 
 
 A_STATE = "a state of charge is a share of the capacity, from 0 (empty) to 1 (full); 90 % is 0.9"

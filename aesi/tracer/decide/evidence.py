@@ -125,8 +125,7 @@ def _settled(problem: InverseProblem, path: Path, searches: _Searches, verdict: 
     if verdict.word == "unknown":
         ages = of_several_ages(problem, archive)
         return _unexplained(replace(problem, ages=ages), path, verdict, searches)
-    tight = searches.paths["tight"]
-    recalibrations = _recalibrations(problem, tight, archive, Option.declared(problem, tight.blocks))
+    recalibrations = _recalibrations(problem, searches.paths["tight"], archive)
     return _adopted(path, searches.paths, with_confidence(verdict), _recalibrated(problem, recalibrations))
 
 
@@ -159,19 +158,19 @@ def _unexplained(problem: InverseProblem, path: Path, verdict: Verdict, searches
     path, verdict : the search that is believed, and its verdict `unknown`.
     """
     archive, tight = searches.archive, searches.paths["tight"]
+    recalibrations = _recalibrations(problem, tight, archive)
     measured, blocks = searches.at(problem, "measured"), path.blocks
-    declared = Option.declared(problem, blocks)
-    recalibrations = _recalibrations(problem, tight, archive, declared)
     lasting = _by_what_lasts(problem, measured, archive)
-    options = [*recalibrations, Option.of(lasting.problem, blocks, lasting.base, declared)]
+    options = [*recalibrations, Option.of(lasting.problem, blocks, lasting.base)]
     if path.beyond_reach_v is not None and len(problem.records) > 1:
-        options += _with_stand_ins(searches.at(problem, "loose"), blocks, declared)
+        options += _with_stand_ins(searches.at(problem, "loose"), blocks)
     named: list[Option] = []
     if path.beyond_reach_v is not None:
         path = measured  # no other search tried an effect
     if measured.chosen.hypothesis:
         path, verdict = measured, partly(measured, verdict, searches.thresholds)
-        named = named_options(lasting, tight, blocks, archive, declared)
+        named = named_options(lasting, tight, blocks, archive)
+    declared = Option.of(problem, blocks, None)
     after, why = written(declared, options, named)
     if after.values is None or not after.hypothesis:
         why = "; ".join(filter(None, (of_refit(declared, recalibrations, options, after), why))) or None
@@ -267,9 +266,7 @@ def with_confidence(verdict: Verdict) -> Verdict:
     return replace(verdict, confidence=frequency_maps()[kind].frequency(verdict.margin))
 
 
-def named_options(
-    path: Path, tight: Path, blocks: Blocks, archive: Archive, declared: Option
-) -> list[Option]:
+def named_options(path: Path, tight: Path, blocks: Blocks, archive: Archive) -> list[Option]:
     """The models with the named effects: (1) own parameters as declared; (2) activation energies as declared too, where
     they are open; (3) own parameters fitted within their tight spreads.
 
@@ -279,7 +276,7 @@ def named_options(
     alone, which one record determines only near its own temperature, five of eleven development drives of its archive
     without their temperature were written as declared that are not with the file's.
 
-    blocks : by which all options are compared.  declared : the declared model, compared by the same blocks.
+    blocks : by which all options are compared.
     """
     named, held = [path], replace(path.problem, energies=False)
     hypothesis = path.chosen.hypothesis
@@ -288,7 +285,7 @@ def named_options(
         found = refitted(problem, path, archive)
         if found is not None:
             named.append(found)
-    return [Option.of(one.problem, blocks, one.chosen, declared) for one in named]
+    return [Option.of(one.problem, blocks, one.chosen) for one in named]
 
 
 def _by_what_lasts(problem: InverseProblem, measured: Path, archive: Archive) -> Path:
@@ -302,25 +299,26 @@ def _by_what_lasts(problem: InverseProblem, measured: Path, archive: Archive) ->
     return measured if found is None else found
 
 
-def _with_stand_ins(wide: Path, blocks: Blocks, declared: Option) -> list[Option]:
+def _with_stand_ins(wide: Path, blocks: Blocks) -> list[Option]:
     """The recalibrated models with added effects, from the steps of a search at the trust `loose`."""
     taken = [step.admitted for step in wide.steps if step.admitted is not None]
     fits = {one.hypothesis: one for one in (*taken, wide.chosen) if one.hypothesis}
-    return [Option.of(wide.problem, blocks, one, declared) for one in fits.values()]
+    return [Option.of(wide.problem, blocks, one) for one in fits.values()]
 
 
-def _recalibrations(problem: InverseProblem, tight: Path, archive: Archive, declared: Option) -> list[Option]:
+def _recalibrations(problem: InverseProblem, tight: Path, archive: Archive) -> list[Option]:
     """The declared model with its own parameters fitted, within their tight and their loose spreads; only fits that do
     no worse than the declared values on the fitted rows."""
     loose = replace(problem, trust="loose")
     wide = base_of(loose, blocks_of(loose), archive)
+    declared = ModelState(problem)
     errors = [
-        (record.thin.voltage_v - declared.state.simulated(record, k, thin=True).voltage_v)[: record.n_fit]
+        (record.thin.voltage_v - declared.simulated(record, k, thin=True).voltage_v)[: record.n_fit]
         for k, record in enumerate(problem.records)
     ]
     most = rms(np.concatenate(errors))
     fits = [(tight.problem, tight.base), *([] if wide is None else [(loose, wide)])]
-    return [Option.of(one, tight.blocks, fit, declared) for one, fit in fits if fit.rmse_v <= most]
+    return [Option.of(one, tight.blocks, fit) for one, fit in fits if fit.rmse_v <= most]
 
 
 def _recalibrated(problem: InverseProblem, recalibrations: Sequence[Option]) -> ModelState:

@@ -235,11 +235,11 @@ def test_at_one_current_there_are_no_ranges_of_it_and_own_parameters_are_not_wri
     assert "rate" not in blocks.folds
     assert "charge" in blocks.folds
     base = base_of(one, blocks, archive)
-    declared = Option.declared(one, blocks)
-    assert not Option.of(one, blocks, base, declared).tested
+    declared = Option.of(one, blocks, None)
+    assert not Option.of(one, blocks, base).tested(declared.usual_error_v)
     held = replace(one, trust="measured")
-    assert Option.of(held, blocks, base_of(held, blocks_of(held), archive), declared).tested
-    moved = Option.of(one, blocks, base, declared)
+    assert Option.of(held, blocks, base_of(held, blocks_of(held), archive)).tested(declared.usual_error_v)
+    moved = Option.of(one, blocks, base)
     declared = replace(declared, left_out=LeftOut((1.0,), (1.0,)))
     assert written(declared, [moved])[0] is declared.state
     assert of_refit(declared, [moved], [moved], declared.state) == f"the recalibrated model: {UNTESTED}"
@@ -371,8 +371,8 @@ def test_all_that_may_be_written_is_held_against_each_other_on_the_same_rows(cel
     tight = searched(problem, 1, archive)
     measured = searched(replace(problem, trust="measured"), 0, archive)
     assert len(measured.blocks) != len(tight.blocks)
-    declared = Option.declared(problem, tight.blocks)
-    options = named_options(measured, tight, tight.blocks, archive, declared)
+    declared = Option.of(problem, tight.blocks, None)
+    options = named_options(measured, tight, tight.blocks, archive)
     assert [one.state.problem.trust for one in options] == ["measured", "tight"]
     assert {len(one.left_out.by_range) for one in options} == {len(declared.left_out.by_range)}
     assert written(declared, [], options)[1] is None

@@ -14,7 +14,6 @@ from aesi.tracer.case.energies import ACTIVATION_ENERGIES, energies_of
 from aesi.tracer.case.free_parameter import of_all_records
 from aesi.tracer.case.trust import MEASURED_CELL
 from aesi.tracer.decide.evidence import named_options
-from aesi.tracer.decide.written import Option
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.report.own_parameters import own_parameters
@@ -116,8 +115,7 @@ def test_what_is_written_of_a_temperature_may_have_the_energies_that_the_file_de
     measured = searched(replace(problem, trust="measured"), 1, archive)
     assert measured.chosen.hypothesis == ("ambient_temperature",)
     tight = searched(problem, 0, archive)
-    declared = Option.declared(problem, tight.blocks)
-    options = named_options(measured, tight, tight.blocks, archive, declared)
+    options = named_options(measured, tight, tight.blocks, archive)
     assert [one.state.problem.energies for one in options] == [True, False, True]
     moved = [ACTIVATION_ENERGIES in one.state.values for one in options]
     assert moved == [True, False, False]  # at the wider trusts they are as declared

@@ -121,10 +121,10 @@ def test_what_says_nothing_of_ordinary_use_is_not_written(cell, few, discharge):
     share, as_believed = (foretold_in_use(problem, blocks, one, MEASURED_V) for one in (fit, untold))
     assert as_believed < 0.5 < share < 1.0
     assert foretold_in_use(problem, blocks, untold, 10.0) == pytest.approx(1.0, abs=1e-3)
-    declared = Option.declared(problem, blocks)
-    assert Option.of(problem, blocks, fit, declared).tested
-    assert not Option.of(problem, blocks, untold, declared).tested
+    declared = Option.of(problem, blocks, None)
+    assert Option.of(problem, blocks, fit).tested(declared.usual_error_v)
+    assert not Option.of(problem, blocks, untold).tested(declared.usual_error_v)
     volts_off = replace(declared, left_out=LeftOut((10.0, 10.0), (10.0,)))
-    assert Option.of(problem, blocks, untold, volts_off).tested  # it may err by as much
+    assert Option.of(problem, blocks, untold).tested(volts_off.usual_error_v)  # it may err by as much
     nowhere = replace(declared, left_out=LeftOut((10.0, np.inf), (10.0,)))
-    assert not Option.of(problem, blocks, untold, nowhere).tested
+    assert not Option.of(problem, blocks, untold).tested(nowhere.usual_error_v)
