@@ -272,6 +272,8 @@ class Store:
 
     def child(self, experiment_id: str, parent: str, label: str) -> Any:
         """The nested run of a label, or None."""
+        if "'" in label:  # which would end the text in the condition
+            return self.children(experiment_id, parent).get(label)
         condition = f"tags.`{PARENT}` = '{parent}' and tags.`{NUMBER}` = '{label}'"
         return next(self.runs(experiment_id, condition), None)
 

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import json
 import math
+import posixpath
+import re
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -26,6 +28,11 @@ from flows.tracking.store import KIND, Store, now_ms, without_login
 PARAMETER_LIMIT = 6000  # MLflow cuts longer ones off
 CUT = "… sha256 "
 """What stands between the beginning of a longer parameter and the hash of all of it."""
+NAME_LIMIT = 250
+"""Letters that MLflow's tables have for the name of a run and for that of a parameter. PostgreSQL refuses a longer name
+of a run, and with it the run: a discovery is called by all of its records."""
+NAME = re.compile(r"[\w.\- /]+")
+"""What the name of a parameter may be made of on every system."""
 SAMPLE_S = 10.0
 """Time between two readings of memory and processor, s."""
 LOCAL_UI = "http://127.0.0.1:5000"
@@ -86,7 +93,7 @@ class Tracker:
         if run_id is None:
             tags = {KIND: "run", "aesi.config_digest": config.digest, **source_tags()}
             name = title or f"{config.name}, seed {config.seed}"
-            self.run_id = store.create_run(self._experiment_id, name, tags)
+            self.run_id = store.create_run(self._experiment_id, _short(name), tags)
         else:
             self.run_id = run_id
             store.client.update_run(run_id, status="RUNNING")
@@ -169,7 +176,7 @@ class Tracker:
                 "experiment_id": self._experiment_id,
                 "parent": self.run_id,
                 "label": label,
-                "name": name,
+                "name": _short(name),
                 "tags": noted,
                 "params": _texts(params),
                 "metrics": _numbers(metrics),
@@ -285,14 +292,29 @@ class Tracker:
 
 
 def flat(content: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Nested mappings as one level of dotted names."""
+    """Nested mappings as one level of dotted names.
+
+    One with a key that is no part of a parameter's name, such as what a file may be called, stays whole: MLflow refuses
+    all parameters that are sent with one that it does not take.
+    """
     result: dict[str, Any] = {}
     for name, value in content.items():
-        if isinstance(value, Mapping) and value:
-            result |= flat(value, f"{prefix}{name}.")
+        dotted = f"{prefix}{name}"
+        if isinstance(value, Mapping) and value and all(_is_name(f"{dotted}.{key}") for key in value):
+            result |= flat(value, f"{dotted}.")
         else:
-            result[f"{prefix}{name}"] = value
+            result[dotted] = value
     return result
+
+
+def _is_name(text: str) -> bool:
+    """Whether MLflow takes a text for the name of a parameter, which it may make a path of."""
+    fits = len(text) <= NAME_LIMIT and NAME.fullmatch(text) is not None
+    return fits and posixpath.normpath(text) == text
+
+
+def _short(name: str) -> str:
+    return name if len(name) <= NAME_LIMIT else f"{name[: NAME_LIMIT - 1]}…"
 
 
 def _texts(values: Mapping[str, Any]) -> dict[str, str]:
