@@ -74,9 +74,7 @@ def _useful_inputs(train: Sequence[ErrorSeries]) -> tuple[tuple[str, ...], tuple
             notes.append(f"{name} is constant over the training records; its terms were left out.")
             continue
         unit = (column - column.min()) / spread
-        twin = next(
-            (other for other, known in kept.items() if np.allclose(unit, known, rtol=0, atol=1e-12)), None
-        )
+        twin = next((other for other, known in kept.items() if _repeats(unit, known)), None)
         if twin is not None:
             notes.append(f"{name} repeats {twin} up to scale; its terms were left out.")
             continue
@@ -84,6 +82,11 @@ def _useful_inputs(train: Sequence[ErrorSeries]) -> tuple[tuple[str, ...], tuple
     if not kept:
         raise DataError("every input is constant over the training records: there is nothing to learn from.")
     return tuple(kept), tuple(notes)
+
+
+def _repeats(unit: Array, known: Array) -> bool:
+    """Whether two columns from 0 to 1 are the same, or one is the other upside down."""
+    return any(np.allclose(each, known, rtol=0, atol=1e-12) for each in (unit, 1.0 - unit))
 
 
 def variables(record: ErrorSeries) -> Array:

@@ -224,6 +224,11 @@ def test_a_repeated_input_is_left_out_with_a_note():
     assert isinstance(evaluate(problem, whole(problem, p_c=1)), Candidate)
 
 
+def test_an_input_that_repeats_another_upside_down_was_kept():
+    problem = Problem.build(with_column(lambda record: 5 - 3 * record.inputs[:, 0]), SMALL)
+    assert "soc repeats I up to scale" in problem.notes[0]
+
+
 def test_a_constant_error_is_refused():
     record = replace(make_record(300), error_v=np.full(300, 0.01))
     with pytest.raises(DataError, match="the voltage error is constant"):

@@ -41,6 +41,17 @@ def test_duplicated_columns_without_ridge_share_the_coefficient(rng):
     assert np.abs(coefficients).max() < 10
 
 
+@pytest.mark.parametrize("of_others", [(-1.0, 0.0, 0.0), (0.3, 0.7, 0.1), (0.0, 1.0, 1.0)])
+def test_a_term_that_is_a_sum_of_others_gave_coefficients_of_1e13(rng, of_others):
+    theta = rng.normal(size=(500, 3))
+    y = theta @ [1.0, 2.0, -1.0] + 0.1 * rng.normal(size=500)
+    more = np.column_stack([theta, theta @ of_others])
+    coefficients = STRidge(0.0, 0.0).fit(more, y)
+    # The term adds nothing, so that the least squares predict the same; they were off by a hundredth.
+    np.testing.assert_allclose(more @ coefficients, theta @ STRidge(0.0, 0.0).fit(theta, y), atol=1e-12)
+    assert np.abs(coefficients).max() < 10
+
+
 def test_fewer_rows_than_terms_is_solved_by_the_ridge(rng):
     theta, y = rng.normal(size=(5, 9)), rng.normal(size=5)
     expected = np.linalg.solve(theta.T @ theta + 0.1 * np.eye(9), theta.T @ y)
