@@ -2,13 +2,14 @@
 
 MLflow writes the absolute address of an experiment's artifacts into the database. Artifacts of this project lie
 beside the database, in mlartifacts/<experiment>, so a database that lies beside such a folder and points
-elsewhere was moved.
+elsewhere was moved. The folder keeps its name where the experiment is given another one.
 """
 
 from __future__ import annotations
 
 import sqlite3
 from pathlib import Path
+from urllib.parse import unquote
 
 FOLDER = "mlartifacts"
 HOLDERS = (
@@ -49,9 +50,10 @@ def _moved(connection: sqlite3.Connection, database: Path) -> list[str]:
     said = []
     known = connection.execute("SELECT name, artifact_location FROM experiments").fetchall()
     for name, before in known:
-        folder = artifact_folder(database, name)
-        if before is None or before.rsplit("/", 2)[-2:] != [FOLDER, folder.as_uri().rsplit("/", 1)[-1]]:
+        *_, above, own = ("", "", *(before or "").split("/"))
+        if above != FOLDER or not own:
             continue  # the user's own place
+        folder = artifact_folder(database, unquote(own))
         now = folder.as_uri()
         if before in (now, str(folder)) or not folder.is_dir():
             continue

@@ -34,6 +34,16 @@ def test_a_moved_store_carried_no_readable_summary(finished, tmp_path, monkeypat
     assert not Store(uri).notes  # once is enough
 
 
+def test_a_renamed_experiment_could_not_be_read_once_its_store_had_moved(finished, tmp_path):
+    original = copied(finished, tmp_path / "original")
+    store = Store(f"sqlite:///{original / 'mlflow.db'}")
+    store.client.rename_experiment(store.find_experiment("smoke"), "the first try")
+    before = tables_of("the first try", uri=store.uri)
+    store.database.engine.dispose()
+    moved = original.rename(tmp_path / "moved")
+    assert tables_of("the first try", uri=f"sqlite:///{moved / 'mlflow.db'}") == before
+
+
 def test_a_discovery_of_the_same_experiment_took_the_place_of_its_runs(finished, tmp_path):
     here = copied(finished, tmp_path / "here")
     uri = f"sqlite:///{here / 'mlflow.db'}"
