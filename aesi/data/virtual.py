@@ -56,7 +56,8 @@ class Laboratory:
     """A cell file, changes to its cell, and the instruments that measure it.
 
     effects : ids of changes, at `magnitude` times their typical strength.  values : change id -> value name -> value,
-    which replaces the typical one.  seed : seed of the instruments' noise.
+    which replaces the typical one.  thermocouple : whether the records have a temperature column; None gives them one
+    where the cell heats itself.  seed : seed of the instruments' noise.
     """
 
     bpx: Path
@@ -65,6 +66,7 @@ class Laboratory:
     magnitude: float = 1.0
     values: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     instrument: Instrument = INSTRUMENT
+    thermocouple: bool | None = None
     seed: int = 0
 
     @property
@@ -84,10 +86,10 @@ class Laboratory:
         rng = np.random.default_rng([self.seed, *profile.name.encode()])
         mix = ", ".join(self.effects) or "nothing added"
         note = f"{profile.name}: virtual, {self.model} of {self.bpx.name} with {mix}; seed {self.seed}."
-        warm = "self_heating" in self.effects
+        written = "self_heating" in self.effects if self.thermocouple is None else self.thermocouple
         trace = simulate_truth(self.setup(), profile)
         notes = (note, *self._outside(profile.name, trace.voltage_v))
-        return self.instrument.write(trace, profile.name, rng, warm, notes)
+        return self.instrument.write(trace, profile.name, rng, written, notes)
 
     def _outside(self, name: str, voltage_v: Array) -> tuple[str, ...]:
         """A note where the voltage leaves the declared window; a cycler would stop there."""

@@ -1,4 +1,5 @@
-"""Puts the virtual records that an experiment falls back to into the package: `python docs/hooks/ship.py EXPERIMENT`.
+"""Puts virtual records that experiments simulate, or fall back to, into the package:
+`python docs/hooks/ship.py EXPERIMENT ...`.
 
 Run it after a change of the laboratory, of the cell file or of the profiles: entries are found by their content, so
 old ones are not wrong, only never met.
@@ -10,27 +11,31 @@ import os
 import shutil
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 
-def main(experiment: str) -> None:
-    """Simulate the records in an empty cache and move them beside the laboratory."""
+def main(experiments: Sequence[str]) -> None:
+    """Simulate the records of all these in an empty cache and move them beside the laboratory, in place of those
+    that are there."""
     with tempfile.TemporaryDirectory() as folder:
         os.environ["AESI_CACHE"] = folder
         from aesi.data.laboratory import cache
         from aesi.pipeline.experiment.config import read_experiment
         from aesi.pipeline.experiment.sources import cell_path, virtual_experiment
 
-        config = read_experiment(experiment)
-        if config.fallback is not None:
-            config = config.model_copy(update={"data": config.fallback.data, "cell": config.fallback.cell})
+        for config in map(read_experiment, experiments):
+            if config.fallback is not None:
+                config = config.model_copy(
+                    update={"data": config.fallback.data, "cell": config.fallback.cell}
+                )
+            virtual_experiment(config, cell_path(config))
         shutil.rmtree(cache.SHIPPED, ignore_errors=True)
-        virtual_experiment(config, cell_path(config))
-        cache.SHIPPED.mkdir(exist_ok=True)
+        cache.SHIPPED.mkdir()
         for path in sorted((Path(folder) / "laboratory").glob("*.npz")):
             shutil.move(path, cache.SHIPPED / path.name)
             print(cache.SHIPPED / path.name)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(sys.argv[1:])

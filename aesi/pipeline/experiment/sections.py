@@ -101,6 +101,8 @@ class VirtualConfig(Section):
     values : parameters of effects, as `{id: {parameter: value}}`, in place of the typical ones.
     pulse_c : C, rate of the charge pulse after each training schedule.
     other_load : factor on the vehicle's current in the validation and test schedules; 2 takes them to 3.1C.
+    thermocouple : whether the records have a temperature column; None gives them one where the cell heats itself
+    (`self_heating`).
     seed : random seed of the sensor noise.
     """
 
@@ -110,6 +112,7 @@ class VirtualConfig(Section):
     values: dict[str, dict[str, float]] = {}
     pulse_c: Annotated[float, Field(ge=0)] = 5.0
     other_load: Positive = 2.0
+    thermocouple: bool | None = None
     seed: Annotated[int, Field(ge=0)] = 0
 
 

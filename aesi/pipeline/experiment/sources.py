@@ -163,7 +163,15 @@ def virtual_experiment(config: ExperimentConfig, cell: Path) -> VirtualExperimen
 
     wanted = config.data.virtual
     effects = DEFAULT_MIX if wanted.effects is None else wanted.effects
-    laboratory = Laboratory(cell, wanted.model, effects, wanted.magnitude, wanted.values, seed=wanted.seed)
+    laboratory = Laboratory(
+        cell,
+        wanted.model,
+        effects,
+        wanted.magnitude,
+        wanted.values,
+        thermocouple=wanted.thermocouple,
+        seed=wanted.seed,
+    )
     return paper_experiment(laboratory, config.data.dt_s, wanted.pulse_c, wanted.other_load)
 
 

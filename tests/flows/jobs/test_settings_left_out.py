@@ -13,6 +13,7 @@ VIRTUAL = {
     "values": {},
     "pulse_c": 2.0,
     "other_load": 2.0,
+    "thermocouple": None,
     "seed": 0,
 }
 FULL = {

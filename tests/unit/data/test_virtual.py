@@ -39,6 +39,9 @@ def test_the_temperature_is_written_where_it_changes(nmc):
     assert Laboratory(nmc, "SPMe").measure(profile()).temperature_degc is None
     warm = Laboratory(nmc, "SPMe", ("self_heating",)).measure(profile())
     assert warm.temperature_degc is not None
+    withheld = Laboratory(nmc, "SPMe", ("self_heating",), thermocouple=False).measure(profile())
+    assert withheld.temperature_degc is None
+    np.testing.assert_array_equal(withheld.voltage_v, warm.voltage_v)
 
 
 def test_a_magnitude_scales_the_effect(nmc):
