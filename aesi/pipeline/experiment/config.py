@@ -103,8 +103,19 @@ class ExperimentConfig(Section):
                 f"fallback: it stands in for a data set that cannot be had, and data are of kind: {self.data.kind}; "
                 "leave it out"
             )
-        if self.data.kind == "virtual" and self.discover is not None and self.discover.listed:
+        return self
+
+    @model_validator(mode="after")
+    def _discovers_what_it_says(self) -> ExperimentConfig:
+        wanted, virtual = self.discover, self.data.kind == "virtual"
+        if wanted is None:
+            return self
+        if virtual and wanted.listed:
             raise ValueError("discover: kind: virtual brings its own records; leave out fit, test and good")
+        if virtual and wanted.hold is not None:
+            raise ValueError("discover: the hold of kind: virtual is known; leave out hold")
+        if wanted.until_s is not None and not (virtual or wanted.test):
+            raise ValueError("discover: until_s cuts test records, and test names none; leave it out")
         return self
 
     @model_validator(mode="after")

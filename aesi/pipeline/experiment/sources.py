@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -133,7 +134,8 @@ def discovery_records(
     """
     if config.data.kind == "virtual":
         experiment = virtual_experiment(config, cell)
-        return experiment.train, experiment.test, ()
+        stop_s = math.inf if wanted.until_s is None else wanted.until_s
+        return experiment.train, tuple(test.take(test.time_s <= stop_s) for test in experiment.test), ()
     placed = _placed(_locator(config), (*wanted.fit, *wanted.test, *wanted.good))
     hold = wanted.hold or config.data.declared_hold
 
