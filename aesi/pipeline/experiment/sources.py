@@ -9,6 +9,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from aesi.data.read import Reading, read
 from aesi.data.reading import record_names
 from aesi.data.virtual import DEFAULT_MIX
@@ -135,7 +137,9 @@ def discovery_records(
     if config.data.kind == "virtual":
         experiment = virtual_experiment(config, cell)
         stop_s = math.inf if wanted.until_s is None else wanted.until_s
-        return experiment.train, tuple(test.take(test.time_s <= stop_s) for test in experiment.test), ()
+        ends = (int(np.searchsorted(test.time_s, stop_s, side="right")) for test in experiment.test)
+        cut = (test.take(slice(end)) for test, end in zip(experiment.test, ends, strict=True))
+        return experiment.train, tuple(cut), ()
     placed = _placed(_locator(config), (*wanted.fit, *wanted.test, *wanted.good))
     hold = wanted.hold or config.data.declared_hold
 
