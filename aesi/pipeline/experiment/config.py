@@ -107,15 +107,13 @@ class ExperimentConfig(Section):
 
     @model_validator(mode="after")
     def _discovers_what_it_says(self) -> ExperimentConfig:
-        wanted, virtual = self.discover, self.data.kind == "virtual"
-        if wanted is None:
-            return self
-        if virtual and wanted.listed:
-            raise ValueError("discover: kind: virtual brings its own records; leave out fit, test and good")
-        if virtual and wanted.hold is not None:
-            raise ValueError("discover: the hold of kind: virtual is known; leave out hold")
-        if wanted.until_s is not None and not (virtual or wanted.test):
-            raise ValueError("discover: until_s cuts test records, and test names none; leave it out")
+        if self.discover is not None and self.data.kind == "virtual":
+            if self.discover.listed:
+                raise ValueError(
+                    "discover: kind: virtual brings its own records; leave out fit, test and good"
+                )
+            if self.discover.hold is not None:
+                raise ValueError("discover: the hold of kind: virtual is known; leave out hold")
         return self
 
     @model_validator(mode="after")

@@ -147,10 +147,6 @@ def test_an_inadmissible_value_is_named(changes, words):
         ({"data": {"kind": "virtual"}, "discover": {"test": ["a"]}}, "leave out fit, test and good"),
         ({"data": {"kind": "virtual"}, "discover": {"hold": "backward"}}, "is known; leave out hold"),
         (
-            {"discover": {"fit": ["a.csv"], "until_s": 60}},
-            "discover: until_s cuts test records, and test names none",
-        ),
-        (
             {"data": {"kind": "virtual", "virtual": {"values": {"double_layer": {"capacity_f_m2": 3.0}}}}},
             "data.virtual: values is about double_layer, which the cell does not have; its effects are: ocv_hysteresis",
         ),
