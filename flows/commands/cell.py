@@ -128,7 +128,7 @@ def calibrate(
             help="Mass of this cell, g. It sets the density. Default: the density of the start file."
         ),
     ] = None,
-    soc0: options.Soc0 = None,
+    soc0: options.RecordSoc0 = None,
     temperature: Annotated[
         list[str] | None,
         typer.Option(
@@ -160,7 +160,7 @@ def calibrate(
             "be repeated. Example: contact.resistance=0.0108:0.0012 (ohm).",
         ),
     ] = None,
-    hold: options.HoldOption = None,
+    hold: options.RecordHold = None,
     until: Annotated[
         list[str] | None,
         typer.Option(
@@ -315,7 +315,7 @@ def discover(
             "--data differs from it.",
         ),
     ] = None,
-    soc0: options.Soc0 = None,
+    soc0: options.RecordSoc0 = None,
     soh: options.SohOption = None,
     holdout: Annotated[
         float | None,
@@ -328,7 +328,7 @@ def discover(
     max_effects: options.MaxEffects = 3,
     seed: options.Seed = 0,
     effect_file: options.EffectFiles = None,
-    hold: options.HoldOption = None,
+    hold: options.RecordHold = None,
     only: Annotated[
         list[str] | None,
         typer.Option(

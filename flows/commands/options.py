@@ -73,15 +73,20 @@ def state_of_health(text: str | None) -> Soh | None:
         raise InputError(f"--soh {text}: {error}") from None
 
 
+SOC0_HELP = "State of charge at the first row, 0 (empty) to 1 (full). Default: read from the measured voltage"
 Soc0 = Annotated[
     float | None,
     typer.Option(
         "--soc0",
         callback=share("--soc0"),
-        help="State of charge at the first row, 0 (empty) to 1 (full). Default: read from the measured voltage; a "
-        "profile without a voltage takes that of a saved model.",
+        help=f"{SOC0_HELP}; a profile without a voltage takes that of a saved model.",
     ),
 ]
+RecordSoc0 = Annotated[
+    float | None,
+    typer.Option("--soc0", callback=share("--soc0"), help=f"{SOC0_HELP}."),
+]
+"""`Soc0` of a command whose records all have a voltage."""
 SohOption = Annotated[
     str | None,
     typer.Option(
@@ -108,15 +113,19 @@ EffectFiles = Annotated[
         "trust.",
     ),
 ]
+HOLD_HELP = (
+    "Current between two rows. linear: a straight line; backward: constant since the row before, as loggers record it. "
+    "Default: {}backward for a measurement with rows more than 5 s apart, and linear otherwise. A message says which "
+    "was used."
+)
 HoldOption = Annotated[
     Literal["linear", "backward"] | None,
-    typer.Option(
-        "--hold",
-        help="Current between two rows. linear: a straight line; backward: constant since the row before, as loggers "
-        "record it. Default: that of a saved model; else backward for a measurement with rows more than 5 s apart, and "
-        "linear otherwise. A message says which was used.",
-    ),
+    typer.Option("--hold", help=HOLD_HELP.format("that of a saved model; else ")),
 ]
+RecordHold = Annotated[
+    Literal["linear", "backward"] | None, typer.Option("--hold", help=HOLD_HELP.format(""))
+]
+"""`HoldOption` of a command that fits: the rows of a record tell, also where --cell is a saved model."""
 
 
 def _no_key_twice(pairs: list[str] | None) -> list[str] | None:

@@ -1,8 +1,8 @@
 """Every Python and console block of the README and the documentation, run in the order of its page.
 
 A page runs in one working folder and one namespace. Jobs that take minutes run as smaller ones of the same
-kind; nothing else about the text is changed. A block of text below a console block shows lines of its output, whose
-words are compared; figures may differ from machine to machine.
+kind; nothing else about the text is changed. A block of text below a console or Python block shows lines of its output,
+whose words are compared; figures may differ from machine to machine.
 """
 
 import contextlib
@@ -92,7 +92,7 @@ def _run_page(page, request, slow):
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_text(block.body, encoding="utf-8")
         elif block.language == "python":
-            _run_python(block.body, where, namespace)
+            said = _run_python(block.body, where, namespace)
         else:
             said = _run_console(block.body, where)
 
@@ -117,16 +117,18 @@ def _require(request, data_set):
 
 
 def _run_python(body, where, namespace):
-    """Plain code is executed; a transcript with prompts is compared with what it shows."""
+    """Plain code is executed, and what it printed returned; a transcript with prompts is compared with its output."""
     if not body.startswith(">>> "):
-        with contextlib.redirect_stdout(io.StringIO()):
+        printed = io.StringIO()
+        with contextlib.redirect_stdout(printed):
             exec(compile(body, where, "exec"), namespace)
-        return
+        return printed.getvalue()
     test = doctest.DocTestParser().get_doctest(body, namespace, where, where, 0)
     said = io.StringIO()
     runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
     assert runner.run(test, out=said.write, clear_globs=False).failed == 0, said.getvalue()
     namespace.update(test.globs)
+    return None
 
 
 def _require_words(shown, said, where):

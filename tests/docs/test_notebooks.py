@@ -3,6 +3,8 @@
 Here their cells are executed as one program, without a kernel, so that no notebook server is needed to test them.
 """
 
+import contextlib
+import io
 import json
 import re
 from pathlib import Path
@@ -12,6 +14,9 @@ import pytest
 NOTEBOOKS = sorted((Path(__file__).resolve().parents[2] / "notebooks").glob("*.ipynb"))
 QUICK = {"interoperability"}
 """Run with every test; the others search, which takes minutes."""
+REMEDY = "python docs/hooks/notebooks.py makes them again"
+FIGURES_AS_FAR = 0.05
+"""Share by which a figure that no search has chosen may differ from machine to machine. A convention."""
 RUNS = [pytest.param(path, marks=() if path.stem in QUICK else pytest.mark.slow) for path in NOTEBOOKS]
 
 
@@ -49,4 +54,20 @@ def test_a_notebook_runs(path, tmp_path, monkeypatch):
     monkeypatch.chdir(path.parent)
     namespace = {"__name__": "__main__"}
     for number, cell in enumerate(cells(path, "code"), start=1):
-        exec(compile("".join(cell["source"]), f"{path.name}, code cell {number}", "exec"), namespace)
+        said = io.StringIO()
+        with contextlib.redirect_stdout(said):
+            exec(compile("".join(cell["source"]), f"{path.name}, code cell {number}", "exec"), namespace)
+        shown = "".join("".join(each["text"]) for each in cell["outputs"] if each["output_type"] == "stream")
+        if _words(shown) != _words(said.getvalue()):
+            pytest.fail(f"cell {number} shows\n{shown}\nof\n{said.getvalue()}\n{REMEDY}")
+        if path.stem in QUICK:
+            assert _figures(shown) == pytest.approx(_figures(said.getvalue()), rel=FIGURES_AS_FAR), REMEDY
+
+
+def _words(text):
+    """Lines without figures, which differ from machine to machine where a search chooses."""
+    return [re.sub(r"[-+]?\d[\d.,]*", "#", line.strip()) for line in text.strip().splitlines()]
+
+
+def _figures(text):
+    return [float(each) for each in re.findall(r"-?\d+(?:\.\d+)?", text)]

@@ -103,8 +103,17 @@ class ExperimentConfig(Section):
                 f"fallback: it stands in for a data set that cannot be had, and data are of kind: {self.data.kind}; "
                 "leave it out"
             )
-        if self.data.kind == "virtual" and self.discover is not None and self.discover.listed:
-            raise ValueError("discover: kind: virtual brings its own records; leave out fit, test and good")
+        return self
+
+    @model_validator(mode="after")
+    def _discovers_what_it_says(self) -> ExperimentConfig:
+        if self.discover is not None and self.data.kind == "virtual":
+            if self.discover.listed:
+                raise ValueError(
+                    "discover: kind: virtual brings its own records; leave out fit, test and good"
+                )
+            if self.discover.hold is not None:
+                raise ValueError("discover: the hold of kind: virtual is known; leave out hold")
         return self
 
     @model_validator(mode="after")

@@ -115,6 +115,23 @@ class VirtualConfig(Section):
     thermocouple: bool | None = None
     seed: Annotated[int, Field(ge=0)] = 0
 
+    @model_validator(mode="after")
+    def _effects_that_are_there(self) -> VirtualConfig:
+        from aesi.data.virtual import DEFAULT_MIX
+
+        effects = DEFAULT_MIX if self.effects is None else self.effects
+        twice = next((name for name in effects if effects.count(name) > 1), None)
+        if twice is not None:
+            raise ValueError(
+                f"{twice} is in effects twice; give it once, with `magnitude` or `values` for its size"
+            )
+        if unread := [name for name in self.values if name not in effects]:
+            raise ValueError(
+                f"values is about {unread[0]}, which the cell does not have; its effects are: "
+                f"{', '.join(effects) or 'none'}"
+            )
+        return self
+
 
 READING_KEYS = ("columns", "units", "sign", "state_words", "duplicates", "from_s", "to_s")
 """Keys of the section `data` that say how files are read."""
@@ -131,9 +148,11 @@ class DataConfig(Section):
     train : files or records that are trained on.
     valid : files or records on which the search validates its candidates; without any, parts of the training records.
     test : files or records that the finished models are tested on, once.
-    dt_s : s, time step to which the records are resampled; also that of the correction and of its bands.
-    hold : current between rows, `backward` (constant since the row before) or `linear`. A discovery uses it only if it
-    is given here, and `discover.hold` takes precedence.
+    dt_s : s, time step to which the records are resampled; also that of the correction and of its bands. With kind
+    `virtual` it is that of the records. A discovery takes the rows of files as they are.
+    hold : current between rows, `backward` (constant since the row before) or `linear`; with kind `virtual`, whose
+    current runs in straight lines, the default is `linear`. A discovery uses it only if it is given here, and
+    `discover.hold` takes precedence.
     columns : columns of the files, as `{quantity: name}`, for a quantity, `state`, `cycle` or `step`. `state` is the
     column that gives a current its sign. For the temperature, None leaves it out and a number states it, degC.
     units : units of columns, as `{quantity: unit}` (`mA`, `mV`, `h`, `K`, `h:m:s`, `date` or a strptime pattern).
@@ -163,6 +182,14 @@ class DataConfig(Section):
     from_s: dict[str, float] = {}
     to_s: dict[str, float] = {}
     virtual: VirtualConfig = VirtualConfig()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _virtual_in_straight_lines(cls, value: object) -> object:
+        """The default of `hold` for the laboratory's records, which are simulated with a linear current."""
+        if isinstance(value, Mapping) and value.get("kind") == "virtual":
+            return {"hold": "linear", **value}
+        return value
 
     @model_validator(mode="after")
     def _complete(self) -> DataConfig:
@@ -452,7 +479,7 @@ class DiscoverConfig(Section):
     test : held-out records; a record that is in `fit` as well is tested on the part after `fit_until_s`.
     good : known-good records of the cell; the search is then for what differs in the records of `fit`.
     fit_until_s : s, time up to which a record of `fit` is fitted, as `{record: time}`.
-    until_s : s, time up to which every test record is used.
+    until_s : s, time up to which every test record is used; those of kind `virtual`, too.
     holdout : share of each record, at its end, that is held out if there are no test records; None takes 0.3.
     hold : current between rows, `backward` or `linear` (known with `data.kind: virtual`). None takes `data.hold` if the
     file gives it, else `backward` for a record with rows more than 5 s apart and `linear` for others.

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from aesi.data.read import Reading, read
 from aesi.data.reading import record_names
@@ -133,7 +136,10 @@ def discovery_records(
     """
     if config.data.kind == "virtual":
         experiment = virtual_experiment(config, cell)
-        return experiment.train, experiment.test, ()
+        stop_s = math.inf if wanted.until_s is None else wanted.until_s
+        ends = (int(np.searchsorted(test.time_s, stop_s, side="right")) for test in experiment.test)
+        cut = (test.take(slice(end)) for test, end in zip(experiment.test, ends, strict=True))
+        return experiment.train, tuple(cut), ()
     placed = _placed(_locator(config), (*wanted.fit, *wanted.test, *wanted.good))
     hold = wanted.hold or config.data.declared_hold
 

@@ -731,6 +731,16 @@ def test_every_command_is_told_in_one_whole_line(call):
     assert "..." not in out.split("Commands:")[1]
 
 
+@pytest.mark.parametrize(
+    ("command", "takes"), [("simulate", True), ("predict", True), ("discover", False), ("calibrate", False)]
+)
+def test_how_the_current_runs_was_said_to_be_of_a_saved_model_where_rows_tell_it(call, command, takes):
+    _, out, _ = call(command, "--help")
+    told = " ".join(out.split()).split("--hold <linear|backward>")[1].split("A message says")[0]
+    assert ("Default: that of a saved model" in told) == takes
+    assert "more than 5 s apart" in told
+
+
 def test_a_short_record_in_milliseconds_was_converted_without_a_word(call, tmp_path):
     cell = aesi.Cell.from_bpx(LG_M50)
     time_s = np.arange(0.0, 1200.0)

@@ -145,11 +145,33 @@ def test_an_inadmissible_value_is_named(changes, words):
             "a.csv: from_s, 60 s, has to be before",
         ),
         ({"data": {"kind": "virtual"}, "discover": {"test": ["a"]}}, "leave out fit, test and good"),
+        ({"data": {"kind": "virtual"}, "discover": {"hold": "backward"}}, "is known; leave out hold"),
+        (
+            {"data": {"kind": "virtual", "virtual": {"values": {"double_layer": {"capacity_f_m2": 3.0}}}}},
+            "data.virtual: values is about double_layer, which the cell does not have; its effects are: ocv_hysteresis",
+        ),
+        (
+            {"data": {"kind": "virtual", "virtual": {"effects": ["film_growth", "film_growth"]}}},
+            "data.virtual: film_growth is in effects twice",
+        ),
         ({"fallback": {"data": {"kind": "virtual"}, "cell": {}}}, "fallback: it stands in for a data set"),
     ],
 )
 def test_what_an_experiment_says_and_nothing_reads_was_passed_over_in_silence(changes, words):
     assert words in sentence(changes)
+
+
+@pytest.mark.parametrize("said", [{}, {"hold": "backward"}])
+def test_a_virtual_current_was_taken_as_a_loggers_where_nothing_said_how_it_runs(said):
+    """The laboratory's current runs in straight lines: a cell that lacks nothing erred by more than its noise."""
+    data = {"kind": "virtual", **said}
+    config = parse_experiment({"name": "a", "data": data})
+    assert config.data.hold == said.get("hold", "linear")
+    files = {"kind": "catalogue", "set": "lg_18650hg2", "train": ["a"], "test": ["b"]}
+    measured = parse_experiment({"name": "a", "data": files, "fallback": {"data": data, "cell": {}}})
+    assert measured.data.hold == "backward"
+    assert measured.data.declared_hold is None
+    assert measured.fallback.data.hold == config.data.hold
 
 
 @pytest.mark.parametrize(

@@ -9,12 +9,15 @@ from small_experiment import BPX, PERIOD_S, SOC0, experiment, write_record
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.read import read
 from aesi.data.reading import Reading
+from aesi.data.virtual import VirtualExperiment
 from aesi.errors import DataError, SimulationError
 from aesi.physics import Cell, simulate
 from aesi.physics.initial_state import OTHER_STATE
+from aesi.pipeline.experiment import sources
 from aesi.pipeline.experiment.config import parse_experiment
 from aesi.pipeline.experiment.load import load
 from aesi.pipeline.experiment.sources import _record, discovery_records, sources_of, with_keys
+from aesi.records import Measurement
 
 
 def written(folder: Path, header: str, sign: float = 1.0) -> Path:
@@ -95,6 +98,17 @@ def test_the_rows_of_a_record_were_cut_for_commands_alone(tmp_path):
     (fit,), _, (good,) = discovery_records(config, config.discover, Path("unread.bpx.json"))
     assert (fit.time_s[0], fit.time_s[-1]) == (20.0, 60.0)
     np.testing.assert_array_equal(good.current_a, taken.current_a)
+
+
+def test_the_end_of_test_records_was_not_read_for_virtual_ones(monkeypatch):
+    time_s = np.arange(100.0)
+    train, test = (Measurement(time_s, 0.0 * time_s, 3.7 + 0.0 * time_s, name=name) for name in "ab")
+    made = VirtualExperiment((train,), (), (test,), {"a": 0.5, "b": 0.5})
+    monkeypatch.setattr(sources, "virtual_experiment", lambda config, cell: made)
+    content = {"name": "cut", "data": {"kind": "virtual"}, "discover": {"until_s": 60}}
+    config = parse_experiment(content)
+    (fit,), (held_out,), _ = discovery_records(config, config.discover, Path("unread.bpx.json"))
+    assert (fit.time_s[-1], held_out.time_s[-1]) == (99.0, 60.0)
 
 
 def test_records_of_one_name_in_one_folder_keep_their_suffix(tmp_path):
