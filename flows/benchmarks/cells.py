@@ -13,6 +13,7 @@ from typing import Any
 
 from aesi.bench.hybrid.splits import judged
 from aesi.bench.physics import cells as physics
+from aesi.bench.physics.cells_table import archive_table, table
 from aesi.errors import AesiError
 from aesi.pipeline.experiment.config import read_experiment
 from flows.benchmarks.page import write_between
@@ -51,9 +52,9 @@ def run(
         rows.append(row)
         yield row
     if write is not None and archive:
-        write_between(write, *ARCHIVE_MARKS, physics.archive_table(rows[:-1]))
+        write_between(write, *ARCHIVE_MARKS, archive_table(rows[:-1]))
     elif write is not None:
-        write_between(write, BEGIN, END, physics.table(rows[:-1]))
+        write_between(write, BEGIN, END, table(rows[:-1]))
 
 
 @cache
