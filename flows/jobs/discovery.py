@@ -240,7 +240,7 @@ def _say_result(
     )
     from aesi.pipeline.report.words.moved import moved_findings
 
-    console.say(short_finding(content, sure=True))
+    console.say(short_finding(content, with_confidence=True))
     for warning in content["warnings"]:
         console.say(f"  WARNING: {warning}")
     said = (

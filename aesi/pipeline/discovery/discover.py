@@ -175,7 +175,7 @@ def write_discovery(out: Path, case: Case, found: Discovery, mlflow_run_id: str 
     write_whole(out / FINDING, json.dumps(content, indent=1, allow_nan=False) + "\n")
     found_model(found).save(out / MODEL)
     title = ", ".join(m.name for m in case.measurements)
-    write_discovery_report(out / REPORT, view(found, content, title, mlflow_run_id))
+    write_discovery_report(out / REPORT, discovery_view(found, content, title, mlflow_run_id))
     return content
 
 
@@ -326,7 +326,9 @@ def _pointers(found: Discovery) -> list[dict[str, Any]]:
     ]
 
 
-def view(found: Discovery, content: Mapping[str, Any], title: str, mlflow_run_id: str = "") -> DiscoveryView:
+def discovery_view(
+    found: Discovery, content: Mapping[str, Any], title: str, mlflow_run_id: str = ""
+) -> DiscoveryView:
     """The view that the report is made of."""
     titles = {name: _title(name) for name in (*CATALOGUE, *(c.effect for c in found.candidates))}
     return DiscoveryView(
