@@ -97,10 +97,12 @@ def _evenly_sampled(run: Run, residual: Array) -> ErrorSeries:
 
 
 def _with_next_inputs(series: ErrorSeries) -> ErrorSeries:
+    """The series with the inputs of the next row in each row; the last row keeps its own."""
     return replace(series, inputs=np.vstack([series.inputs[1:], series.inputs[-1:]]))
 
 
 def _resampled(series: ErrorSeries, dt_s: float) -> ErrorSeries:
+    """The series at even steps of `dt_s`, s, by linear interpolation; as it is if it has them already."""
     if series.dt_s == dt_s and np.ptp(np.diff(series.time_s)) < 0.01 * dt_s:
         return series
     time = np.arange(series.time_s[0], series.time_s[-1], dt_s)
@@ -114,22 +116,23 @@ def _resampled(series: ErrorSeries, dt_s: float) -> ErrorSeries:
 
 
 def _of_one_rate(records: Sequence[ErrorSeries]) -> Yardstick:
+    """The yardstick of records of one sampling rate."""
     options = _options(records)
     try:
         problem = Problem.build(Split(tuple(records), (), ()), options)
     except DataError:  # too few samples, or nothing that varies
         return Yardstick()
     every = np.ones(len(problem.library), dtype=bool)
-    without = max((_candidate(problem, every, ridge, False) for ridge in RIDGES), key=_share)
-    whole = _candidate(problem, every, RIDGES[-1], True)
-    best = max(without, whole, key=_share)
+    without_past = max((_candidate(problem, every, ridge, feedback=False) for ridge in RIDGES), key=_share)
+    with_past = _candidate(problem, every, RIDGES[-1], feedback=True)
+    best = max(without_past, with_past, key=_share)
     if best is None:
         return Yardstick()
     square = float(np.mean(np.concatenate([r.error_v for r in records]) ** 2))
     shares = {
-        text: _share(whole) - _share(without)
+        text: _share(with_past) - _share(without_past)
         if ERROR in names
-        else _share(_candidate(problem, _terms_in(problem.library, names), RIDGES[0], False))
+        else _share(_candidate(problem, _terms_in(problem.library, names), RIDGES[0], feedback=False))
         for text, names in POINTS_TO.items()
     }
     pointers = {
@@ -155,6 +158,8 @@ def _options(records: Sequence[ErrorSeries]) -> Options:
 
 
 def _candidate(problem: Problem, terms: BoolArray, ridge: float, feedback: bool) -> Candidate | None:
+    """The correction with these terms, (m,), or None if it cannot be fitted.  feedback : whether it may use the error's
+    own past."""
     genome = Genome.of(terms, ridge, THRESHOLD, 0.5, ORDER, DEGREE, feedback)
     outcome = evaluate(problem, genome)
     return None if isinstance(outcome, Failed) else outcome
