@@ -79,7 +79,7 @@ def with_model(
     reduced = _fine(problem, "espm")
     if declared is not None and not declared.notable:
         reduced = let_stand(reduced, declared.shift_v)
-    single = _Single(reduced, archive_of(reduced, None), search, max_effects, declared)
+    single = _SingleParticle(reduced, archive_of(reduced, None), search, max_effects, declared)
     if problem.has_good:
         return _chosen(
             single.full_search(), "espm", declared, ", since its approximations act on the good records, too"
@@ -96,7 +96,7 @@ class _FirstSearch:
 
 
 @dataclass(frozen=True, eq=False)
-class _Single:
+class _SingleParticle:
     """The searches of a case with the single particle.
 
     declared : difference of the two models of the declared cell.
@@ -135,7 +135,7 @@ class _Single:
 
 
 def _chosen_by_records(
-    single: _Single, problem: InverseProblem, archive_of: ArchiveOf
+    single: _SingleParticle, problem: InverseProblem, archive_of: ArchiveOf
 ) -> tuple[Evidence, ModelChoice]:
     """The single particle, where the two models do not differ notably (on the declared cell and on the one it ended
     with), or where it leaves far more than they differ by; else the believed one of both."""
@@ -151,23 +151,27 @@ def _chosen_by_records(
             reduction,
             ", whose error is far larger than the difference of the two models",
         )
-    full = _fine(problem, "dfn")
-    return _compared(single, first, full, archive_of(full, single.archive), reduction)
+    porous = _fine(problem, "dfn")
+    return _compared(single, first, porous, archive_of(porous, single.archive), reduction)
 
 
 def _compared(
-    single: _Single, first: _FirstSearch, full: InverseProblem, archive: Archive, reduction: Reduction
+    single: _SingleParticle,
+    first: _FirstSearch,
+    porous: InverseProblem,
+    archive: Archive,
+    reduction: Reduction,
 ) -> tuple[Evidence, ModelChoice]:
     """The model whose search is believed, after a search with each.
 
-    full, archive : of the porous electrode. Where that one needs effects, the single particle is searched for all.
+    porous, archive : of the porous electrode. Where that one needs effects, the single particle is searched for all.
     """
-    needs_effects = not first.complete and single.search(full, archive, 0).verdict.word == "unknown"
+    needs_effects = not first.complete and single.search(porous, archive, 0).verdict.word == "unknown"
     by_single = single.full_search(first.answer) if needs_effects else first.answer
-    by_full = single.search(full, archive, most_effects_of_dfn(by_single, single.max_effects))
-    if second_is_believed((by_full.path, by_full.verdict), (by_single.path, by_single.verdict)):
-        return _chosen(_of_both(by_single, by_full), "espm", reduction, _likelier(by_single))
-    return _chosen(_of_both(by_full, by_single), "dfn", reduction)
+    by_porous = single.search(porous, archive, most_effects_of_dfn(by_single, single.max_effects))
+    if second_is_believed((by_porous.path, by_porous.verdict), (by_single.path, by_single.verdict)):
+        return _chosen(_of_both(by_single, by_porous), "espm", reduction, _likelier(by_single))
+    return _chosen(_of_both(by_porous, by_single), "dfn", reduction)
 
 
 def _fine(problem: InverseProblem, name: ModelName) -> InverseProblem:
