@@ -198,6 +198,11 @@ class Effect:
         return f"Effect({self.id!r}, {self.kind}, parameters {', '.join(self.parameters) or 'none'})"
 
     @property
+    def restates_declared(self) -> bool:
+        """Whether it moves parameters that cell files declare, with a tolerance."""
+        return any(p.spread is not None for p in self.parameters.values())
+
+    @property
     def kind_told(self) -> str:
         """The kind as reported to a user: an effect that refines the discretisation is "numerics", no instrument."""
         return "numerics" if self.refines == "discretisation" else self.kind

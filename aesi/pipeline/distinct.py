@@ -39,12 +39,12 @@ RECORDS = _Words(
 )
 
 
-def check_distinct_spectra(fitted: Sequence[Spectrum], witnesses: Sequence[Spectrum] = ()) -> None:
+def check_distinct_spectra(fitted: Sequence[Spectrum], compared: Sequence[Spectrum] = ()) -> None:
     """Raises DataError, one sentence, for two spectra of the same frequencies and impedance.
 
-    fitted : what a fit takes in.  witnesses : what its result is held against.
+    fitted : what a fit takes in.  compared : what its result is compared with.
     """
-    _check_once(fitted, witnesses, SPECTRA)
+    _check_once(fitted, compared, SPECTRA)
 
 
 def check_distinct(

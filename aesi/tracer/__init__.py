@@ -17,7 +17,7 @@ report, decide, search, likelihood, case.
     likelihood/gaussian    log predictive density of left-out data for either           -> PredictiveScore
     likelihood/surrogates  the gain by chance, which an effect has to exceed
     decide/verdict         found, none or unknown, from a Path                          -> Verdict
-    decide/written         the model that is written where the verdict is unknown       -> ModelState
+    decide/model_to_write  the model that is written where the verdict is unknown       -> ModelState
     report/                the results as they are reported                             -> Discovery
 
 Words that mean one thing throughout:

@@ -25,20 +25,25 @@ from aesi.tracer.case.energies import ACTIVATION_ENERGIES
 from aesi.tracer.case.free_parameter import OF_ONE_RECORD, by_owner
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import PreparedRecord, prepare_all, prepare_test
-from aesi.tracer.decide.beside import gathered_beside
-from aesi.tracer.decide.evidence import Answer, Evidence, gathered
+from aesi.tracer.decide.beside import searched_answer_beside
+from aesi.tracer.decide.evidence import Answer, Evidence, searched_answer
 from aesi.tracer.decide.model_choice import ModelChoice, with_model
-from aesi.tracer.decide.temperatures import fitted_at_fault, left_by_fit, of_unseen, other_temperatures
+from aesi.tracer.decide.temperatures import (
+    contradicting_unseen,
+    other_temperatures,
+    still_contradicting,
+    temperature_fault,
+)
 from aesi.tracer.decide.verdict import Thresholds, Verdict
 from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.report.candidate_effects import CandidateEffect, ranking
 from aesi.tracer.report.explain import explain
-from aesi.tracer.report.outcome import FileOutcome, State, States, emptied, outcomes, test_rmse_v
+from aesi.tracer.report.outcome import FileOutcome, State, States, depletion_notes, held_out_rmse_v, outcomes
 from aesi.tracer.report.own_parameters import OwnParameter, ages_told, own_parameters
 from aesi.tracer.report.tell_apart import telling_experiment
 from aesi.tracer.report.warning import contradicted_by_v, warnings
-from aesi.tracer.report.yardstick import Yardstick, measure
+from aesi.tracer.report.yardstick import Yardstick, yardstick_of
 from aesi.tracer.search.archive import Archive, context_of
 
 
@@ -185,8 +190,8 @@ def discover(
         problem: InverseProblem, archive: Archive, most: int, shallower: Answer | None = None
     ) -> Answer:
         if problem.has_good:
-            return gathered_beside(problem, most, archive, Thresholds(), spent)
-        return gathered(problem, most, archive, Thresholds(), spent, shallower)
+            return searched_answer_beside(problem, most, archive, Thresholds(), spent)
+        return searched_answer(problem, most, archive, Thresholds(), spent, shallower)
 
     def archive_of(one: InverseProblem, other_model: Archive | None) -> Archive:
         return Archive(archive, context_of(one), other_model)
@@ -220,15 +225,15 @@ def inverse_problem(
         raise DataError(
             f"an effect cannot have the id {taken!r}, which the cell or its records have their own of; give it another."
         )
-    there = {active.id for active in given} - _own(effects)
+    there = {active.id for active in given} - _restating(effects)
     tried = {name: effect for name, effect in effects.items() if name not in there}
     return InverseProblem(cell, records, tried, fixed=tuple(given), model=model)
 
 
-def _own(effects: Mapping[str, Effect]) -> set[str]:
+def _restating(effects: Mapping[str, Effect]) -> set[str]:
     """Ids of the effects that restate declared parameters. They may be tried even where they are given: a parameter
     that was corrected once may still be off."""
-    return {e.id for e in effects.values() if any(p.spread is not None for p in e.parameters.values())}
+    return {effect.id for effect in effects.values() if effect.restates_declared}
 
 
 class _Spent:
@@ -261,8 +266,8 @@ def _discovery_of(
     problem, verdict = evidence.path.problem, evidence.verdict
     records, declared = problem.records, ModelState(problem)
     fitted = _fitted(evidence)
-    others = left_by_fit(fitted, other_temperatures(problem))
-    at_other = {records[k].name: other for k, other in others.items()} | of_unseen(fitted, tested)
+    others = still_contradicting(fitted, other_temperatures(problem))
+    at_other = {records[k].name: other for k, other in others.items()} | contradicting_unseen(fitted, tested)
     evidence = _without_fault(evidence, others)
     fits: States = {"before": declared, "recalibrated": evidence.recalibrated, "after": evidence.after}
     states = {
@@ -287,7 +292,7 @@ def _discovery_of(
         experiments=tuple((g, telling_experiment(g, problem.effects)) for g in verdict.groups),
         choice=choice,
         not_adopted=evidence.fault,
-        notes=(choice.sentence, *_notes(evidence, tested, left), *emptied(files)),
+        notes=(choice.sentence, *_notes(evidence, tested, left), *depletion_notes(files)),
         contradicted=contradicted_by_v(files, verdict) is not None,
         warnings=(
             *(other.sentence(name) for name, other in at_other.items()),
@@ -311,7 +316,7 @@ def _fitted(evidence: Evidence) -> ModelState:
 
 def _without_fault(evidence: Evidence, others: Mapping[int, OtherTemperature]) -> Evidence:
     """The evidence, with the declared model written in place of a fitted one that makes up for a wrong temperature."""
-    fault = fitted_at_fault(evidence.after, others)
+    fault = temperature_fault(evidence.after, others)
     if fault is None:
         return evidence
     return replace(evidence, after=ModelState(evidence.path.problem), fault=fault, limits=())
@@ -322,7 +327,7 @@ def _test_error_v(
 ) -> float | None:
     """RMSE on data that no fit has seen, V; None where the model cannot be simulated there."""
     try:
-        error_v = test_rmse_v(ModelState.of(problem, one).of_one_age(), problem.records, tested)
+        error_v = held_out_rmse_v(ModelState.of(problem, one).of_one_age(), problem.records, tested)
     except AesiError:  # it was simulated on the fit part alone
         return None
     return error_v if np.isfinite(error_v) else None
@@ -337,7 +342,7 @@ def _notes(evidence: Evidence, tested: Sequence[PreparedRecord], left: ResidualS
     ]
     notes = [*known, *(note for record in (*records, *tested) for note in record.notes)]
     notes += [note for path in evidence.paths.values() for note in path.notes]
-    notes += [*evidence.verdict.alike_too, *evidence.limits]
+    notes += [*evidence.verdict.look_alike_notes, *evidence.limits]
     ages = ages_told((evidence.after, evidence.recalibrated))
     notes += [ages] if ages else []
     if left.yardstick.explained_v is None:
@@ -355,4 +360,4 @@ def _structure_of(records: Sequence[PreparedRecord], state: ModelState) -> Resid
         seen = record.thin.take(slice(0, record.n_fit))
         runs.append(state.simulated(replace(record, thin=seen), index, thin=True))
         residuals.append(seen.voltage_v - runs[-1].voltage_v)
-    return ResidualStructure(explain(runs, residuals), measure(runs, residuals))
+    return ResidualStructure(explain(runs, residuals), yardstick_of(runs, residuals))

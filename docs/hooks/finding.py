@@ -1,6 +1,6 @@
 """The picture of a finding, from the folder that `aesi discover` wrote, whatever it found:
 
-    python docs/hooks/finding.py FOLDER docs/images/finding.svg [--thermocouple RECORD [--until-s S]] [--witness TEXT]
+    python docs/hooks/finding.py FOLDER docs/images/finding.svg [--thermocouple RECORD [--until-s S]] [--reference TEXT]
 
 The measured voltage, its residual as declared, recalibrated and with what was found, the name and size of that, and
 what was measured beside it: RECORD, one whose temperature the loop was not given, or TEXT in your own words. Errors
@@ -65,17 +65,17 @@ def main() -> None:
         "--thermocouple", help="file of the record with its temperature, or SET/NAME of a data set"
     )
     parser.add_argument("--until-s", type=float, help="seconds of that record that the loop was given")
-    parser.add_argument("--witness", default="", help="what was measured beside it, in words")
+    parser.add_argument("--reference", default="", help="what was measured beside it, in words")
     asked = parser.parse_args()
-    told = asked.witness
+    reference = asked.reference
     if asked.thermocouple:
-        told = witness(asked.thermocouple, asked.until_s)
-    asked.out.write_text(draw(asked.folder, told), encoding="utf-8")
+        reference = thermocouple_line(asked.thermocouple, asked.until_s)
+    asked.out.write_text(draw(asked.folder, reference), encoding="utf-8")
     print(asked.out)
 
 
-def witness(record: str, until_s: float | None) -> str:
-    """The thermocouple's mean, up to `until_s`."""
+def thermocouple_line(record: str, until_s: float | None) -> str:
+    """A line on the mean temperature that the thermocouple of a record measured, up to `until_s` (s)."""
     place, _, name = record.partition("/")
     path = Path(record) if Path(record).exists() else locate(place, name)
     measured = read_measurement(path, stop_s=until_s).temperature_degc
@@ -84,8 +84,8 @@ def witness(record: str, until_s: float | None) -> str:
     return f"thermocouple on the case, not given to the loop: {np.mean(measured):.1f} degC in the mean"
 
 
-def draw(folder: Path, told: str) -> str:
-    """The picture as SVG."""
+def draw(folder: Path, reference: str) -> str:
+    """The picture as SVG.  reference : line on what was measured beside the records, below the finding."""
     content = json.loads((folder / "discovery.json").read_text(encoding="utf-8"))
     payload = _payload(folder / "report.html")
     parts = [part for part in PARTS if part in payload["figures"]]
@@ -104,9 +104,9 @@ def draw(folder: Path, told: str) -> str:
         )
     lines = wrap(finding_line(content), LETTERS)
     body += [_text(LEFT, 20 + 19 * k, line, weight=600) for k, line in enumerate(lines)]
-    body.append(_text(LEFT, 20 + 19 * len(lines), told))
+    body.append(_text(LEFT, 20 + 19 * len(lines), reference))
     body.append(_time_axis(end, unit))
-    title = f"{finding_line(content)}. {told}"
+    title = f"{finding_line(content)}. {reference}"
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" font-size="13" '
         f'font-family="system-ui, sans-serif" role="img" aria-label="{escape(title)}">'

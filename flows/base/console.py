@@ -78,6 +78,6 @@ def duration(seconds: float) -> str:
     return f"{seconds / 60:.1f} min"
 
 
-def first_line(error: Exception) -> str:
+def first_line(error: BaseException) -> str:
     """What an exception says, in one line of at most 200 characters; its type where it says nothing."""
     return (str(error).strip().splitlines() or [type(error).__name__])[0][:200]

@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import NonNegativeInt, PositiveFloat, PositiveInt
 
 from aesi.bench.blind import LIMIT_S, chosen, judged, lost, summary, table
-from flows.benchmarks.cases import Cases, tracked
+from flows.benchmarks.cases import Cases, in_order, tracked
 from flows.benchmarks.page import write_between
 
 SHOWN = (
@@ -55,5 +55,4 @@ def run(
         rows.append(row)
         yield row
     if write is not None:
-        order = {spec.name: k for k, spec in enumerate(specs)}
-        write_between(write, BEGIN, END, table(sorted(rows[:-1], key=lambda row: order[row["case"]])))
+        write_between(write, BEGIN, END, table(in_order(rows[:-1], specs)))

@@ -69,7 +69,7 @@ def tracked(cases: Cases, workers: int = 1, address: str | None = None) -> Itera
     with tracked_job(subject, title, Console()) as tracker:
         if tracker is not None:
             tracker.parameters({"seed": cases.seed, "cases": len(cases.specs)})
-        for row in _judged(cases, workers, address):
+        for row in _rows(cases, workers, address):
             rows.append(row)
             if tracker is not None:
                 _track(tracker, row, cases.shown)
@@ -90,11 +90,12 @@ def judged_once(
     keep: str | None,
     files: Callable[[Any], Iterable[Path]] = lambda case: (),
 ) -> CaseRow:
-    """The row of a case, from the folder `keep` where this program judged it before, as it is asked now.
+    """The row of a case: the one in the folder `keep`, if it is of the same program, case, arguments and files, else a
+    new one, which is then kept there.
 
-    case : of a repr that says all of it; case.name names its file.  judge : a function, or a partial of one, whose
-    arguments count.  keep : None to judge every time.  files : of a case, files and folders that its row depends on
-    beside the program; their content counts. What cannot be run here, for want of its data, is not kept.
+    case : its `repr` has to tell it from all others; `case.name` names its file.  judge : a function of a case, or a
+    partial of one.  keep : None judges every time.  files : case -> files and folders whose content its row depends on.
+    A case whose data are not available here is not kept.
     """
     if keep is None:
         return judge(case)
@@ -113,18 +114,24 @@ def judged_once(
     return row
 
 
-def of_sets(files: Iterable[tuple[str, str]]) -> Iterator[Path]:
-    """The files of data sets that can be had here.
+def in_order(rows: Iterable[CaseRow], specs: Sequence[Any]) -> list[CaseRow]:
+    """The rows in the order of the specifications that they were judged from, whichever came first."""
+    place = {spec.name: k for k, spec in enumerate(specs)}
+    return sorted(rows, key=lambda row: place[row["case"]])
 
-    files : data set, name of the file.
+
+def available_files(files: Iterable[tuple[str, str]]) -> Iterator[Path]:
+    """The paths of those of the files that are on this machine or can be fetched.
+
+    files : (data set, name of the file) of each.
     """
     for data, name in files:
         with suppress(DataError):
             yield locate(data, name)
 
 
-def kept(folder: str) -> list[CaseRow]:
-    """The rows that this program has kept there, by name."""
+def kept_rows(folder: str) -> list[CaseRow]:
+    """The rows that `judged_once` of this program has kept in a folder, by the name of their case."""
     rows, other = [], []
     for path in sorted(Path(folder).rglob("*.json")):
         known = _read(path)
@@ -151,7 +158,8 @@ def _read(path: Path) -> dict[str, Any]:
         return {}
 
 
-def _judged(cases: Cases, workers: int, address: str | None) -> Iterator[CaseRow]:
+def _rows(cases: Cases, workers: int, address: str | None) -> Iterator[CaseRow]:
+    """The rows of the cases as they come, in any order."""
     if address is not None:
         return on_dask(cases.judge, cases.specs, workers, address, cases.lost)
     if workers == 1:

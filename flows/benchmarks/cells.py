@@ -13,17 +13,19 @@ from typing import Any
 
 from aesi.bench.hybrid.splits import judged
 from aesi.bench.physics import cells as physics
+from aesi.bench.physics.cells_table import archive_table, table
 from aesi.errors import AesiError
 from aesi.pipeline.experiment.config import read_experiment
 from flows.benchmarks.page import write_between
-from flows.benchmarks.splits import BLOCK_S, CHEAP, QUICK, search_and_fit
+from flows.benchmarks.splits import BLOCK_S, QUICK, QUICK_INTERVALS, search_and_fit
 
 EXPERIMENTS = {
     physics.NCR: "panasonic_ncr18650pf.yaml",
     physics.HG2: "lg_18650hg2.yaml",
     physics.NMC: "measured_nmc_drive.yaml",
 }
-"""One whose experiment trains on repeats of a record is trained on all of it here."""
+"""Data set -> experiment file of its cell. An experiment that trains on repeats of a record is trained on all of it
+here."""
 HYBRID = "AESI I"
 BEGIN, END = "<!-- table of aesi bench cells -->", "<!-- end -->"
 ARCHIVE_MARKS = "<!-- table of aesi bench cells, archive -->", "<!-- end of archive -->"
@@ -46,36 +48,35 @@ def run(
     rows = []
     for row in physics.run(cells, only, archive, porous):
         if hybrid and not row.get("summary") and row["cell"] in EXPERIMENTS and "error" not in row:
-            row |= _hybrid(Path(experiments), row["cell"], row["record"])
+            row |= hybrid_figures(Path(experiments), row["cell"]).get(row["record"], {})
         rows.append(row)
         yield row
     if write is not None and archive:
-        write_between(write, *ARCHIVE_MARKS, physics.archive_table(rows[:-1]))
+        write_between(write, *ARCHIVE_MARKS, archive_table(rows[:-1]))
     elif write is not None:
-        write_between(write, BEGIN, END, physics.table(rows[:-1]))
-
-
-def _hybrid(experiments: Path, cell: str, record: str) -> dict[str, Any]:
-    figures = hybrids(experiments, cell)
-    return figures.get(record, {})
+        write_between(write, BEGIN, END, table(rows[:-1]))
 
 
 @cache
-def hybrids(experiments: Path, cell: str) -> Mapping[str, dict[str, Any]]:
-    """Record -> `hybrid_mv` of the cell's hybrid, or `trained` where the record was used."""
+def hybrid_figures(experiments: Path, cell: str) -> Mapping[str, dict[str, Any]]:
+    """Record -> entries of its row about the hybrid of a cell, fitted once: `hybrid_mv`, its RMS error in free run;
+    `trained` for a record that it was trained or validated on; `hybrid_error` where it could not be fitted.
+
+    experiments : folder of the experiment files.  cell : a key of EXPERIMENTS.
+    """
     file = experiments / EXPERIMENTS[cell]
     data = read_experiment(file, ()).data
     used = {*data.train, *data.valid} or {data.record}
     whole = () if data.train else ("data.repeats=null", "data.record=null", f"data.train=[{data.record}]")
     drives = [r.name for r in physics.RECORDS if r.data == cell and not r.fitted and r.name not in used]
-    laid = [
+    overrides = [
         *whole, f"data.test=[{', '.join(drives)}]", f"data.dt_s={QUICK['dt_s']}", f"search.block={round(BLOCK_S)}",
         f"search.candidates={QUICK['candidates']}", f"search.resamples={QUICK['resamples']}",
-        f'models=["ESPM", "{HYBRID}"]', *CHEAP,
+        f'models=["ESPM", "{HYBRID}"]', *QUICK_INTERVALS,
     ]  # fmt: skip
     out: dict[str, dict[str, Any]] = {str(name): {"trained": True} for name in used}
     try:
-        config = read_experiment(file, laid)
+        config = read_experiment(file, overrides)
         loaded, _, fitted = search_and_fit(config)
     except AesiError as error:
         return out | {name: {"hybrid_error": str(error)} for name in drives}

@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import PositiveFloat, PositiveInt
 
 from aesi.bench.left_out import LIMIT_S, LeftOutCase, judged, lost, plan, summary, table
-from flows.benchmarks.cases import Cases, judged_once, of_sets, tracked
+from flows.benchmarks.cases import Cases, available_files, in_order, judged_once, tracked
 from flows.benchmarks.page import write_between
 
 SHOWN = ("cell", "record", "verdict", "effects", "error")
@@ -33,19 +33,18 @@ def run(
     marks becomes the table.  keep : a folder for what each case gave; a case that is in it is not judged again by the
     same program, as it was asked, so that an interrupted run goes on.
     """
-    rows = []
+    rows, specs = [], plan(only)
     judge = partial(
         judged_once,
         judge=partial(judged, cells=cells, limit_s=limit_s),
         keep=keep,
         files=partial(_files, cells=cells),
     )
-    for row in tracked(Cases("left_out", 0, plan(only), judge, summary, lost, SHOWN), workers, address):
+    for row in tracked(Cases("left_out", 0, specs, judge, summary, lost, SHOWN), workers, address):
         rows.append(row)
         yield row
     if write is not None:
-        order = {case.name: k for k, case in enumerate(plan(only))}
-        write_between(write, BEGIN, END, table(sorted(rows[:-1], key=lambda row: order[row["case"]])))
+        write_between(write, BEGIN, END, table(in_order(rows[:-1], specs)))
 
 
 def _files(case: LeftOutCase, cells: str) -> Iterator[Path]:
@@ -54,4 +53,4 @@ def _files(case: LeftOutCase, cells: str) -> Iterator[Path]:
     if one.cell is not None:
         yield Path(cells) / one.cell
     names = (*([] if one.cell else ["cell.bpx.json"]), *one.slow, *one.drives)
-    yield from of_sets((one.data, name) for name in names)
+    yield from available_files((one.data, name) for name in names)

@@ -15,7 +15,7 @@ from pydantic import PositiveFloat, PositiveInt
 from aesi.bench.real import chosen, judged, lost, summary, table, write_report
 from aesi.bench.real.case import RealCase
 from aesi.bench.real.judge import LIMIT_S
-from flows.benchmarks.cases import Cases, judged_once, of_sets, tracked
+from flows.benchmarks.cases import Cases, available_files, in_order, judged_once, tracked
 from flows.benchmarks.page import write_between
 
 SHOWN = ("group", "cell", "record", "put_in", "answer", "verdict", "effects", "source", "error")
@@ -62,9 +62,8 @@ def run(
             rows.append(row)
             yield {key: value for key, value in row.items() if key != "residual"}
     if write is not None:
-        order = {spec.name: k for k, spec in enumerate(specs)}
         marks = ARCHIVE_MARKS if archive else (BEGIN, END)
-        write_between(write, *marks, table(sorted(rows, key=lambda row: order[row["case"]])))
+        write_between(write, *marks, table(in_order(rows, specs)))
 
 
 def _files(case: RealCase, cells: str) -> Iterator[Path]:
@@ -73,7 +72,7 @@ def _files(case: RealCase, cells: str) -> Iterator[Path]:
     if not colon:
         yield Path(cells) / case.cell
     takes = [case.take, *case.good, *([] if case.against is None else [case.against])]
-    yield from of_sets(
+    yield from available_files(
         [
             *([(place, file)] if colon else []),
             *((take.set, take.file) for take in takes),

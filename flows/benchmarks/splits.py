@@ -26,14 +26,15 @@ from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.load import Loaded
 from aesi.pipeline.experiment.sources import catalogue_files, check_had, named_files
 from flows.base.console import Console
-from flows.benchmarks.cases import Cases, judged_once, kept, tracked
+from flows.benchmarks.cases import Cases, judged_once, kept_rows, tracked
 from flows.benchmarks.page import write_between
 
 QUICK = {"a_cell": 5, "seeds": 1, "candidates": 24, "resamples": 40, "dt_s": 1.0}
-"""A look at every split in hours; `whole` runs them at the settings of an experiment."""
+"""Settings of a run of some hours: splits of a cell, seeds, candidates, resamples, and step of the rows, s. With
+`whole` all splits run with the settings of their experiment files."""
 BLOCK_S = 100.0
 """Length of a block of the bootstrap, s."""
-CHEAP = ("conformal.method=split", "conformal.compare=[]", "conformal.horizons_s=[60.0]")
+QUICK_INTERVALS = ("conformal.method=split", "conformal.compare=[]", "conformal.horizons_s=[60.0]")
 """Intervals one step ahead are not judged here."""
 QUICK_MODELS = ("ESPM", "ESPM, one resistor", "ESPM recalibrated", "AESI I", "AESI II")
 
@@ -46,7 +47,10 @@ BEGIN, END = "<!-- table of aesi bench splits -->", "<!-- end of splits -->"
 
 @dataclass(frozen=True)
 class SplitRun:
-    """One split with one seed, and what is laid over the file of its experiment."""
+    """One split with one seed.
+
+    folder : of the experiment files.  overrides : KEY=VALUE that replace keys of the experiment's file.
+    """
 
     split: SplitCase
     seed: int
@@ -55,18 +59,18 @@ class SplitRun:
 
     @property
     def name(self) -> str:
-        """Of the case."""
+        """Name of the case: split and seed."""
         return f"{self.split.name}, seed {self.seed}"
 
     @property
     def settings(self) -> list[str]:
-        """What is laid over the file for every split alike."""
+        """The overrides that all splits share: without the seed and those of this split."""
         own = ("seed", *map(overridden_key, self.split.overrides))
         return [override for override in self.overrides if overridden_key(override) not in own]
 
     @property
     def config(self) -> ExperimentConfig:
-        """The experiment."""
+        """The experiment file with its overrides."""
         return read_experiment(Path(self.folder) / self.split.experiment, self.overrides)
 
 
@@ -92,7 +96,8 @@ def run(
 
     experiments : folder of the experiment files.  whole : every split, three seeds, candidates, resamples and step as
     the files have them; otherwise five splits of a cell, one seed, few candidates and rows of 1 s.
-    cells, a_cell, only, development : which splits.  models : which rows of Table 1.  overrides : laid over all files.
+    cells, a_cell, only, development : which splits.  models : which rows of Table 1.  overrides : KEY=VALUE that
+    replace keys of all experiment files.
     workers, address : processes here, or a Dask scheduler.  write : a page whose part between the two marks becomes
     the table.  keep : a folder for what each split gave; one that is in it is not run again by the same program, as it
     was asked, so that an interrupted run goes on, and the table is of all that the program has kept there with these
@@ -102,7 +107,12 @@ def run(
     standing = {"seeds": 3} if whole else QUICK
     settings: dict[str, Any] = {**standing, **{k: v for k, v in asked.items() if v is not None}}
     runs = [
-        SplitRun(split, seed, experiments, over(_laid(split, seed, settings, models), overrides))
+        SplitRun(
+            split,
+            seed,
+            experiments,
+            merged_overrides(_split_overrides(split, seed, settings, models), overrides),
+        )
         for split in chosen_splits(cells, settings.get("a_cell"), only, development)
         for seed in range(int(settings["seeds"]))
     ]
@@ -112,23 +122,23 @@ def run(
         rows.append(row)
         yield row
     if write is not None:
-        write_between(write, BEGIN, END, table(_kept(keep, runs[0].settings) if keep else rows[:-1]))
+        write_between(write, BEGIN, END, table(_kept_with(keep, runs[0].settings) if keep else rows[:-1]))
 
 
-def _kept(folder: str, settings: Sequence[str]) -> list[CaseRow]:
-    """The rows that this program has kept there with these settings."""
-    rows = kept(folder)
+def _kept_with(folder: str, settings: Sequence[str]) -> list[CaseRow]:
+    """The rows in a folder that are of this program and of these settings (`SplitRun.settings`)."""
+    rows = kept_rows(folder)
     other = [row["case"] for row in rows if row["settings"] != settings]
     if other:
         Console().say(f"{folder}: of other settings, and left out of the table: {'; '.join(other)}.")
     return [row for row in rows if row["settings"] == settings]
 
 
-def over(laid: Sequence[str], overrides: Sequence[str]) -> tuple[str, ...]:
-    """What is laid over a file, less the keys that were asked for otherwise, and then these: no key twice, which an
-    experiment refuses."""
+def merged_overrides(defaults: Sequence[str], overrides: Sequence[str]) -> tuple[str, ...]:
+    """The defaults, without the keys that `overrides` have too, then `overrides`: an experiment refuses a key that is
+    given twice.  Both : KEY=VALUE of an experiment file."""
     asked = {overridden_key(override) for override in overrides}
-    return (*(one for one in laid if overridden_key(one) not in asked), *overrides)
+    return (*(one for one in defaults if overridden_key(one) not in asked), *overrides)
 
 
 def _files(run: SplitRun) -> Iterator[Path]:
@@ -140,16 +150,19 @@ def _files(run: SplitRun) -> Iterator[Path]:
         yield from catalogue_files(config)
 
 
-def _laid(case: SplitCase, seed: int, settings: Mapping[str, Any], models: Sequence[str]) -> tuple[str, ...]:
-    laid = [*case.overrides, f"seed={seed}", f"models={json.dumps(list(models))}"]
-    laid += [
+def _split_overrides(
+    case: SplitCase, seed: int, settings: Mapping[str, Any], models: Sequence[str]
+) -> tuple[str, ...]:
+    """The overrides of one split and seed with these settings (keys as in `QUICK`)."""
+    overrides = [*case.overrides, f"seed={seed}", f"models={json.dumps(list(models))}"]
+    overrides += [
         f"search.{key}={settings[key]}"
         for key in ("candidates", "resamples")
         if settings.get(key) is not None
     ]
     if settings.get("dt_s") is not None:
-        laid += [f"data.dt_s={settings['dt_s']}", f"search.block={round(BLOCK_S / settings['dt_s'])}"]
-    return (*laid, *CHEAP)
+        overrides += [f"data.dt_s={settings['dt_s']}", f"search.block={round(BLOCK_S / settings['dt_s'])}"]
+    return (*overrides, *QUICK_INTERVALS)
 
 
 def _row(run: SplitRun) -> CaseRow:

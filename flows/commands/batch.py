@@ -9,10 +9,10 @@ import typer
 
 from aesi.errors import InputError
 from aesi.pipeline.written import SUMMARY_TABLE, batch_files
-from flows.commands import options, outputs
+from flows.commands import options, outputs, record_options
 
 
-@options.reads_files
+@record_options.reads_files
 def batch(
     source: Annotated[
         Path,
@@ -70,7 +70,7 @@ def batch(
         raise InputError(
             f"--address {address} names a Dask scheduler; give --runner dask beside it, or leave it out."
         )
-    options.say_reading([source])
+    record_options.say_reading([source])
     from aesi.pipeline.batch.job import Settings
     from aesi.pipeline.batch.plan import read_plan
     from flows.jobs.batch import batch as run

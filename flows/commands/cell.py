@@ -9,13 +9,13 @@ import typer
 
 from aesi.errors import InputError
 from aesi.pipeline.written import calibration_files, discovery_files
-from flows.commands import options, outputs
+from flows.commands import options, outputs, record_options
 
 BESIDE_AN_EXPERIMENT = ("experiment", "out", "overrides", "prefect")
 """Arguments of `aesi discover` that may be given with an experiment file. All others are keys of that file."""
 
 
-@options.reads_files
+@record_options.reads_files
 def simulate(
     *,
     reading: Any,
@@ -46,13 +46,13 @@ def simulate(
 
     asked = ProfileRequest(soc0, hold, reading, self_heating, options.state_of_health(soh), run_on)
     added = options.added_effects(effect, effect_file)
-    run = simulate_file(cell, current, out, asked, added, model, options.say_notes)
+    run = simulate_file(cell, current, out, asked, added, model, record_options.say_notes)
     from aesi.over_time import extent
 
     typer.echo(f"{out}: {extent(run.time_s)}, {voltage_words(run)}", err=True)
 
 
-@options.reads_files
+@record_options.reads_files
 def predict(
     *,
     reading: Any,
@@ -95,12 +95,12 @@ def predict(
 
     health = options.state_of_health(soh)
     asked = ProfileRequest(soc0, hold, reading, self_heating, health, soc0_sd=soc0_sd)
-    rows = predict_file(model, current, out, asked, measured, options.say_notes)
+    rows = predict_file(model, current, out, asked, measured, record_options.say_notes)
     regime = "one step ahead" if measured else "free run"
     typer.echo(f"{out}: {rows:,} rows, {regime}", err=True)
 
 
-@options.reads_files
+@record_options.reads_files
 def calibrate(
     *,
     reading: Any,
@@ -216,21 +216,30 @@ def calibrate(
     """
     read = [cell, *data, *(impedance or []), *(fit_impedance or [])]
     outputs.check_json(out, read, calibration_files(out))
-    options.check_once("--data", data)
-    temperatures = options.by_file("--temperature", temperature, data)
-    days, day = options.dates(dates, data), options.day("--as-of", as_of)
-    ends = options.by_file("--until", until, data)
-    witnesses, spectra = options.spectra(impedance), options.spectra(fit_impedance)
-    priors, limits, edges = options.priors(prior), options.cut_offs(cut_offs), options.body(body)
-    options.say_reading(data)
+    record_options.check_once("--data", data)
+    temperatures = record_options.numbers_by_record("--temperature", temperature, data)
+    days, as_of_day = record_options.dates_by_record(dates, data), options.day("--as-of", as_of)
+    ends_s = record_options.numbers_by_record("--until", until, data)
+    compared, fitted = record_options.spectra(impedance), record_options.spectra(fit_impedance)
+    priors, cut_offs_v, body_mm = options.priors(prior), options.cut_offs(cut_offs), options.body(body)
+    record_options.say_reading(data)
     from aesi.calibration import Conditions
     from aesi.pipeline.calibrate import Request, check_request
     from flows.jobs.calibration import calibrate as flow
 
-    conditions = Conditions(soc0, temperatures, days, day, model, spectra=spectra, priors=priors)
-    request = Request(conditions, witnesses, limits, posterior, starts, seed, title, edges, mass)
+    request = Request(
+        Conditions(soc0, temperatures, days, as_of_day, model, spectra=fitted, priors=priors),
+        impedance=compared,
+        cut_offs_v=cut_offs_v,
+        posterior=posterior,
+        starts=starts,
+        seed=seed,
+        title=title,
+        body_mm=body_mm,
+        mass_g=mass,
+    )
     check_request(cell, request)
-    records = options.measurements(data, reading, hold, ends)
+    records = record_options.measurements(data, reading, hold, ends_s)
     flow(cell, records, out, request)
 
 
@@ -270,13 +279,13 @@ def impedance(
         options.added_effects(effect, effect_file),
         model,
         options.state_of_health(soh),
-        options.say_notes,
+        record_options.say_notes,
     )
     size = 1e3 * abs(z)
     typer.echo(f"{out}: {len(z):,} frequencies, |Z| {size.min():.4g} to {size.max():.4g} mOhm", err=True)
 
 
-@options.reads_files
+@record_options.reads_files
 def discover(
     *,
     context: typer.Context,
@@ -377,7 +386,7 @@ def discover(
         raise InputError(
             "--set changes a key of an experiment file, and none is given; use the options instead."
         )
-    options.say_reading([*data, *(test or []), *(good or [])])
+    record_options.say_reading([*data, *(test or []), *(good or [])])
     from aesi.pipeline.discovery.cases import case_of_files
     from flows.jobs.start import discover as flow
 
@@ -398,14 +407,14 @@ def discover(
         model=model,
         soh=options.state_of_health(soh),
     )
-    options.say_notes(note for m in case.records for note in m.notes)
+    record_options.say_notes(note for m in case.records for note in m.notes)
     flow(case, out, prefect)
 
 
 def _discover_experiment(experiment: Path, overrides: list[str], out: Path | None, prefect: bool) -> None:
     """Run the discovery of an experiment file.  Raises InputError if its results would overwrite a file that it
     names."""
-    options.say_reading([experiment])
+    record_options.say_reading([experiment])
     from aesi.pipeline.experiment.sources import named_files
     from flows.jobs.discovery import finding_folder
     from flows.jobs.run_request import RunRequest

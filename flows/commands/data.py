@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from flows.commands import complete, options, outputs
+from flows.commands import complete, outputs, record_options
 from flows.commands.command import App
 
 app = App(no_args_is_help=True, rich_markup_mode=None)
@@ -45,7 +45,7 @@ def get(
 
 
 @app.command("convert")
-@options.reads_files
+@record_options.reads_files
 def convert(
     file: Annotated[
         Path,
@@ -81,7 +81,7 @@ def convert(
 
         admit = partial(check_of_cell, cell)
     record = convert_file(file, out, reading, to, admit)
-    options.say_notes(record.notes)
+    record_options.say_notes(record.notes)
     for line in record_lines(record, of_cell=cell is not None):
         typer.echo(line, err=True)
     typer.echo(str(out))

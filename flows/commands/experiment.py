@@ -151,13 +151,13 @@ def candidate(
     outputs.check_folder(out)
     from flows.base.console import Console
     from flows.base.folder_lock import alone_in
-    from flows.results.candidate import Differs, rebuild, said, save
+    from flows.results.candidate import Differs, rebuild, rebuilt_line, save
 
     _deliver(uri)
     rebuilt = rebuild(run_id, uri)
     with alone_in(out):
         save(rebuilt, out)
-    Console().say(said(rebuilt, out))
+    Console().say(rebuilt_line(rebuilt, out))
     if rebuilt.differing:
         raise Differs(rebuilt)
 

@@ -105,9 +105,12 @@ def _check_form(address: str) -> None:
 
 
 @dataclass
-class _Handed:
-    """A candidate that the scheduler has. since_s : when it began to run, on our monotonic clock; None while it waits
-    or its worker builds the problem."""
+class _Submitted:
+    """A candidate that the scheduler has.
+
+    worker : address of the worker that evaluates it, '' while it waits.  since_s : when it began to run, s on this
+    process's monotonic clock; None while it waits or its worker builds the problem.
+    """
 
     tag: Any
     future: Any = None
@@ -136,7 +139,7 @@ class DaskPool:
     ) -> None:
         self._recipe, self._timeout_s, self._memory_mb = (content, base, study), timeout_s, memory_mb
         self._client, self._cluster = connect(address, workers)
-        self._handed: dict[str, _Handed] = {}
+        self._submitted: dict[str, _Submitted] = {}
         self._finished: Queue[Any] = Queue()
         self._topic = f"aesi-began-{uuid.uuid4().hex}"
         self._client.subscribe_topic(self._topic, self._began)
@@ -148,15 +151,15 @@ class DaskPool:
 
     @property
     def busy(self) -> int:
-        return len(self._handed)
+        return len(self._submitted)
 
     def start(self, tag: Any, genome: Any) -> None:
         """Hand a genome to the scheduler."""
         key = f"candidate-{uuid.uuid4().hex}"
-        handed = self._handed[key] = _Handed(tag)  # before it is submitted: it may begin at once
+        candidate = self._submitted[key] = _Submitted(tag)  # before it is submitted: it may begin at once
         given = (self._topic, key, self._memory_mb, *self._recipe, codec.dumps(genome))
-        handed.future = self._client.submit(_evaluate_timed, *given, key=key, pure=False)
-        handed.future.add_done_callback(self._finished.put)
+        candidate.future = self._client.submit(_evaluate_timed, *given, key=key, pure=False)
+        candidate.future.add_done_callback(self._finished.put)
 
     def collect(self, timeout_s: float) -> list[tuple[Any, Any]]:
         """(tag, outcome) of what has finished, after at most `timeout_s`."""
@@ -164,9 +167,9 @@ class DaskPool:
         try:
             future = self._finished.get(timeout=timeout_s)
             while True:
-                handed = self._handed.pop(future.key, None)
-                if handed is not None:
-                    found.append((handed.tag, _outcome(future)))
+                candidate = self._submitted.pop(future.key, None)
+                if candidate is not None:
+                    found.append((candidate.tag, _outcome(future)))
                 future = self._finished.get_nowait()
         except Empty:
             pass
@@ -185,21 +188,21 @@ class DaskPool:
     def _began(self, event: tuple[float, dict[str, str]]) -> None:
         """A worker says that it begins with a candidate; one that is begun again elsewhere has all its time again."""
         _, told = event
-        handed = self._handed.get(told["key"])
-        if handed is not None:
-            handed.worker, handed.since_s = told["worker"], time.monotonic()
+        candidate = self._submitted.get(told["key"])
+        if candidate is not None:
+            candidate.worker, candidate.since_s = told["worker"], time.monotonic()
 
     def _overdue(self) -> list[tuple[Any, Any]]:
         """Candidates past their time: their worker is restarted, since a thread cannot be stopped."""
         now = time.monotonic()
         found = []
-        for key, handed in list(self._handed.items()):
-            if handed.since_s is None or now - handed.since_s <= self._timeout_s:
+        for key, candidate in list(self._submitted.items()):
+            if candidate.since_s is None or now - candidate.since_s <= self._timeout_s:
                 continue
-            del self._handed[key]
-            found.append((handed.tag, Failed(f"took longer than {self._timeout_s:g} s", of_machine=True)))
-            self._client.cancel([handed.future], force=True)  # else another worker is given it
-            self._client.restart_workers([handed.worker], raise_for_error=False)
+            del self._submitted[key]
+            found.append((candidate.tag, Failed(f"took longer than {self._timeout_s:g} s", of_machine=True)))
+            self._client.cancel([candidate.future], force=True)  # else another worker is given it
+            self._client.restart_workers([candidate.worker], raise_for_error=False)
         return found
 
 

@@ -30,8 +30,9 @@ class Evaluation:
     """The candidates of one study. Called with a generation, yields (position, outcome) as they come.
 
     study : content key of the problem, so that the same genome on other data is another candidate.
-    reuse : False evaluates what an earlier run has stored; what this one stores is still shared.
-    lost_again : evaluates what an earlier run lost to its machine, which would fail every run from then on.
+    reuse : whether outcomes that an earlier run has stored are taken; what this run stores is shared in any case.
+    lost_again : whether candidates that an earlier run lost to its machine (time, memory, a killed process) are
+    evaluated again, instead of failing every run from then on.
     """
 
     def __init__(
@@ -51,7 +52,7 @@ class Evaluation:
         self._reuse = reuse
         self._lost_again = lost_again
         self._fresh: set[str] = set()
-        self._told = False
+        self._store_lost = False
         self.tally = tally
 
     def key(self, genome: Any) -> str:
@@ -83,27 +84,31 @@ class Evaluation:
         """The stored outcome; None where there is none.  Then an idle pool begins the candidate, and its key is added
         to `working`, unless another process has claimed it."""
         outcome = self._stored(key)
-        if outcome is not None or not self._pool.idle or not self._tried(self._outcomes.claim, key, True):
+        if (
+            outcome is not None
+            or not self._pool.idle
+            or not self._from_store(self._outcomes.claim, key, True)
+        ):
             return outcome
         outcome = self._stored(key)  # finished between the look and the claim
         if outcome is None:
             self._pool.start(key, genome)
             working.add(key)
         else:
-            self._tried(self._outcomes.release, key, None)
+            self._from_store(self._outcomes.release, key, None)
         return outcome
 
     def _stored(self, key: str) -> Any:
         if not self._reuse and key not in self._fresh:
             return None
-        data = self._tried(self._outcomes.get, key, None)
+        data = self._from_store(self._outcomes.get, key, None)
         if data is None:
             return None
         try:
             outcome = codec.loads(data)
         except codec.Damaged as error:
             self._say(f"cache: the stored candidate {key[:8]} is damaged ({error}); it is evaluated again.")
-            self._tried(self._outcomes.discard, key, None)
+            self._from_store(self._outcomes.discard, key, None)
             return None
         lost = isinstance(outcome, Failed) and outcome.of_machine
         return None if lost and self._lost_again and key not in self._fresh else outcome
@@ -113,21 +118,22 @@ class Evaluation:
             self._outcomes.put(key, codec.dumps(outcome))
             self._fresh.add(key)
         except OSError as error:
-            self._tell(error)
-        self._tried(self._outcomes.release, key, None)
+            self._say_store_lost(error)
+        self._from_store(self._outcomes.release, key, None)
 
-    def _tried(self, step: Callable[[str], T], key: str, otherwise: T) -> T:
-        """What the store says to a key; `otherwise` where it is lost."""
+    def _from_store(self, step: Callable[[str], T], key: str, otherwise: T) -> T:
+        """The answer of a step of the store (`get`, `claim`, `release`, `discard`) for a key; `otherwise` where the
+        store is lost."""
         try:
             return step(key)
         except OSError as error:
-            self._tell(error)
+            self._say_store_lost(error)
             return otherwise
 
-    def _tell(self, error: OSError) -> None:
+    def _say_store_lost(self, error: OSError) -> None:
         """Say once that the store is lost: the run itself needs none."""
-        if not self._told:
-            self._told = True
+        if not self._store_lost:
+            self._store_lost = True
             self._say(
                 f"cache: candidates cannot be stored or looked up ({error.strerror or error}); the search goes on "
                 "without, and a resumed or another one evaluates them again."

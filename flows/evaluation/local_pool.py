@@ -30,8 +30,11 @@ WATCH_S = 1.0
 
 @dataclass
 class _Process:
-    """tag : of the candidate in work, None where there is none.  built : has it said that it has?
-    deadline_s : of the candidate in work, on the monotonic clock; None while it builds."""
+    """A process of the pool and its end of the pipe.
+
+    tag : of the candidate that it evaluates, None where it is idle.  built : whether it has built the evaluating
+    function.  deadline_s : time on the monotonic clock by which the candidate has to be done, s; None while the process
+    still builds."""
 
     process: Any
     pipe: Connection
@@ -110,19 +113,22 @@ class LocalPool:
         self._processes = []
 
     def _received(self, i: int, one: _Process) -> list[tuple[Any, Any]]:
-        """(tag, outcome) of what it was at work on; none where it says that it has built."""
+        """(tag, outcome) of the candidate that process `i` has finished or was lost with; empty where its message says
+        that it has built the evaluating function."""
         tag = one.tag
         try:
-            said = one.pipe.recv()
+            message = one.pipe.recv()
         except (EOFError, OSError):
             one.process.join(5)
             self._processes[i] = self._replace(one)
-            return [(tag, Failed(f"its process was lost ({_how(one.process.exitcode)})", of_machine=True))]
+            return [
+                (tag, Failed(f"its process was lost ({_exit_words(one.process.exitcode)})", of_machine=True))
+            ]
         if not one.built:
             one.built, one.deadline_s = True, time.monotonic() + self._timeout_s
             return []
         one.tag, one.deadline_s = None, None
-        return [(tag, said)]
+        return [(tag, message)]
 
     def _replace(self, one: _Process) -> _Process:
         _end(one)
@@ -157,7 +163,7 @@ def _serve(pipe: Connection, build: Callable[[], Evaluate], memory_mb: float, pa
     """Life of a process: build and say so, then one genome in and one outcome out, until the other end is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it is not held back
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    threading.Thread(target=_leave_with, args=(parent,), daemon=True).start()
+    threading.Thread(target=_exit_with_parent, args=(parent,), daemon=True).start()
     limit_memory(memory_mb)
     evaluate = build()
     try:
@@ -169,7 +175,7 @@ def _serve(pipe: Connection, build: Callable[[], Evaluate], memory_mb: float, pa
         os._exit(0)
 
 
-def _leave_with(parent: int) -> None:
+def _exit_with_parent(parent: int) -> None:
     """A killed parent cannot tell its children; they notice that they were adopted."""
     while os.getppid() == parent:
         time.sleep(WATCH_S)
@@ -183,7 +189,7 @@ def _end(one: _Process) -> None:
     one.process.join(5)
 
 
-def _how(exitcode: int | None) -> str:
+def _exit_words(exitcode: int | None) -> str:
     if exitcode is not None and exitcode < 0:
         name = signal.Signals(-exitcode).name
         return f"{name}, perhaps out of memory" if name == "SIGKILL" else name

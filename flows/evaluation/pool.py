@@ -21,19 +21,30 @@ Evaluate = Callable[[Any], Any]
 
 
 class Pool(Protocol):
-    """Who evaluates: `idle` candidates can be started at once; `collect` waits for finished ones."""
+    """Processes or workers that evaluate candidates."""
 
     @property
-    def idle(self) -> int: ...
+    def idle(self) -> int:
+        """Number of candidates that can be started now."""
+        ...
 
     @property
-    def busy(self) -> int: ...
+    def busy(self) -> int:
+        """Number of candidates that are started and not collected."""
+        ...
 
-    def start(self, tag: Any, genome: Any) -> None: ...
+    def start(self, tag: Any, genome: Any) -> None:
+        """Start a candidate; its outcome carries the tag, which is not None."""
+        ...
 
-    def collect(self, timeout_s: float) -> list[tuple[Any, Any]]: ...
+    def collect(self, timeout_s: float) -> list[tuple[Any, Any]]:
+        """(tag, outcome) of the candidates that are done or lost, after at most `timeout_s`; an outcome is a Candidate
+        or Failed."""
+        ...
 
-    def close(self) -> None: ...
+    def close(self) -> None:
+        """End the processes, or leave the scheduler."""
+        ...
 
 
 def guarded(evaluate: Evaluate, genome: Any) -> Any:

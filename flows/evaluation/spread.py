@@ -27,13 +27,13 @@ def in_processes(
     from concurrent.futures.process import BrokenProcessPool
     from multiprocessing import get_context
 
-    def begin(pool: ProcessPoolExecutor) -> None:
+    def submit_next(pool: ProcessPoolExecutor) -> None:
         if waiting:
             item = waiting.popleft()
             with leaving_interrupts_to_us():
                 running[pool.submit(function, item)] = pool, item
 
-    def anew() -> ProcessPoolExecutor:
+    def new_pool() -> ProcessPoolExecutor:
         context = get_context("spawn")
         pools.append(ProcessPoolExecutor(1, mp_context=context, initializer=environment.prepare_process))
         return pools[-1]
@@ -45,7 +45,7 @@ def in_processes(
     running: dict[Future[R], tuple[ProcessPoolExecutor, T]] = {}
     try:
         for _ in range(min(workers, len(items))):
-            begin(anew())
+            submit_next(new_pool())
         while running:
             results = []
             for future in wait(running, return_when=FIRST_COMPLETED).done:
@@ -56,8 +56,8 @@ def in_processes(
                     if lost is None:
                         raise
                     results.append(lost(item))
-                    pool = anew()
-                begin(pool)
+                    pool = new_pool()
+                submit_next(pool)
             yield from results
     finally:
         for pool in pools:

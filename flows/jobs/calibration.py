@@ -28,12 +28,15 @@ def calibrate(
         console.say(note)
     started_s = time.monotonic()
 
-    def stands(steps: int, left: float) -> None:
+    def show_step(steps: int, cost_share: float) -> None:
         console.count(
-            "steps of the fit", steps, started_s, f"at {100.0 * left:.3g} % of the starting point's cost"
+            "steps of the fit",
+            steps,
+            started_s,
+            f"at {100.0 * cost_share:.3g} % of the starting point's cost",
         )
 
-    content = calibrate_files(cell, measurements, out, request, stands)
+    content = calibrate_files(cell, measurements, out, request, show_step)
     for row in content["files"]:
         console.say(
             f"  {row['name']}: {row['before_rmse_mv']:.2f} mV before, {row['after_rmse_mv']:.2f} mV after, "
@@ -47,8 +50,8 @@ def calibrate(
     for note in content["notes"]:
         if note not in read:
             console.say(f"  {note}")
-    if left := open_line(content):
-        console.say(f"  {left} (each with its weights in the report)")
+    if undetermined := open_line(content):
+        console.say(f"  {undetermined} (each with its weights in the report)")
     if content["at_bounds"]:
         console.say(f"  on a bound, so not determined by the data: {', '.join(content['at_bounds'])}")
     for warning in content["warnings"]:

@@ -44,7 +44,7 @@ class TrackedUnder:
         return cls(config.name, config.tracking)
 
 
-def check(case: Case) -> None:
+def check_case(case: Case) -> None:
     """Raise AesiError, one sentence, for a cell, an effect file or records that cannot be used."""
     from aesi.tracer.discovery import inverse_problem
 
@@ -72,13 +72,17 @@ def finding_folder(config: ExperimentConfig) -> Path:
     return environment.workspace() / "runs" / config.name / "discovery"
 
 
-def trace(case: Case, out: Path, run: Stages, console: Console, under: TrackedUnder) -> dict[str, Any]:
+def run_discovery(
+    case: Case, out: Path, run: Stages, console: Console, under: TrackedUnder
+) -> dict[str, Any]:
     """The flow itself; `run` runs a stage.  Raises InputError where another process writes to `out` now."""
     with alone_in(out):
-        return _trace(case, out, run, console, under)
+        return _run_discovery(case, out, run, console, under)
 
 
-def _trace(case: Case, out: Path, run: Stages, console: Console, under: TrackedUnder) -> dict[str, Any]:
+def _run_discovery(
+    case: Case, out: Path, run: Stages, console: Console, under: TrackedUnder
+) -> dict[str, Any]:
     from aesi.pipeline.discovery.discover import run_case, write_discovery
 
     started = time.monotonic()
@@ -91,12 +95,12 @@ def _trace(case: Case, out: Path, run: Stages, console: Console, under: TrackedU
     title = ", ".join(m.name for m in case.measurements)
     with tracked_job(_subject(case, under), title, console) as tracker, kept_on_interrupt(kept):
         _track_case(tracker, case)
-        follow = Follow(tracker, console)
+        follow = HypothesisTracker(tracker, console)
         found = run("hypotheses", lambda: run_case(case, out, follow))
         content: dict[str, Any] = run("report", lambda: write_discovery(out, case, found, _run_id(tracker)))
         _track_result(tracker, found, content, out)
     run.publish("discovery", _page(content, out, tracker), "What the model lacks")
-    _say(console, content, (*case.restrictions, *case.assumed, *found.notes), out, started)
+    _say_result(console, content, (*case.restrictions, *case.assumed, *found.notes), out, started)
     return content
 
 
@@ -116,7 +120,7 @@ def _page(content: dict[str, Any], out: Path, tracker: Tracker | None) -> str:
     return "\n".join(lines)
 
 
-class Follow:
+class HypothesisTracker:
     """Shows and tracks each hypothesis as it is judged."""
 
     def __init__(self, tracker: Tracker | None, console: Console) -> None:
@@ -223,7 +227,9 @@ def _track_result(tracker: Tracker | None, found: Discovery, content: dict[str, 
         tracker.files(out / name)
 
 
-def _say(console: Console, content: dict[str, Any], notes: Sequence[str], out: Path, started: float) -> None:
+def _say_result(
+    console: Console, content: dict[str, Any], notes: Sequence[str], out: Path, started: float
+) -> None:
     from aesi.pipeline.notes import together
     from aesi.pipeline.report.words.discoveries import (
         look_alike_finding,
@@ -234,7 +240,7 @@ def _say(console: Console, content: dict[str, Any], notes: Sequence[str], out: P
     )
     from aesi.pipeline.report.words.moved import moved_findings
 
-    console.say(short_finding(content, sure=True))
+    console.say(short_finding(content, with_confidence=True))
     for warning in content["warnings"]:
         console.say(f"  WARNING: {warning}")
     said = (

@@ -29,7 +29,7 @@ from flows.base.console import Console
 from flows.base.stage_cache import Cache
 from flows.jobs.run_request import RunRequest
 from flows.jobs.stages import Stages
-from flows.search.study import Found, run_study
+from flows.search.study import StudyResult, run_study
 from flows.tracking.experiment_log import UNFITTED, CandidateTracker, result_line, track_result, track_start
 from flows.tracking.tracker import Tracker
 
@@ -75,7 +75,7 @@ class ExperimentJob:
         self.console.say(f"run {self.tracker.run_id} {'resumed' if self.tracker.resumed else 'started'}")
         return problem
 
-    def _search(self, loaded: Loaded, config: ExperimentConfig, problem: Problem) -> Found:
+    def _search(self, loaded: Loaded, config: ExperimentConfig, problem: Problem) -> StudyResult:
         follow = CandidateTracker(self.tracker, config, loaded, problem)
         name = f"{config.name}, seed {config.seed} ({self.tracker.run_id[:8]})"
         found = self.run(
@@ -97,7 +97,7 @@ class ExperimentJob:
         self.tracker.metrics({f"importance/{gene}": share for gene, share in importances.items()})
         return found
 
-    def _fit(self, found: Found, config: ExperimentConfig, problem: Problem) -> FinalModels:
+    def _fit(self, found: StudyResult, config: ExperimentConfig, problem: Problem) -> FinalModels:
         cache = Cache(self.console.say, self.request.use_cache)
         key = (config.digest, found.key)
         models = self.run(
@@ -113,14 +113,19 @@ class ExperimentJob:
         return models
 
     def _band(
-        self, models: FinalModels, found: Found, config: ExperimentConfig, problem: Problem, loaded: Loaded
+        self,
+        models: FinalModels,
+        found: StudyResult,
+        config: ExperimentConfig,
+        problem: Problem,
+        loaded: Loaded,
     ) -> tuple[Fitted, ...]:
         return self.run(
             "intervals", lambda: conformalise(models.fitted, problem, found.chosen, config, loaded.left_out)
         )
 
     def _evaluate(
-        self, fitted: Sequence[Fitted], found: Found, problem: Problem, loaded: Loaded
+        self, fitted: Sequence[Fitted], found: StudyResult, problem: Problem, loaded: Loaded
     ) -> EvaluatedModels:
         validation = self.run("validation", lambda: validation_mser(loaded, problem, found.candidates()))
         return self.run("evaluation", lambda: evaluate_models(fitted, loaded.split, validation))
@@ -129,7 +134,7 @@ class ExperimentJob:
         self,
         loaded: Loaded,
         problem: Problem,
-        found: Found,
+        found: StudyResult,
         models: FinalModels,
         fitted: Sequence[Fitted],
         evaluation: EvaluatedModels,
@@ -149,7 +154,7 @@ class ExperimentJob:
             unfitted=models.unfitted,
         )
 
-    def _report(self, folder: Path, result: Result, found: Found) -> Mapping[str, Any]:
+    def _report(self, folder: Path, result: Result, found: StudyResult) -> Mapping[str, Any]:
         summary = self.run("report", lambda: write_outputs(folder, result))
         self.console.say(summary["finding"])
         self.tracker.json(COMPARISON, self.run("comparison", lambda: comparison(result)))

@@ -10,7 +10,7 @@ from prefect.runtime import flow_run
 
 from flows.base import environment
 from flows.base.console import Console
-from flows.jobs.discovery import TrackedUnder, case_and_folder, trace
+from flows.jobs.discovery import TrackedUnder, case_and_folder, run_discovery
 from flows.jobs.experiment import run_experiment
 from flows.jobs.run_request import RunRequest
 from flows.jobs.stages import PrefectStages
@@ -83,4 +83,4 @@ def discovery(
         under = TrackedUnder.of(request.config)
     assert folder is not None  # `aesi discover` with records asks for one
     stages = PrefectStages(console.say)
-    return as_the_job(lambda: trace(case, folder, stages, console, under))
+    return as_the_job(lambda: run_discovery(case, folder, stages, console, under))

@@ -130,7 +130,7 @@ class PrefectStages:
         from prefect.artifacts import create_progress_artifact, update_progress_artifact
 
         share = 100.0 * done / total
-        with self._told("progress"):
+        with self._without_failing("progress"):
             if name in self._bars:
                 update_progress_artifact(self._bars[name], share)
             else:
@@ -142,11 +142,12 @@ class PrefectStages:
             return
         from prefect.artifacts import create_markdown_artifact
 
-        with self._told(key):
+        with self._without_failing(key):
             create_markdown_artifact(markdown, key=key, description=about)
 
     @contextmanager
-    def _told(self, what: str) -> Iterator[None]:
+    def _without_failing(self, what: str) -> Iterator[None]:
+        """Within, a failure of Prefect is said and ends nothing; one of its connection ends what is shown there."""
         try:
             yield
         except Exception as error:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from flows.base import environment
 from flows.base.console import Console, first_line
-from flows.jobs.discovery import TrackedUnder, case_and_folder, check, trace
+from flows.jobs.discovery import TrackedUnder, case_and_folder, check_case, run_discovery
 from flows.jobs.experiment import run_experiment
 from flows.jobs.run_request import RunRequest
 from flows.jobs.stages import PlainStages, server_in_reach
@@ -89,7 +89,7 @@ def discover(
 
     under = under or TrackedUnder()
     checked_address(under.tracking.uri)
-    check(case)
+    check_case(case)
 
     def under_prefect() -> dict[str, Any]:
         from flows.jobs.prefect_flows import discovery
@@ -107,7 +107,7 @@ def discover(
 
     def plainly() -> dict[str, Any]:
         console = Console()
-        return trace(case, out, PlainStages(console.say), console, under)
+        return run_discovery(case, out, PlainStages(console.say), console, under)
 
     return _with_or_without(under_prefect, plainly, use_prefect)
 

@@ -153,7 +153,7 @@ def save(rebuilt: Rebuilt, out: Path) -> Path:
     return out / MODEL
 
 
-def said(rebuilt: Rebuilt, out: Path) -> str:
+def rebuilt_line(rebuilt: Rebuilt, out: Path) -> str:
     """What came back, in one line; of one of several candidates that the models of a run are the mean of, that too."""
     candidate = rebuilt.candidate
     declared, recalibrated = (rebuilt.metrics[f"free_run/valid_{name}"] for name in AGAINST)

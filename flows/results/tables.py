@@ -191,11 +191,11 @@ def _footer(name: str, runs: Sequence[Any], left_out: _LeftOut, format: str) -> 
     for run in runs:
         told = (run.data.tags.get(tag) for tag in ("aesi.fallback", UNFITTED))
         text = " ".join((text, *filter(None, told)))
-    text += _told_of(left_out, runs[0])
+    text += _left_out_words(left_out, runs[0])
     return {"md": text, "tex": f"% {text}", "csv": f"# {text}"}[format]
 
 
-def _told_of(left_out: _LeftOut, shown: Any) -> str:
+def _left_out_words(left_out: _LeftOut, shown: Any) -> str:
     """Sentences on the runs that are left out, each after a space."""
     text = ""
     if left_out.by_program:

@@ -25,6 +25,7 @@ from aesi.sparse import Genome
 from aesi.sparse.search.genome import GENE_WORDS
 from aesi.sparse.search.genome_space import GenomeSpace
 from flows.base import environment
+from flows.base.console import first_line
 from flows.base.databases import limits, with_driver
 from flows.search.nsga2 import Constraints
 from flows.search.term_sampler import distributions, widened
@@ -116,8 +117,7 @@ class PublishedStudy:
         )
 
     def _give_up(self, error: Exception) -> None:
-        reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:200]
         self._say(
-            f"optuna: the study cannot be kept for the dashboard ({reason}); the search goes on without."
+            f"optuna: the study cannot be kept for the dashboard ({first_line(error)}); the search goes on without."
         )
         self._study = None

@@ -32,11 +32,11 @@ OnGeneration = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
-    """The result of the search stage.
+class StudyResult:
+    """The result of the search stage: that of the search, and the candidate that was picked.
 
-    numbers : of the fittest candidates, those that `chosen` is the mean of, the best first.
-    key : content key of these.  scored : number -> outcome, of all candidates.
+    numbers : of the fittest candidates, of which `chosen` is the mean, best first.  key : content key of these.
+    scored : number -> outcome, of all candidates.
     """
 
     result: SearchResult
@@ -78,7 +78,7 @@ def run_study(
     publish_as: str | None = None,
     on_generation: OnGeneration | None = None,
     lost_again: bool = False,
-) -> Found:
+) -> StudyResult:
     """Search until all candidates of the experiment are known, and pick one.
 
     reuse, lost_again : see `Evaluation`; a resumed run leaves out the latter, since its candidates are tracked as they
@@ -117,9 +117,9 @@ def run_study(
     if tally.found:
         console.say(f"  {tally.evaluated} candidates evaluated, {tally.found} known from before")
     numbers = result.fittest(top_share(config))
-    chosen = averaged([_alive(number, scores.scored[number]) for number in numbers])
+    chosen = averaged([_evaluated(number, scores.scored[number]) for number in numbers])
     key = fingerprint.key(*(evaluation.key(genome) for genome in chosen.genomes))
-    return Found(result, numbers, chosen, key, scores.scored)
+    return StudyResult(result, numbers, chosen, key, scores.scored)
 
 
 class _Scores:
@@ -175,7 +175,8 @@ def settings_of(problem: Problem, config: ExperimentConfig) -> SearchSettings:
     )
 
 
-def _alive(number: int, outcome: ScoredCandidate | Failed) -> Candidate:
+def _evaluated(number: int, outcome: ScoredCandidate | Failed) -> Candidate:
+    """The candidate of an outcome.  Raises FitError if it failed."""
     if isinstance(outcome, Failed):
         raise FitError(f"the chosen candidate {number} failed: {outcome.reason}")
     return outcome.candidate

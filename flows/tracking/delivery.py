@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 
 def _send_run(store: Store, item: Item, again: bool) -> None:
-    """A finished nested run: parameters, metrics, files."""
+    """A finished nested run: parameters, metrics, files.  again : whether it may be there already, in whole or in
+    part."""
     info = _sent_before(store, item) if again else None
     tags = {PARENT: item["parent"], NUMBER: item["label"], **item["tags"]}
     if info is None and store.local:
@@ -70,7 +71,7 @@ def _write_texts(folder: Path, files: Mapping[str, str]) -> None:
         (folder / name).write_text(text, encoding="utf-8")
 
 
-def _send_batch(store: Store, item: Item, again: bool) -> None:
+def _send_batch(store: Store, item: Item) -> None:
     """Parameters, metrics and tags of a run that exists."""
     from mlflow.entities import Metric, Param, RunTag
 
@@ -82,7 +83,7 @@ def _send_batch(store: Store, item: Item, again: bool) -> None:
     )
 
 
-def _send_datasets(store: Store, item: Item, again: bool) -> None:
+def _send_datasets(store: Store, item: Item) -> None:
     from mlflow.entities import Dataset, DatasetInput, InputTag
 
     inputs = [
@@ -95,7 +96,7 @@ def _send_datasets(store: Store, item: Item, again: bool) -> None:
     store.client.log_inputs(item["run_id"], inputs)
 
 
-def _send_files(store: Store, item: Item, again: bool) -> None:
+def _send_files(store: Store, item: Item) -> None:
     """A file or a folder as artifacts."""
     source = Path(item["path"])
     if source.is_dir():
@@ -106,21 +107,21 @@ def _send_files(store: Store, item: Item, again: bool) -> None:
         raise ValueError(f"{source} is gone")
 
 
-def _send_json(store: Store, item: Item, again: bool) -> None:
+def _send_json(store: Store, item: Item) -> None:
     store.client.log_dict(item["run_id"], item["content"], item["name"])
 
 
-def _send_model(store: Store, item: Item, again: bool) -> None:
+def _send_model(store: Store, item: Item) -> None:
     from flows.tracking.serving.logged_model import log_hybrid
 
     log_hybrid(store.uri, item["run_id"], Path(item["path"]), item["registered_as"])
 
 
-def _send_end(store: Store, item: Item, again: bool) -> None:
+def _send_end(store: Store, item: Item) -> None:
     store.client.set_terminated(item["run_id"], item["status"], item["at_ms"])
 
 
-def _send_mark(store: Store, item: Item, again: bool) -> None:
+def _send_mark(store: Store, item: Item) -> None:
     """Tags of a nested run that was sent before."""
     run = store.child(item["experiment_id"], item["parent"], item["label"])
     if run is not None:
@@ -128,7 +129,7 @@ def _send_mark(store: Store, item: Item, again: bool) -> None:
             store.client.set_tag(run.info.run_id, key, value)
 
 
-def _send_experiment(store: Store, item: Item, again: bool) -> None:
+def _send_experiment(store: Store, item: Item) -> None:
     """Tags of the experiment that are not there yet: what a person has written stays."""
     there = store.client.get_experiment(item["experiment_id"]).tags
     new = {key: value for key, value in item["tags"].items() if key not in there}
@@ -141,8 +142,7 @@ def _sent_before(store: Store, item: Item) -> RunInfo | None:
     return None if found is None else found.info
 
 
-SENDERS: dict[str, Callable[[Store, Item, bool], None]] = {
-    "run": _send_run,
+SENDERS: dict[str, Callable[[Store, Item], None]] = {
     "mark": _send_mark,
     "experiment": _send_experiment,
     "batch": _send_batch,
@@ -152,9 +152,13 @@ SENDERS: dict[str, Callable[[Store, Item, bool], None]] = {
     "model": _send_model,
     "end": _send_end,
 }
-"""Kind of item -> what sends it: to a store, an item, and whether it may have been sent before."""
+"""Kind of item -> what sends it to a store, for the kinds that MLflow itself does not double. A nested run is the other
+one (`_send_run`): each request would make a new one."""
 
 
 def deliver(store: Store, item: Item, again: bool) -> None:
-    """Send an item; `again` says that it may have been sent before."""
-    SENDERS[item["kind"]](store, item, again)
+    """Send an item.  again : whether it may have been sent before."""
+    if item["kind"] == "run":
+        _send_run(store, item, again)
+    else:
+        SENDERS[item["kind"]](store, item)

@@ -23,6 +23,7 @@ from urllib.parse import urlsplit
 from aesi.errors import AesiError, InputError
 from aesi.numerics.files.whole import check_writable
 from flows.base import environment
+from flows.base.console import first_line
 from flows.base.databases import limits, with_driver
 from flows.base.locks import ProcessLock
 from flows.tracking.relocation import artifact_folder, follow
@@ -228,8 +229,9 @@ class Store:
         try:
             return Path(self.client.download_artifacts(run.info.run_id, name))
         except (OSError, ValueError, MlflowException) as error:
-            reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:200]
-            raise InputError(f"run {run.info.run_id} carries no readable {name} ({reason}).") from None
+            raise InputError(
+                f"run {run.info.run_id} carries no readable {name} ({first_line(error)})."
+            ) from None
 
     def find_experiment(self, name: str) -> str | None:
         """Id of the experiment of that name, or None."""
@@ -367,7 +369,7 @@ def _reach_database(uri: str) -> None:
 
 
 def _unusable(uri: str, error: BaseException) -> StoreAway:
-    reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:200]
+    reason = first_line(error)
     if uri.startswith("http"):
         advice = (
             "start the server, or leave out tracking.uri and MLFLOW_TRACKING_URI to track in the workspace's own "

@@ -40,9 +40,9 @@ def home(folder):
 
 def laid_under(more):
     """The overrides of a small run, without those keys that `more` sets, which may be given once."""
-    from flows.benchmarks.splits import over
+    from flows.benchmarks.splits import merged_overrides
 
-    return [*over((*SMALL, *ASIDE), more)]
+    return [*merged_overrides((*SMALL, *ASIDE), more)]
 
 
 @pytest.fixture(scope="session")

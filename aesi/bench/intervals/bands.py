@@ -72,8 +72,8 @@ def one_width(errors: _Errors) -> HalfWidths:
 
 def without_leverage(errors: _Errors) -> HalfWidths:
     """The bands of the package without the term for the distance of a sample from the fitted rows (leverage)."""
-    nothing: list[Array | None] = [None] * len(errors.calibration.soc)
-    return bands(replace(errors, calibration=replace(errors.calibration, excess=nothing)))
+    no_excess: list[Array | None] = [None] * len(errors.calibration.soc)
+    return bands(replace(errors, calibration=replace(errors.calibration, excess=no_excess)))
 
 
 def without_spread(errors: _Errors) -> HalfWidths:
@@ -85,10 +85,10 @@ def without_spread(errors: _Errors) -> HalfWidths:
     return bands(replace(errors, calibration=calibration, test=test))
 
 
-def held_at_the_edge(errors: _Errors) -> HalfWidths:
+def without_reach(errors: _Errors) -> HalfWidths:
     """The bands of the package without the widening where the model leaves its trained range (reach)."""
-    nowhere = {h: [np.zeros(len(r)) for r in each] for h, each in errors.test.reach.items()}
-    return bands(replace(errors, test=replace(errors.test, reach=nowhere)))
+    no_reach = {h: [np.zeros(len(r)) for r in each] for h, each in errors.test.reach.items()}
+    return bands(replace(errors, test=replace(errors.test, reach=no_reach)))
 
 
 def best_width(errors: _Errors) -> HalfWidths:
@@ -109,7 +109,7 @@ DESIGNS: dict[str, Callable[[_Errors], HalfWidths]] = {
     "one width": one_width,
     "scaled, without leverage": without_leverage,
     "scaled, without spread": without_spread,
-    "scaled, without reach": held_at_the_edge,
+    "scaled, without reach": without_reach,
     "scaled": bands,
     "best width in hindsight": best_width,
 }

@@ -25,7 +25,7 @@ these records are marked and are left out of the medians.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -33,7 +33,7 @@ from typing import Any
 import numpy as np
 
 from aesi.bench import some_chosen
-from aesi.bench.physics.archive import ARCHIVE, HG2, NCR, chamber, degc_of
+from aesi.bench.physics.archive import ARCHIVE, HG2, NCR
 from aesi.bench.physics.tested import soh_on_its_day
 from aesi.constants import MV_PER_V
 from aesi.data.catalogue import locate
@@ -81,6 +81,8 @@ class MeasuredRecord:
 FILES = {NCR: (START, NCR), HG2: (START, HG2), NMC: (None, None), LFP: (None, None), M50T: (START, None)}
 """Data set -> (start file, calibrated file) of `experiments/cells`. None as the start file means the file published
 with the data, None as the calibrated file that there is none."""
+NOMINAL_AH = {NCR: 2.9, HG2: 3.0}
+"""Nominal capacity as the maker states it, Ah, to which the start file of another cell is scaled."""
 
 COLD = "_cold"
 """Suffix of the name of a calibrated file that was also fitted to records of the archive in the cold."""
@@ -96,7 +98,7 @@ RECORDS = (
     MeasuredRecord(NCR, "10degC_cycle_1", others_mv=43.5, protocol=f"UDDS; {ECM_UDE}"),
     MeasuredRecord(NCR, "0degC_cycle_1", others_mv=71.0, protocol=f"UDDS; {ECM_UDE}"),
     MeasuredRecord(NCR, "n10degC_cycle_1", others_mv=127.4, protocol=f"UDDS; {ECM_UDE}"),
-    *(MeasuredRecord(NCR, f"{name}", fitted=True)
+    *(MeasuredRecord(NCR, name, fitted=True)
         for name in ("25degC_1c_start", "25degC_c20_ocv", "25degC_hppc", "10degC_hppc", "0degC_hppc")),
     MeasuredRecord(NCR, "n10degC_hppc", fitted=True, until_s=78611.0),
     MeasuredRecord(HG2, "25degC_us06"),
@@ -149,13 +151,13 @@ def run(
     }
 
 
-def _chosen(only: Sequence[str], there: Sequence[MeasuredRecord]) -> list[MeasuredRecord]:
+def _chosen(only: Sequence[str], records: Sequence[MeasuredRecord]) -> list[MeasuredRecord]:
     """The records that `only` names, by data set or by record; all if it is empty.  Raises InputError for an unknown
     name."""
-    names = [name for record in there for name in (record.data, record.name)]
+    names = [name for record in records for name in (record.data, record.name)]
     for one in only:
         some_chosen("cells", [name for name in names if name == one], names)
-    return [record for record in there if not only or record.data in only or record.name in only]
+    return [record for record in records if not only or record.data in only or record.name in only]
 
 
 def best(row: dict[str, Any]) -> float:
@@ -164,90 +166,6 @@ def best(row: dict[str, Any]) -> float:
     return next(
         row[k] for k in ("with_temperature_mv", "calibrated_mv", "declared_mv") if row.get(k) is not None
     )
-
-
-COLUMNS = {
-    "declared_mv": "declared",
-    "calibrated_mv": "calibrated",
-    "with_temperature_mv": "with temperature",
-    "aged_mv": "aged",
-    "windows_mv": "windows",
-    "hybrid_mv": "hybrid",
-}
-"""Key of a row -> heading of its column in `table`, RMS errors in mV."""
-
-
-def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Lines of a Markdown table with one line per record, RMS errors in mV, then the protocols of the published
-    figures, which the table refers to by number."""
-    protocols = list(dict.fromkeys(r["others"] for r in rows if r.get("others")))
-    lines = [f"| cell | record | mean degC | {' | '.join(COLUMNS.values())} | others |"]
-    lines.append("|---|---|" + "---:|" * (len(COLUMNS) + 1) + "---|")
-    for row in rows:
-        name = row["record"] + (" (fitted)" if row["fitted"] else "")
-        shown = [_shown(row, key) for key in COLUMNS]
-        others = (
-            f"{row['others_mv']:g} [{protocols.index(row['others']) + 1}]" if row.get("others_mv") else ""
-        )
-        degc = "" if row.get("mean_degc") is None else f"{row['mean_degc']:.1f}"
-        lines.append(f"| {row['cell']} | {name} | {degc} | {' | '.join(shown)} | {others} |")
-    return [*lines, "", *(f"[{k}] {text}.  " for k, text in enumerate(protocols, start=1))]
-
-
-HEADINGS = COLUMNS | {"porous_mv": "porous electrode", "cold_mv": "fitted in the cold"}
-JUDGED = ("declared_mv", "with_temperature_mv", "porous_mv", "aged_mv", "cold_mv")
-"""Keys of the columns for the records of the archives: start file, calibrated file with the single-particle and with
-the porous-electrode model, calibrated file at the state of health of the day, file fitted in the cold as well."""
-
-
-def archive_table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Lines of Markdown: a table with the median and the largest RMS error, mV, of the records of each cell and chamber
-    temperature, then a table of the records in a block to open."""
-    there = sorted(
-        (row for row in rows if "error" not in row),
-        key=lambda row: (row["cell"], degc_of(row["record"]), row["record"]),
-    )
-    keys = [key for key in JUDGED if any(row.get(key) is not None for row in there)]
-    records = (f"    {line}" for line in _by_record(there, keys))
-    return [*_by_chamber(there, keys), "", '??? note "Each record of the archives"', "", *records]
-
-
-def _by_chamber(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Iterator[str]:
-    """Lines of the table by cell and chamber temperature: `median / largest` RMS error, mV. Records that a file was
-    fitted to are left out of its column."""
-    yield f"| cell | chamber | records | {' | '.join(HEADINGS[key] for key in keys)} | ran out |"
-    yield "|---|---|---:|" + "---:|" * (len(keys) + 1)
-    for cell, place in dict.fromkeys((row["cell"], chamber(row["record"])) for row in rows):
-        ours = [row for row in rows if (row["cell"], chamber(row["record"])) == (cell, place)]
-        figures = [
-            [row[key] for row in ours if row.get(key) is not None and key not in row.get("fitted_mv", ())]
-            for key in keys
-        ]
-        told = " | ".join(f"{np.median(each):.1f} / {max(each):.1f}" if each else "" for each in figures)
-        out = sum("with_temperature" in row["ran_out"] for row in ours)
-        yield f"| {cell} | {place} | {len(ours)} | {told} | {out or ''} |"
-
-
-def _by_record(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Iterator[str]:
-    yield f"| cell | record | mean degC | {' | '.join(HEADINGS[key] for key in keys)} |"
-    yield "|---|---|---:|" + "---:|" * len(keys)
-    for row in rows:
-        told = " | ".join(_shown(row, key) for key in keys)
-        yield f"| {row['cell']} | {row['record']} | {row['mean_degc']:.1f} | {told} |"
-
-
-def _shown(row: Mapping[str, Any], key: str) -> str:
-    if key == "hybrid_mv" and row.get("trained"):
-        return "trained"
-    if row.get(key) is None:
-        return ""
-    name = key.removesuffix("_mv")
-    ran_out = row.get("ran_out", {}).get(name)
-    until_held = row.get("until_held_mv", {}).get(name)
-    fitted = " (fitted)" if key in row.get("fitted_mv", ()) else ""
-    told = "" if ran_out is None else f" (ran out at {ran_out:.0f} s)"
-    held = "" if until_held is None else f" ({until_held:.1f} until {row['held_from_s']:.0f} s)"
-    return f"{row[key]:.1f}{fitted}{told}{held}"
 
 
 def judged(cells: Path, record: MeasuredRecord, porous: bool = False) -> dict[str, Any]:
@@ -264,32 +182,33 @@ def judged(cells: Path, record: MeasuredRecord, porous: bool = False) -> dict[st
 
 
 def _figures(cells: Path, record: MeasuredRecord, porous: bool) -> dict[str, Any]:
+    """The entries of a row about the errors, mV, of the models that there are for the cell (see the module)."""
     data = read_measurement(locate(record.data, record.name), stop_s=record.until_s)
     measured = data.temperature_degc
     bare = replace(data, temperature_degc=None)
     start, calibrated = FILES[record.data]
-    best_cell = cell_of(cells, record.data, start)
-    runs = {"declared": free_run(best_cell, bare)}
+    cell = cell_of(cells, record.data, start)
+    runs = {"declared": free_run(cell, bare)}
     out: dict[str, Any] = {"mean_degc": None if measured is None else round(float(measured.mean()), 1)}
     if calibrated is not None:
-        best_cell = cell_of(cells, record.data, calibrated)
-        runs["calibrated"] = free_run(best_cell, bare)
+        cell = cell_of(cells, record.data, calibrated)
+        runs["calibrated"] = free_run(cell, bare)
         if measured is not None:
-            runs["with_temperature"] = free_run(best_cell, data)
+            runs["with_temperature"] = free_run(cell, data)
             if porous:
-                runs["porous"] = free_run(best_cell, data, "dfn")
-        soh = soh_on_its_day(best_cell, record.data, record.name)
+                runs["porous"] = free_run(cell, data, "dfn")
+        soh = soh_on_its_day(cell, record.data, record.name)
         if soh is not None:
             out["soh"] = round(soh, 3)
-            runs["aged"] = free_run(best_cell.with_soh(soh), data)
+            runs["aged"] = free_run(cell.with_soh(soh), data)
         if record in ARCHIVED and (cells / f"{calibrated}{COLD}.bpx.json").is_file():
             cold = cell_of(cells, record.data, calibrated + COLD)
             runs["cold"] = free_run(cold, data)
             out["fitted_mv"] = ["cold_mv"] if record.name in dict(cold.fitted_at_k) else []
     if "windows" in record.protocol:
-        out["windows_mv"] = windows_mv(best_cell, data)
+        out["windows_mv"] = windows_mv(cell, data)
     out |= {f"{name}_mv": run.rmse_mv for name, run in runs.items()}
-    row = held_from(best_cell, data)
+    row = held_from(cell, data)
     if row is not None:
         out["held_from_s"] = float(data.time_s[row] - data.time_s[0])
         out["until_held_mv"] = {
@@ -315,10 +234,6 @@ def cell_of(cells: Path, data: str, name: str | None) -> Cell:
     )
 
 
-NOMINAL_AH = {NCR: 2.9, HG2: 3.0}
-"""Nominal capacity as the maker states it, Ah, to which the start file of another cell is scaled."""
-
-
 @dataclass(frozen=True, eq=False)
 class FreeRunError:
     """The error of one free run.
@@ -335,9 +250,9 @@ class FreeRunError:
 def free_run(cell: Cell, data: Measurement, model: ModelName = "espm") -> FreeRunError:
     """A free run over all rows, from the state of charge that `initial_state` finds. The current is constant between
     rows (hold `backward`), as loggers record it."""
-    error, gone = _errors(cell, data, initial_state(cell, data).soc, model)
-    out_s = float(data.time_s[int(np.argmax(gone))]) if gone.any() else None
-    return FreeRunError(error, round(MV_PER_V * rms(error), 2), out_s)
+    error, depleted = _errors(cell, data, initial_state(cell, data).soc, model)
+    ran_out_s = float(data.time_s[int(np.argmax(depleted))]) if depleted.any() else None
+    return FreeRunError(error, round(MV_PER_V * rms(error), 2), ran_out_s)
 
 
 def held_from(cell: Cell, data: Measurement) -> int | None:

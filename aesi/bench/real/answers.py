@@ -66,19 +66,19 @@ def _size(truth: Mapping[str, float], content: Mapping[str, Any]) -> dict[str, A
     return {}
 
 
-def initial_state_row(told: float, true: float, content: Mapping[str, Any]) -> dict[str, Any]:
+def initial_state_row(given: float, true: float, content: Mapping[str, Any]) -> dict[str, Any]:
     """The `size_*` entries of a wrongly given initial state of charge: its true error, and how much of it the fit of
     the written model corrected on the first record (nothing if the written model is the declared one).
 
-    told : the state of charge that the tracer was given, 0 to 1.  true : the right one.  content : the answer as in
+    given : the state of charge that the tracer had, 0 to 1.  true : the right one.  content : the answer as in
     `discovery.json`.
     """
     rows = content["own_parameters"]["after"]
-    moved = next((row["value"] for row in rows if row["effect"] == STATE_OF_CHARGE), told)
+    moved = next((row["value"] for row in rows if row["effect"] == STATE_OF_CHARGE), given)
     return {
         "parameter": "initial state of charge",
-        "size_true": true - told,
-        "size_found": moved - told,
+        "size_true": true - given,
+        "size_found": moved - given,
         "size_neutral": 0.0,
-        "size_error": abs(moved - true) / abs(true - told),
+        "size_error": abs(moved - true) / abs(true - given),
     }

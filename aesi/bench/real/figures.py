@@ -29,21 +29,21 @@ def confusion_figure(matrix: Mapping[str, Mapping[str, int]]) -> Figure:
 
     matrix : right answer -> given answer -> number of cases; not empty.
     """
-    asked = sorted(matrix)
-    said = sorted({name for counts in matrix.values() for name in counts})
-    counts = [[matrix[a].get(s, 0) for s in said] for a in asked]
+    right = sorted(matrix)
+    given = sorted({name for counts in matrix.values() for name in counts})
+    counts = [[matrix[a].get(s, 0) for s in given] for a in right]
     shares = [[n / max(1, sum(row)) for n in row] for row in counts]
-    rows = [a.replace("_", " ").replace(" or ", " or<br>") for a in asked]
+    rows = [a.replace("_", " ").replace(" or ", " or<br>") for a in right]
     tallest = max(row.count("<br>") for row in rows) + 1
     fig = style.figure(
         "Right and given answers",
         "Rows: the right effect, or several of which each is right. Columns: the answer of the tracer; effects named "
         "with the verdict 'unknown' follow this word. Numbers count cases; the shade is their share of the row.",
-        220 + max(30, LINE_PX * tallest) * len(asked),
+        220 + max(30, LINE_PX * tallest) * len(right),
     )
     fig.add_heatmap(
         z=shares,
-        x=[s.replace("_", " ") for s in said],
+        x=[s.replace("_", " ") for s in given],
         y=rows,
         text=[[str(n) if n else "" for n in row] for row in counts],
         texttemplate="%{text}",
@@ -109,8 +109,8 @@ def _ratio(row: CaseRow, key: str) -> float:
 def worst_of(rows: Sequence[CaseRow]) -> list[CaseRow]:
     """The cases with a residual whose written model has the largest error on held-out data, the largest first; at most
     WORST."""
-    told = [row for row in rows if row.get("after_test_mv") is not None and "residual" in row]
-    return sorted(told, key=lambda row: -float(row["after_test_mv"]))[:WORST]
+    known = [row for row in rows if row.get("after_test_mv") is not None and "residual" in row]
+    return sorted(known, key=lambda row: -float(row["after_test_mv"]))[:WORST]
 
 
 def residual_figure(row: CaseRow) -> Figure:

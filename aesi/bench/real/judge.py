@@ -12,9 +12,9 @@ import numpy as np
 from aesi.bench.detectable import seen_on_measured
 from aesi.bench.limit import LOST, NO_TIME, NOT_RUN, NoAnswer, Stopwatch, answer_of
 from aesi.bench.real.answers import initial_state_row, scored
-from aesi.bench.real.beside import capacity_row, course_row, witness_row
 from aesi.bench.real.case import RealCase, Take
 from aesi.bench.real.faults import declared_with_fault, soc0_with_fault, with_fault
+from aesi.bench.real.references import capacity_row, resistance_row, temperature_row
 from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.data import read_measurement
 from aesi.data.catalogue import locate
@@ -43,11 +43,11 @@ def judged(case: RealCase, cells: str, limit_s: float | None = LIMIT_S) -> dict[
     longer counts as not named.
     """
     spent = Stopwatch()
-    row = _asked(case)
+    row = _case_row(case)
     try:
         data = record(case.take)
         declared = declared_cell(case.cell, cells)
-        known = _known(case, data, declared)
+        truth = _truth(case, data, declared)
         good = [record(take) for take in case.good]
     except DataError as error:
         return row | {"verdict": NOT_RUN, "error": str(error), **spent.row}
@@ -61,21 +61,22 @@ def judged(case: RealCase, cells: str, limit_s: float | None = LIMIT_S) -> dict[
     if isinstance(found, NoAnswer):
         answer = found.row | MISSED
     else:
-        answer = _held_against(case, known, found, discovery_content(found), data, declared, soc0)
+        answer = _scored_row(case, truth, found, discovery_content(found), data, declared, soc0)
     row |= answer | spent.row
     return row | {"seen_nats": seen_on_measured(declared, data, soc0, case.answers, good, held)}
 
 
 def lost(case: RealCase) -> dict[str, Any]:
     """The row of a case whose process the operating system ended. It counts as not named, and has no detectability."""
-    return _asked(case) | LOST.row | MISSED | NO_TIME
+    return _case_row(case) | LOST.row | MISSED | NO_TIME
 
 
 MISSED: dict[str, Any] = {"effects": [], "named": False}
 """Scores of a case that gave no answer."""
 
 
-def _asked(case: RealCase) -> dict[str, Any]:
+def _case_row(case: RealCase) -> dict[str, Any]:
+    """The entries of the row that describe the case."""
     return {
         "case": case.name,
         "group": case.group,
@@ -103,7 +104,7 @@ def declared_cell(name: str, cells: str) -> Cell:
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
+class Truth:
     """What is known of the cell and of the record, for the score.
 
     parameters : `effect.parameter` -> true value, SI.  temperature_degc : (n,) degC, the temperature that was withheld
@@ -116,43 +117,51 @@ class Known:
     spectra: tuple[Spectrum, ...] = ()
 
 
-def _known(case: RealCase, data: Measurement, declared: Cell) -> Known:
-    truth = dict(case.parameters)
-    course, lost = None, None
+def _truth(case: RealCase, data: Measurement, declared: Cell) -> Truth:
+    """The truth of a case from its description and the records that it names.
+
+    data : the record of the case, without a fault.  Raises DataError if one of the records is not available.
+    """
+    parameters = dict(case.parameters)
+    measured_degc, lost = None, None
     if case.group == "withheld":
         full = record(replace(case.take, temperature=True))
         if full.temperature_degc is None:
             raise DataError(f"{full.name} has no column of temperature.")
-        course = full.temperature_degc
-    if case.measured == "temperature" and course is not None:
+        measured_degc = full.temperature_degc
+    if case.measured == "temperature" and measured_degc is not None:
         reference_degc = declared.initial_temperature_k - ZERO_CELSIUS_K
-        truth["ambient_temperature.shift_k"] = float(np.mean(course)) - reference_degc
+        parameters["ambient_temperature.shift_k"] = float(np.mean(measured_degc)) - reference_degc
     if case.against is not None:
         other_ah = record(case.against).charge_ah
         by_file = case.measured == "declared capacity"
         lost = 1 - (other_ah / declared.capacity_ah if by_file else data.charge_ah / other_ah)
     spectra = () if case.spectra is None else read_spectra(locate(case.take.set, case.spectra))
-    return Known(truth, course, lost, spectra)
+    return Truth(parameters, measured_degc, lost, spectra)
 
 
-def _held_against(
+def _scored_row(
     case: RealCase,
-    known: Known,
+    truth: Truth,
     found: Discovery,
     content: Mapping[str, Any],
     data: Measurement,
     declared: Cell,
-    told: float | None,
+    given_soc0: float | None,
 ) -> dict[str, Any]:
-    row = scored(case.answers, known.parameters, content) | {"residual": _residual(found)}
-    if known.temperature_degc is not None:
-        row |= course_row(found, data, known.temperature_degc)
-    if known.lost is not None:
-        row |= capacity_row(found, declared, known.lost)
-    if known.spectra:
-        row |= witness_row(found, declared, known.spectra)
-    if case.fault and case.fault.kind == "wrong_soc0" and told is not None and case.soc0 is not None:
-        row |= initial_state_row(told, case.soc0, content)
+    """The entries of the row about the answer: its scores, and its differences from what was measured independently.
+
+    data, declared, given_soc0 : record, cell and initial state of charge as the tracer had them, with the fault.
+    """
+    row = scored(case.answers, truth.parameters, content) | {"residual": _residual(found)}
+    if truth.temperature_degc is not None:
+        row |= temperature_row(found, data, truth.temperature_degc)
+    if truth.lost is not None:
+        row |= capacity_row(found, declared, truth.lost)
+    if truth.spectra:
+        row |= resistance_row(found, declared, truth.spectra)
+    if case.fault and case.fault.kind == "wrong_soc0" and given_soc0 is not None and case.soc0 is not None:
+        row |= initial_state_row(given_soc0, case.soc0, content)
     return row
 
 

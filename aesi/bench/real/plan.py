@@ -109,7 +109,7 @@ def plan(archive: bool = False) -> tuple[RealCase, ...]:
     if archive:
         cases = list(_archived())
     else:
-        cases = [*_controls(), *_withheld(), *_faults(), *_physics(), *_ageing(), *_witnesses()]
+        cases = [*_controls(), *_withheld(), *_faults(), *_physics(), *_ageing(), *_spectra_cases()]
         cases += beside_good(cases)
     there = {case.name for case in cases}
     seen: dict[str, int] = {}
@@ -260,7 +260,7 @@ def _physics() -> Iterator[RealCase]:
 
 
 def _ageing() -> Iterator[RealCase]:
-    march = Take(PANASONIC, "25degC_1c_start")
+    first_discharge = Take(PANASONIC, "25degC_1c_start")
     for file, answers in (("25degC_1c_end", LOSSES), ("25degC_1c_start", ())):
         yield RealCase(
             name=f"ageing-{file}",
@@ -271,7 +271,7 @@ def _ageing() -> Iterator[RealCase]:
             answers=answers,
             source="charge of the 1C discharges of March and July 2017",
             measured="capacity" if answers else None,
-            against=march if answers else None,
+            against=first_discharge if answers else None,
         )
     for file in ("n0_hppc", "n0_udds"):
         yield RealCase(
@@ -287,7 +287,7 @@ def _ageing() -> Iterator[RealCase]:
         )
 
 
-def _witnesses() -> Iterator[RealCase]:
+def _spectra_cases() -> Iterator[RealCase]:
     for month, spectra in SPECTRA.items():
         yield RealCase(
             name=f"witness-{month}_hppc",

@@ -86,7 +86,7 @@ def write_report(path: Path, rows: Sequence[CaseRow], summary: Mapping[str, Any]
         lines=_lines(summary),
         worst=[f"worst_{k}" for k in range(len(worst))],
         by_kind=_by_kind(rows),
-        witnesses=[r for r in rows if "ohmic_off" in r],
+        resistances=[r for r in rows if "ohmic_off" in r],
         courses=[r for r in rows if "course_rms_k" in r],
         losses=[r for r in rows if "lost_off_pp" in r],
     )
@@ -96,13 +96,13 @@ def _lines(summary: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
     """Lines of the table: (what the figure is, its value over all cases, over the test cases alone, its aim). Figures
     without a case are left out."""
     return [
-        (words, _told(summary, key), _told(summary["reported"], key), aim)
+        (words, _figure_text(summary, key), _figure_text(summary["reported"], key), aim)
         for key, (words, aim) in FIGURES.items()
         if summary.get(key) is not None
     ]
 
 
-def _told(rates: Mapping[str, Any], key: str) -> str:
+def _figure_text(rates: Mapping[str, Any], key: str) -> str:
     """A figure as text, with its 95 % interval and the number of its cases if it is a rate; '–' without a case."""
     value = rates.get(key)
     if value is None:
@@ -123,12 +123,15 @@ def _by_kind(rows: Sequence[CaseRow]) -> list[dict[str, Any]]:
         if row.get("put_in"):
             found.setdefault(row["put_in"], []).append(row)
     return [
-        {"put_in": put_in, "said": [(r["record"].partition("/")[0], r["named"], _said(r)) for r in each]}
+        {
+            "put_in": put_in,
+            "said": [(r["record"].partition("/")[0], r["named"], _answer_text(r)) for r in each],
+        }
         for put_in, each in sorted(found.items())
     ]
 
 
-def _said(row: CaseRow) -> str:
+def _answer_text(row: CaseRow) -> str:
     """The named effects, or the verdict if there are none."""
     effects = " + ".join(row.get("effects") or ())
     return effects or str(row["verdict"])

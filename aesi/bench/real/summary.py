@@ -16,7 +16,7 @@ from aesi.bench import CaseRow
 from aesi.bench.detectable import SEEN_NATS
 from aesi.bench.limit import NO_ANSWER, NOT_RUN
 from aesi.bench.scoring import rate
-from aesi.tracer.decide.written import AS_GOOD
+from aesi.tracer.decide.model_to_write import AS_GOOD
 
 NEAR_K = 2.0
 """Largest error, K, of a temperature that counts as near. A convention."""
@@ -60,22 +60,20 @@ def _rates(rows: Sequence[CaseRow]) -> CaseRow:
             "warming_named"
         ),
         **rate(faults, "named").named("fault_named"),
-        **rate(_seen(faults), "named").named("fault_seen_named"),
+        **rate(detectable(faults), "named").named("fault_seen_named"),
         "fault_named_by_kind": _by_kind(faults),
         **rate(of("physics"), "named").named("physics_named"),
         "size_error_median": _median(sized, "size_error"),
         **rate([r for r in sized if r.get("size_covered") is not None], "size_covered").named("size_covered"),
-        **_beside(of("fault_beside"), of("control_beside")),
+        **_with_good_records(of("fault_beside"), of("control_beside")),
         **_initial_state([r for r in of("fault") if r["put_in"].startswith(SOC0)]),
         **_controls(of("control"), rows),
         **rate(of("ageing"), "named").named("ageing_named"),
         **_near([r for r in of("ageing") if "lost_off_pp" in r], "lost_off_pp", NEAR_PP).named(
             "ageing_within_2pp"
         ),
-        **_witnesses([r for r in rows if "ohmic_off" in r]),
-        **rate([{"worse": not _at_most(r, AS_GOOD)} for r in rows if _errors(r)], "worse").named(
-            "after_worse"
-        ),
+        **_resistances([r for r in rows if "ohmic_off" in r]),
+        **rate([{"worse": _is_worse(r)} for r in rows if _has_errors(r)], "worse").named("after_worse"),
         "processor_s_median": _median(rows, "processor_s"),
         "processor_s_total": float(sum(r["processor_s"] for r in rows)),
     }
@@ -88,7 +86,7 @@ def _withheld(rows: Sequence[CaseRow]) -> CaseRow:
     RMS difference over time is that of the written model. Both it and the halved error are over right answers only.
     """
     near = [{"near": "size_found" in r and abs(r["size_found"] - r["size_true"]) <= NEAR_K} for r in rows]
-    halved = [{"halved": _at_most(r, HALVED)} for r in rows if r["named"] and _errors(r)]
+    halved = [{"halved": _is_halved(r)} for r in rows if r["named"] and _has_errors(r)]
     return {
         **rate(rows, "named").named("withheld_named"),
         **rate(near, "near").named("withheld_within_2k"),
@@ -97,12 +95,12 @@ def _withheld(rows: Sequence[CaseRow]) -> CaseRow:
     }
 
 
-def _seen(rows: Sequence[CaseRow]) -> list[CaseRow]:
+def detectable(rows: Sequence[CaseRow]) -> list[CaseRow]:
     """The cases whose right answer is detectable: it gains more than SEEN_NATS of log likelihood on held-out data."""
     return [r for r in rows if r.get("seen_nats") is not None and r["seen_nats"] > SEEN_NATS]
 
 
-def _beside(rows: Sequence[CaseRow], controls: Sequence[CaseRow]) -> CaseRow:
+def _with_good_records(rows: Sequence[CaseRow], controls: Sequence[CaseRow]) -> CaseRow:
     """Figures of the cases with known-good records: of those with a fault or contact resistance (`rows`), and of the
     controls without."""
     faults = [r for r in rows if r["answer"]]
@@ -110,7 +108,7 @@ def _beside(rows: Sequence[CaseRow], controls: Sequence[CaseRow]) -> CaseRow:
     silent = [r for r in rows if not r["answer"]]
     return {
         **rate(faults, "named").named("beside_named"),
-        **rate(_seen(faults), "named").named("beside_seen_named"),
+        **rate(detectable(faults), "named").named("beside_seen_named"),
         "beside_named_by_kind": _by_kind(faults),
         "beside_size_error_median": _median(sized, "size_error"),
         **rate([r for r in sized if r.get("size_covered") is not None], "size_covered").named(
@@ -147,7 +145,7 @@ def _controls(controls: Sequence[CaseRow], rows: Sequence[CaseRow]) -> CaseRow:
     }
 
 
-def _witnesses(rows: Sequence[CaseRow]) -> CaseRow:
+def _resistances(rows: Sequence[CaseRow]) -> CaseRow:
     """Figures of the written model's resistances at half charge and at the temperature of the spectra."""
     both = [{"off": r[key]} for r in rows for key in ("ohmic_off", "transfer_off")]
     return {
@@ -169,17 +167,21 @@ def _by_kind(rows: Sequence[CaseRow]) -> dict[str, str]:
     return {put_in: f"{sum(named)} of {len(named)}" for put_in, named in out.items()}
 
 
-def _errors(row: CaseRow) -> bool:
+def _has_errors(row: CaseRow) -> bool:
+    """Whether all three models could be simulated on the held-out data."""
     return all(row.get(f"{state}_test_mv") is not None for state in ("before", "recalibrated", "after"))
 
 
-def _at_most(row: CaseRow, times: float) -> bool:
-    """Whether the written model's error on held-out data is at most `times` that of the declared model or, if `times`
-    is above 1, that of the better of the declared and the recalibrated model."""
-    better = row["before_test_mv"]
-    if times > 1:
-        better = min(better, row["recalibrated_test_mv"])
-    return bool(row["after_test_mv"] <= times * better)
+def _is_halved(row: CaseRow) -> bool:
+    """Whether the error of the written model on held-out data is at most half that of the declared one."""
+    return bool(row["after_test_mv"] <= HALVED * row["before_test_mv"])
+
+
+def _is_worse(row: CaseRow) -> bool:
+    """Whether the error of the written model on held-out data is notably larger than that of the better of the declared
+    and the recalibrated one."""
+    better = min(row["before_test_mv"], row["recalibrated_test_mv"])
+    return not row["after_test_mv"] <= AS_GOOD * better
 
 
 def _median(rows: Sequence[Mapping[str, Any]], key: str) -> float | None:

@@ -7,9 +7,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from aesi.bench import CaseRow
-from aesi.bench.detectable import SEEN_NATS
 from aesi.bench.limit import NOT_RUN
-from aesi.bench.real.summary import SOC0
+from aesi.bench.real.summary import SOC0, detectable
 
 NOUNS = {
     "withheld": "temperature withheld",
@@ -44,7 +43,7 @@ def _by_kind(rows: Sequence[CaseRow]) -> Iterator[str]:
     for row in rows:
         kinds.setdefault((_kind(row), row["group"] in BESIDE), []).append(row)
     for (kind, beside), ones in kinds.items():
-        seen = [one for one in ones if one.get("seen_nats") is not None and one["seen_nats"] > SEEN_NATS]
+        seen = detectable(ones)
         right = any(one["answer"] for one in ones)
         sizes = [one["size_error"] for one in ones if one.get("size_error") is not None]
         covered = [one["size_covered"] for one in ones if one.get("size_covered") is not None]

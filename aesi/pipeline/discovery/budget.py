@@ -32,7 +32,7 @@ def within_budget(case: Case) -> Case:
         case,
         measurements=tuple(_thinned(record, most) for record in case.measurements),
         good=tuple(_thinned(record, most) for record in case.good),
-        tests=tuple(_judging(record, case.measurements, most) for record in case.tests),
+        tests=tuple(_thinned_test(record, case.measurements, most) for record in case.tests),
     )
 
 
@@ -56,9 +56,9 @@ def _thinned(record: Measurement, most: int) -> Measurement:
     return decimate(decimate(record, MAX_ROWS), most)
 
 
-def _judging(record: Measurement, fitted: Sequence[Measurement], most: int) -> Measurement:
-    """A record that judges. Where a fitted record leads to it and either is thinned, it is given with that record's
-    rows before it.
+def _thinned_test(record: Measurement, fitted: Sequence[Measurement], most: int) -> Measurement:
+    """A test record, thinned by its own length. Where it begins with a fitted record, or continues one, and either is
+    thinned, it begins with the thinned rows of that record.
 
     fitted : as they were given.  most : rows that each of them may have.
     """

@@ -38,8 +38,8 @@ the file of one of 30 Ah it is the other way round."""
 def with_cold_admitted(case: Case) -> Case:
     """The case, with a note on each record that can be of its cell only if that was colder than declared.
 
-    Raises DataError for a record that cannot be of the cell, whatever its temperature; where the temperature of the
-    surroundings is not among what is tried, or the record holds its temperature, at that which is declared or measured.
+    Raises DataError for a record that cannot be of the cell: at any temperature, or, if `ambient_temperature` is not
+    among the effects that are tried or the record has a temperature, at the declared or measured one.
     """
     declared, searched = case.declared(), COLD.id in case.tried()
     given = replace(declared, model=case.model or declared.model)

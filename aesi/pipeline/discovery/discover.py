@@ -43,16 +43,20 @@ ABBREVIATIONS = {"ocv": "OCV", "ocp": "OCP"}
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """One case, as requested.
+    """One discovery, as requested.
 
-    cell : a BPX file, or a saved model or its folder, whose cell and effects are what is declared.
-    only, without : ids of the effects that are tried, or are not; all where neither names one.
-    model : "espm" or "dfn" for every hypothesis; None: that of a saved porous electrode, else what the data ask for.
-    holdout : last share of each record that is kept back where there are no tests; None takes `HOLDOUT`.
-    max_effects : most that are added; it is said where this is less than usual.
-    soh : share of the cell's capacity that it had then, or the day of the test; None takes all of it.
-    good : records of the same cell that are known to be good.
-    of_experiment : an experiment file describes it, whose keys are named beside the options of a command.
+    cell : BPX file, or a saved model or its folder, whose cell and effects are the declared ones.
+    measurements : records that are searched for missing effects.  tests : records that choose nothing.  good : records
+    of the same cell that are known to be good.
+    soc0 : state of charge at the first row, 0 to 1; None reads it from the voltage.  soh : share of the
+    cell's capacity that it had then, or the day of the records; None takes the whole capacity.
+    holdout : last share of each record that is kept back if there are no tests, 0 to 1; None takes `HOLDOUT`.
+    max_effects : most effects that are added; a note says so if it is less than the default.  seed : of the bootstrap.
+    effect_files : Python files of the user's own effects.  only, without : ids of the effects that are tried, or are
+    not; empty for all.
+    model : "espm" or "dfn" for every hypothesis; None takes that of a saved porous electrode, else what the data ask
+    for.
+    of_experiment : whether an experiment file describes the case; warnings then name its keys beside the options.
     """
 
     cell: Path | HybridModel
@@ -175,7 +179,7 @@ def write_discovery(out: Path, case: Case, found: Discovery, mlflow_run_id: str 
     write_whole(out / FINDING, json.dumps(content, indent=1, allow_nan=False) + "\n")
     found_model(found).save(out / MODEL)
     title = ", ".join(m.name for m in case.measurements)
-    write_discovery_report(out / REPORT, view(found, content, title, mlflow_run_id))
+    write_discovery_report(out / REPORT, discovery_view(found, content, title, mlflow_run_id))
     return content
 
 
@@ -326,7 +330,9 @@ def _pointers(found: Discovery) -> list[dict[str, Any]]:
     ]
 
 
-def view(found: Discovery, content: Mapping[str, Any], title: str, mlflow_run_id: str = "") -> DiscoveryView:
+def discovery_view(
+    found: Discovery, content: Mapping[str, Any], title: str, mlflow_run_id: str = ""
+) -> DiscoveryView:
     """The view that the report is made of."""
     titles = {name: _title(name) for name in (*CATALOGUE, *(c.effect for c in found.candidates))}
     return DiscoveryView(

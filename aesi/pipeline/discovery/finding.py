@@ -7,7 +7,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from aesi.pipeline.discovery.discover import Case, discovery_content, found_model, view, write_discovery
+from aesi.pipeline.discovery.discover import (
+    Case,
+    discovery_content,
+    discovery_view,
+    found_model,
+    write_discovery,
+)
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.tracer import Discovery
 
@@ -104,7 +110,7 @@ class Finding:
         """Measured voltage, current, and the residual of each model over time: a plotly figure."""
         from aesi.pipeline.report.plots.records import residual_figure
 
-        traces = view(self.found, self.content, "").of(part)
+        traces = discovery_view(self.found, self.content, "").of(part)
         return residual_figure(traces, LABELS)
 
     def save(self, out: str | Path) -> Path:

@@ -119,9 +119,8 @@ def differing_settings(runs: Sequence[ComparedRun]) -> list[str]:
 
 def _finding(runs: Sequence[ComparedRun]) -> str:
     """A sentence on the runs: which errs least in free run, whether a correction helped, and the verdicts."""
-    return (
-        " ".join(filter(None, (_least(runs), _harmed(runs), _found(runs)))) or f"{len(runs)} runs compared."
-    )
+    sentences = (_least(runs), _worse_than_declared(runs), _verdict_counts(runs))
+    return " ".join(filter(None, sentences)) or f"{len(runs)} runs compared."
 
 
 def _least(runs: Sequence[ComparedRun]) -> str:
@@ -145,7 +144,8 @@ def _least(runs: Sequence[ComparedRun]) -> str:
     return f"{known[0][1]} errs least in free run on test records: {least} mV RMSE, {rest} by {errors} mV."
 
 
-def _harmed(runs: Sequence[ComparedRun]) -> str:
+def _worse_than_declared(runs: Sequence[ComparedRun]) -> str:
+    """A sentence on how many corrections err by more than the declared model in free run; '' if none does."""
     known = [run.metrics[FREE_RUN_MSER] for run in runs if FREE_RUN_MSER in run.metrics]
     worse = sum(value < 0.0 for value in known)
     if not worse:
@@ -160,7 +160,8 @@ def _judged_alike(runs: Sequence[ComparedRun]) -> bool:
     return len({run.judged_on for run in runs if FREE_RUN_MV in run.metrics}) < 2
 
 
-def _found(runs: Sequence[ComparedRun]) -> str:
+def _verdict_counts(runs: Sequence[ComparedRun]) -> str:
+    """A sentence on the verdicts of the discoveries among the runs; '' without one."""
     verdicts = Counter(str(run.discovery["verdict"]) for run in runs if run.discovery)
     if not verdicts:
         return ""
@@ -169,6 +170,7 @@ def _found(runs: Sequence[ComparedRun]) -> str:
 
 
 def _settings(runs: Sequence[ComparedRun]) -> PageTable | None:
+    """The settings that differ, a run a row."""
     keys = differing_settings(runs)
     shared = len({key for run in runs for key in run.settings}) - len(keys)
     return PageTable(
@@ -190,6 +192,7 @@ def _settings(runs: Sequence[ComparedRun]) -> PageTable | None:
 
 
 def _metrics(runs: Sequence[ComparedRun]) -> PageTable | None:
+    """The figures of COLUMNS on test records, a run a row."""
     names = [name for name in COLUMNS if any(name in run.metrics for run in runs)]
     chosen = ("model",) if any(run.chosen for run in runs) else ()
     rows = tuple(
@@ -212,6 +215,7 @@ def _metrics(runs: Sequence[ComparedRun]) -> PageTable | None:
 
 
 def _figure(run: ComparedRun, name: str) -> ComparedCell:
+    """The cell of a metric, in mV where it is tracked in V, with its 90 % range in free run."""
     value = run.metrics.get(name)
     if value is None:
         return ComparedCell(ABSENT)
@@ -224,6 +228,7 @@ def _figure(run: ComparedRun, name: str) -> ComparedCell:
 
 
 def _verdicts(runs: Sequence[ComparedRun]) -> PageTable | None:
+    """The verdicts with the parameters of their effects, a discovery a row; None without one."""
     found = [run for run in runs if run.discovery]
     if not found:
         return None
@@ -260,6 +265,7 @@ def _parameters(run: ComparedRun) -> dict[str, ComparedCell]:
 
 
 def _genes(runs: Sequence[ComparedRun]) -> PageTable | None:
+    """The genes of the chosen candidates, a run a row; None if no run has them."""
     names = list(dict.fromkeys(name for run in runs for name in run.comparison.get("genome", {})))
     if not names:
         return None
@@ -276,6 +282,7 @@ def _genes(runs: Sequence[ComparedRun]) -> PageTable | None:
 
 
 def _terms(runs: Sequence[ComparedRun]) -> PageTable | None:
+    """The coefficients of the terms that not all runs hold, a term a row; None for fewer than two runs with terms."""
     having = [run for run in runs if run.comparison.get("terms")]
     if len(having) < 2:
         return None

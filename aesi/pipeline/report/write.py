@@ -95,7 +95,7 @@ def write_discovery_report(path: str | Path, view: DiscoveryView) -> Path:
             if sentence
         ],
         rest=discoveries.rest_finding(view.discovery),
-        look_alikes=discoveries.look_alikes_told(view.discovery, view.titles),
+        look_alikes=discoveries.look_alike_names(view.discovery, view.titles),
         closest=discoveries.closest_finding(view),
         moved=_moved_rows(view.discovery),
         candidates=[

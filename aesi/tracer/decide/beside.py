@@ -20,9 +20,9 @@ from aesi.numerics.typing import BoolArray
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.decide.carry_over import ORDINARY_C, range_fault
 from aesi.tracer.decide.evidence import MEASURED_EFFECTS, Answer, Evidence, with_confidence
+from aesi.tracer.decide.model_to_write import fast_load_limits
 from aesi.tracer.decide.shared import searched_unshared
-from aesi.tracer.decide.verdict import Thresholds, Verdict, best_gain, beyond, look_alikes, tolerance_v
-from aesi.tracer.decide.written import limits_of
+from aesi.tracer.decide.verdict import Thresholds, Verdict, best_gain, beyond_noise, look_alikes, tolerance_v
 from aesi.tracer.likelihood.fit import FittedHypothesis, held_out_residual
 from aesi.tracer.likelihood.growth import Explanation, Parent
 from aesi.tracer.likelihood.model_state import ModelState
@@ -34,7 +34,7 @@ from aesi.tracer.search.plausible import alike, lag, sds_behind
 from aesi.tracer.search.wrong_parameters import NINETY
 
 
-def gathered_beside(
+def searched_answer_beside(
     problem: InverseProblem, max_effects: int, archive: Archive, thresholds: Thresholds, report: Report
 ) -> Answer:
     """The search for effects that act on the other records and not on the good ones, with its verdict.
@@ -44,31 +44,31 @@ def gathered_beside(
     beside = replace(problem, trust="beside")
     found = searched_unshared(beside, min(max_effects, MEASURED_EFFECTS), archive, report)
     path = replace(found.path, notes=(*found.path.notes, *found.shared))
-    verdict = judged_beside(path, thresholds)
+    verdict = verdict_beside(path, thresholds)
     if verdict.word != "none":
         believed = path.chosen if verdict.effects else path.base
-        usual = Usual.of(path, believed, thresholds)
+        allowed_error = AllowedError.of(path, believed, thresholds)
         aged = [
             one
-            for one in _of_another_age(path, found.archive)
-            if usual.said_nats(path, one) > path.admission_nats
+            for one in _ageing_hypotheses(path, found.archive)
+            if allowed_error.discounted_gain_nats(path, one) > path.admission_nats
         ]
-        verdict = of_one_age(verdict, believed, aged)
-    return Answer(path, verdict, {"beside": path}, partial(_settled, path))
+        verdict = checked_against_ageing(verdict, believed, aged)
+    return Answer(path, verdict, {"beside": path}, partial(_evidence_for, path))
 
 
-def _settled(path: Path, verdict: Verdict) -> Evidence:
+def _evidence_for(path: Path, verdict: Verdict) -> Evidence:
     beside, verdict = path.problem, with_confidence(verdict)
     recalibrated = ModelState.of(beside, path.base)
     after = ModelState.of(beside, path.chosen) if verdict.effects else recalibrated
     fault = range_fault(after, ORDINARY_C)
     if fault is not None:
         return Evidence(path, {"beside": path}, recalibrated, ModelState(beside), verdict, fault)
-    limits = limits_of(after) if verdict.effects else ()
+    limits = fast_load_limits(after) if verdict.effects else ()
     return Evidence(path, {"beside": path}, recalibrated, after, verdict, None, limits)
 
 
-def _of_another_age(path: Path, archive: Archive) -> list[FittedHypothesis]:
+def _ageing_hypotheses(path: Path, archive: Archive) -> list[FittedHypothesis]:
     """The fitted hypotheses in which the cell has aged since the good records, one ageing effect each; best first."""
     names = [name for name, effect in path.problem.effects.items() if effect.of_age]
     grown = grown_with(Parent(path.problem, path.blocks, path.base), names, archive)
@@ -76,7 +76,7 @@ def _of_another_age(path: Path, archive: Archive) -> list[FittedHypothesis]:
     return sorted((fit for fit in fits if fit is not None), key=lambda fit: -fit.score.total)
 
 
-def of_one_age(verdict: Verdict, believed: Explanation, aged: Sequence[Explanation]) -> Verdict:
+def checked_against_ageing(verdict: Verdict, believed: Explanation, aged: Sequence[Explanation]) -> Verdict:
     """The verdict, checked against ageing. Ageing effects that score as well join the look-alikes; where one scores
     better, the verdict is `unknown` without a name.
 
@@ -111,8 +111,8 @@ def of_one_age(verdict: Verdict, believed: Explanation, aged: Sequence[Explanati
 
 
 @dataclass(frozen=True)
-class Usual:
-    """Error that a right answer may leave on the records in question, V RMS beyond the noise.
+class AllowedError:
+    """Error that a right answer may leave on the other records, V RMS beyond the noise.
 
     good_v : error of the model on the good records.  usual_v : that and the tolerance for any right hypothesis, added
     as squares.  allowed_v : usual_v, enlarged by the difference that two records may have by chance.
@@ -123,35 +123,38 @@ class Usual:
     allowed_v: float
 
     @classmethod
-    def of(cls, path: Path, believed: FittedHypothesis, thresholds: Thresholds) -> Usual:
+    def of(cls, path: Path, believed: FittedHypothesis, thresholds: Thresholds) -> AllowedError:
         """The errors under the hypothesis that is believed."""
         problem, good = path.problem, path.problem.good_rows
-        good_v = left_v(path, believed, good & problem.compared)
+        good_v = error_beyond_noise_v(path, believed, good & problem.compared)
         usual_v = float(np.hypot(good_v, tolerance_v(problem, thresholds)))
         return cls(good_v, usual_v, usual_v * (1.0 + NINETY * _relative_sd(problem, good)))
 
-    def said_nats(self, path: Path, one: FittedHypothesis) -> float:
-        """Gain of a hypothesis over the bare model, nats. Where it leaves more than `allowed_v` on the records in
-        question, the gain is multiplied by the ratio of the mean squares (usual_v / left)**2."""
-        left = left_v(path, one, ~path.problem.good_rows)
-        return path.gain(one) * (1.0 if left <= self.allowed_v else (self.usual_v / left) ** 2)
+    def discounted_gain_nats(self, path: Path, one: FittedHypothesis) -> float:
+        """Gain of a hypothesis over the bare model, nats. Where its error on the other records, left_v, is more than
+        `allowed_v`, the gain is multiplied by the ratio of the mean squares (usual_v / left_v)**2."""
+        left_v = error_beyond_noise_v(path, one, ~path.problem.good_rows)
+        return path.gain(one) * (1.0 if left_v <= self.allowed_v else (self.usual_v / left_v) ** 2)
 
 
-def judged_beside(path: Path, thresholds: Thresholds) -> Verdict:
+def verdict_beside(path: Path, thresholds: Thresholds) -> Verdict:
     """The verdict on a search beside good records, without its confidence (`evidence.with_confidence`)."""
-    problem, usual = path.problem, Usual.of(path, path.chosen, thresholds)
-    before, left = (left_v(path, one, ~problem.good_rows) for one in (path.base, path.chosen))
+    problem, allowed_error = path.problem, AllowedError.of(path, path.chosen, thresholds)
+    before, left = (error_beyond_noise_v(path, one, ~problem.good_rows) for one in (path.base, path.chosen))
     named = path.chosen.hypothesis
-    if left > usual.allowed_v and usual.said_nats(path, path.chosen) < path.admission_nats:
+    if (
+        left > allowed_error.allowed_v
+        and allowed_error.discounted_gain_nats(path, path.chosen) < path.admission_nats
+    ):
         # The gain is too small for the error on these records: the verdict is on the model without an effect.
-        named, left, usual = (), before, Usual.of(path, path.base, thresholds)
-    allowed = usual.allowed_v
+        named, left, allowed_error = (), before, AllowedError.of(path, path.base, thresholds)
+    allowed = allowed_error.allowed_v
     groups, margin = look_alikes(path, thresholds, max(allowed, left)) if named else ((), -best_gain(path))
     others = ", ".join(r.name for r in problem.records if not r.good)
     after = f" without the finding, {1e3 * left:.1f} mV with it" if named else ""
     reason = (
         f"the error on unseen data of {others} is {1e3 * before:.1f} mV beyond the noise{after}; it is "
-        f"{1e3 * usual.good_v:.1f} mV on the good records"
+        f"{1e3 * allowed_error.good_v:.1f} mV on the good records"
     )
     if left > allowed:
         reason += (
@@ -163,9 +166,9 @@ def judged_beside(path: Path, thresholds: Thresholds) -> Verdict:
     return Verdict("found" if named else "none", named, groups, 0.0, left, allowed, reason, margin)
 
 
-def left_v(path: Path, one: FittedHypothesis, rows: BoolArray) -> float:
+def error_beyond_noise_v(path: Path, one: FittedHypothesis, rows: BoolArray) -> float:
     """RMS error of a hypothesis beyond noise, V, on `rows` (n,) of left-out blocks."""
-    return beyond(rms(held_out_residual(path.blocks, one)[rows]), rms(path.problem.white_v[rows]))
+    return beyond_noise(rms(held_out_residual(path.blocks, one)[rows]), rms(path.problem.white_v[rows]))
 
 
 def _relative_sd(problem: InverseProblem, good: BoolArray) -> float:

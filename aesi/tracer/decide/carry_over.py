@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -68,18 +69,18 @@ def left_out_errors(problem: InverseProblem, blocks: Blocks, one: FittedHypothes
     """
     folds = blocks.folds["record" if len(problem.records) > 1 else "end"]
     charges = [np.isin(blocks.of_row, charge) for charge in blocks.folds["charge"]]
-    tells = np.sqrt(_tells(problem))
+    weights = np.sqrt(_evidence_weights(problem))
     by_record, by_range = [], []
     for k, fold in enumerate(folds):
         out = np.isin(blocks.of_row, fold)
         whole, seen = _left_out_residuals(problem, blocks, one, k, fold)
         by_record.append(rms(whole))
-        told = tells[out] * seen
-        by_range += [rms(told[charge[out]]) for charge in charges if charge[out].any()]
+        weighted = weights[out] * seen
+        by_range += [rms(weighted[charge[out]]) for charge in charges if charge[out].any()]
     return LeftOut(tuple(by_record), tuple(by_range))
 
 
-def _tells(problem: InverseProblem) -> Array:
+def _evidence_weights(problem: InverseProblem) -> Array:
     """(n,) weight of each row, 0 to 1, as evidence of a fault of the model, where its record is left out.
 
     The initial state of such a record (`ModelState.simulated`) is uncertain. Where it changes the voltage by more than
@@ -123,13 +124,11 @@ def range_fault(state: ModelState, rates_c: Sequence[float] = (*ORDINARY_C, *FAS
     model is at fault only where it runs out long before the declared one ends.
     """
     declared = ModelState(state.problem)
-    for temperature in temperatures_degc(state.problem):
-        for rate in rates_c:
-            ends_s, fault = _end(state, rate, temperature)
-            if fault is None:
-                continue
-            declared_s, as_declared = _end(declared, rate, temperature)
-            if as_declared is None and ends_s < LEAST_SHARE * declared_s:
+    for degc, rate_c in product(temperatures_degc(state.problem), rates_c):
+        ends_s, fault = _course_end(state, rate_c, degc)
+        if fault is not None:
+            declared_s, declared_fault = _course_end(declared, rate_c, degc)
+            if declared_fault is None and ends_s < LEAST_SHARE * declared_s:
                 return fault
     return None
 
@@ -143,20 +142,20 @@ def temperatures_degc(problem: InverseProblem) -> tuple[float | None, ...]:
     return tuple({float(min(t.min() for t in known)), float(max(t.max() for t in known))})
 
 
-def _end(state: ModelState, rate: float, temperature: float | None) -> tuple[float, str | None]:
-    """(s until a full discharge or charge ends; a sentence where the model runs empty before its voltage limit, else
-    None)."""
+def _course_end(state: ModelState, rate_c: float, degc: float | None) -> tuple[float, str | None]:
+    """(time at which a full discharge or charge ends, s; a sentence where it fails: it cannot be simulated, or the
+    model runs empty before its voltage limit; else None)."""
     cell = state.problem.cell
-    profile, soc0 = full_course(cell, rate, temperature)
+    profile, soc0 = full_course(cell, rate_c, degc)
     time = profile.time_s
-    what = f"{'a full discharge' if rate > 0 else 'a charge'} at {abs(rate):g}C"
+    what = f"{'a full discharge' if rate_c > 0 else 'a charge'} at {abs(rate_c):g}C"
     try:
         run = state.problem.run(profile, soc0, state.effects(), "linear")
     except AesiError as error:
         return 0.0, f"{what} cannot be simulated: {error}"
     if not np.isfinite(run.voltage_v).all():
         return 0.0, f"{what} has no finite voltage"
-    over = np.append(np.flatnonzero(_beyond_limit(cell, rate, run.voltage_v)), len(time) - 1)[0]
+    over = np.append(np.flatnonzero(_beyond_limit(cell, rate_c, run.voltage_v)), len(time) - 1)[0]
     empty = np.append(np.flatnonzero(run.series["depleted"] > 0), len(time))[0]
     if over <= empty:
         return float(time[over]), None
@@ -180,5 +179,5 @@ def full_course(cell: Cell, rate_c: float, degc: float | None) -> tuple[Measurem
     return course, 1.0 if rate_c > 0 else 0.0
 
 
-def _beyond_limit(cell: Cell, rate: float, voltage_v: Array) -> BoolArray:
-    return voltage_v < cell.lower_voltage_v if rate > 0 else voltage_v > cell.upper_voltage_v
+def _beyond_limit(cell: Cell, rate_c: float, voltage_v: Array) -> BoolArray:
+    return voltage_v < cell.lower_voltage_v if rate_c > 0 else voltage_v > cell.upper_voltage_v

@@ -14,16 +14,23 @@ from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.trust import Trust
 from aesi.tracer.decide.carry_over import ORDINARY_C, range_fault
 from aesi.tracer.decide.confidence import frequency_maps, kind_of
-from aesi.tracer.decide.one_cause import in_one
+from aesi.tracer.decide.model_to_write import (
+    Option,
+    carries_best,
+    fast_load_limits,
+    model_to_write,
+    stand_in_notes,
+    why_not_refit,
+)
+from aesi.tracer.decide.one_cause import with_one_effect
 from aesi.tracer.decide.verdict import (
     Thresholds,
     Verdict,
-    judged,
-    partly,
+    partly_explained,
     tolerance_v,
     unexplained_v,
+    verdict_on,
 )
-from aesi.tracer.decide.written import Option, carries_best, limits_of, of_refit, stand_ins, written
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import base_of
@@ -98,10 +105,10 @@ class Answer:
     path: Path
     verdict: Verdict
     paths: dict[Trust, Path]
-    settled: Callable[[Verdict], Evidence]
+    evidence_for: Callable[[Verdict], Evidence]
 
 
-def gathered(
+def searched_answer(
     problem: InverseProblem,
     max_effects: int,
     archive: Archive,
@@ -109,7 +116,7 @@ def gathered(
     report: Report,
     shallower: Answer | None = None,
 ) -> Answer:
-    """The searches of a case with their verdict. `Answer.settled` checks what carries over.
+    """The searches of a case with their verdict. `Answer.evidence_for` checks what carries over.
 
     shallower : answer of the same searches with fewer effects, to be reused.
     Raises DataError where the model cannot be simulated on the records.
@@ -117,16 +124,18 @@ def gathered(
     begun = {} if shallower is None else shallower.paths
     searches = _Searches(max_effects, archive, thresholds, report, shallower=begun)
     path, verdict = _best_explanation(problem, searches)
-    return Answer(path, verdict, searches.paths, partial(_settled, problem, path, searches))
+    return Answer(path, verdict, searches.paths, partial(_evidence_for, problem, path, searches))
 
 
-def _settled(problem: InverseProblem, path: Path, searches: _Searches, verdict: Verdict) -> Evidence:
+def _evidence_for(problem: InverseProblem, path: Path, searches: _Searches, verdict: Verdict) -> Evidence:
     archive = searches.archive
     if verdict.word == "unknown":
         ages = of_several_ages(problem, archive)
         return _unexplained(replace(problem, ages=ages), path, verdict, searches)
     recalibrations = _recalibrations(problem, searches.paths["tight"], archive)
-    return _adopted(path, searches.paths, with_confidence(verdict), _recalibrated(problem, recalibrations))
+    return _with_found_effects(
+        path, searches.paths, with_confidence(verdict), _recalibrated(problem, recalibrations)
+    )
 
 
 def _best_explanation(problem: InverseProblem, searches: _Searches) -> tuple[Path, Verdict]:
@@ -134,33 +143,33 @@ def _best_explanation(problem: InverseProblem, searches: _Searches) -> tuple[Pat
     where neither explains the data."""
     archive, thresholds = searches.archive, searches.thresholds
     path = searches.at(problem, "tight")
-    verdict = judged(path, thresholds)
+    verdict = verdict_on(path, thresholds)
     if verdict.word != "unknown":
         wrong = with_wrong_parameters(path, searches.max_effects, archive)
         if wrong is not path:
-            path, verdict = wrong, judged(wrong, thresholds)
+            path, verdict = wrong, verdict_on(wrong, thresholds)
     if verdict.word == "found":
         path, verdict = _with_one_cause(path, verdict, archive, thresholds)
     if verdict.word != "unknown":
-        path, verdict = _sharpened(problem, path, verdict, archive, thresholds)
+        path, verdict = _at_exact_trust(problem, path, verdict, archive, thresholds)
     if verdict.word == "none":  # own parameters may hide an effect
         exact = searches.at(problem, "exact")
-        found = exact, judged(exact, thresholds)
-        if believed((path, verdict), found):
+        found = exact, verdict_on(exact, thresholds)
+        if second_is_believed((path, verdict), found):
             path, verdict = found
-    return path, consistent(path, verdict)
+    return path, plausible_or_unknown(path, verdict)
 
 
 def _unexplained(problem: InverseProblem, path: Path, verdict: Verdict, searches: _Searches) -> Evidence:
-    """Evidence where nothing explains the data: `unknown` with the effects that the coarsened search names, and the
-    model that carries over best.
+    """Evidence where nothing explains the data: `unknown` with the effects that the search at the trust `measured`
+    names, and the model that carries over best.
 
     path, verdict : the search that is believed, and its verdict `unknown`.
     """
     archive, tight = searches.archive, searches.paths["tight"]
     recalibrations = _recalibrations(problem, tight, archive)
     measured, blocks = searches.at(problem, "measured"), path.blocks
-    lasting = _by_what_lasts(problem, measured, archive)
+    lasting = _at_lasting_trust(problem, measured, archive)
     options = [*recalibrations, Option.of(lasting.problem, blocks, lasting.base)]
     if path.beyond_reach_v is not None and len(problem.records) > 1:
         options += _with_stand_ins(searches.at(problem, "loose"), blocks)
@@ -168,13 +177,13 @@ def _unexplained(problem: InverseProblem, path: Path, verdict: Verdict, searches
     if path.beyond_reach_v is not None:
         path = measured  # no other search tried an effect
     if measured.chosen.hypothesis:
-        path, verdict = measured, partly(measured, verdict, searches.thresholds)
+        path, verdict = measured, partly_explained(measured, verdict, searches.thresholds)
         named = named_options(lasting, tight, blocks, archive)
     declared = Option.of(problem, blocks, None)
-    after, why = written(declared, options, named)
+    after, why = model_to_write(declared, options, named)
     if after.values is None or not after.hypothesis:
-        why = "; ".join(filter(None, (of_refit(declared, recalibrations, options, after), why))) or None
-    limits = (*stand_ins(after, verdict.effects), *limits_of(after)) if after.hypothesis else ()
+        why = "; ".join(filter(None, (why_not_refit(declared, recalibrations, options, after), why))) or None
+    limits = (*stand_in_notes(after, verdict.effects), *fast_load_limits(after)) if after.hypothesis else ()
     recalibrated = _recalibrated(problem, recalibrations)
     return Evidence(path, searches.paths, recalibrated, after, with_confidence(verdict), why, limits)
 
@@ -192,8 +201,8 @@ def of_several_ages(problem: InverseProblem, archive: Archive) -> bool:
     return one is not None and several is not None and several.score.total > one.score.total
 
 
-def believed(one: tuple[Path, Verdict], other: tuple[Path, Verdict]) -> bool:
-    """True where the second of two searches is believed rather than the first.
+def second_is_believed(first: tuple[Path, Verdict], second: tuple[Path, Verdict]) -> bool:
+    """Whether the second of two searches, each with its verdict, is believed rather than the first.
 
     A search that explains the data is believed before one that does not; otherwise the hypotheses that they chose
     decide. The one with more names is believed only where both its score on unseen data and its marginal likelihood are
@@ -202,20 +211,19 @@ def believed(one: tuple[Path, Verdict], other: tuple[Path, Verdict]) -> bool:
     On a blind case that lacks nothing, another radius with plating scored 3.5 nats more on unseen data, with a marginal
     likelihood lower by 17 nats.
     """
-    unknown = [verdict.word == "unknown" for _, verdict in (one, other)]
+    unknown = [verdict.word == "unknown" for _, verdict in (first, second)]
     if unknown[0] != unknown[1]:
         return unknown[0]
-    competing = len(one[0].problem.competing())
-    first, second = one[0].chosen, other[0].chosen
-    fewer, more = sorted((first, second), key=lambda fit: len(fit.hypothesis))
-    if len(fewer.hypothesis) < len(more.hypothesis) and not (
-        plausibility(more, competing) > plausibility(fewer, competing)
-    ):
-        return fewer is second
-    return most_plausible([first, second], competing) is second
+    competing = len(first[0].problem.competing())
+    fits = [path.chosen for path, _ in (first, second)]
+    fewer, more = sorted(fits, key=lambda fit: len(fit.hypothesis))
+    adds_effects = len(fewer.hypothesis) < len(more.hypothesis)
+    if adds_effects and not plausibility(more, competing) > plausibility(fewer, competing):
+        return fewer is fits[1]
+    return most_plausible(fits, competing) is fits[1]
 
 
-def consistent(path: Path, verdict: Verdict) -> Verdict:
+def plausible_or_unknown(path: Path, verdict: Verdict) -> Verdict:
     """The verdict, or `unknown` where the fit has declared parameters further off than cell files are and does not name
     them.
 
@@ -234,7 +242,7 @@ def consistent(path: Path, verdict: Verdict) -> Verdict:
     return replace(verdict, word="unknown", effects=(), confidence_sets=(), reason=reason, margin=0.0)
 
 
-def _sharpened(
+def _at_exact_trust(
     problem: InverseProblem, path: Path, verdict: Verdict, archive: Archive, thresholds: Thresholds
 ) -> tuple[Path, Verdict]:
     """(path, verdict) of the same finding at the trust `exact`, where that scores as well on unseen data."""
@@ -253,10 +261,10 @@ def _with_one_cause(
     path: Path, verdict: Verdict, archive: Archive, thresholds: Thresholds
 ) -> tuple[Path, Verdict]:
     """(path, verdict) of the same finding with one effect, where one scores as well as several wrong parameters."""
-    one, group = in_one(path, archive)
+    one, group = with_one_effect(path, archive)
     if not group:
         return path, verdict
-    found = judged(one, thresholds)
+    found = verdict_on(one, thresholds)
     return (one, replace(found, confidence_sets=(group,))) if found.word == "found" else (path, verdict)
 
 
@@ -288,7 +296,7 @@ def named_options(path: Path, tight: Path, blocks: Blocks, archive: Archive) -> 
     return [Option.of(one.problem, blocks, one.chosen) for one in named]
 
 
-def _by_what_lasts(problem: InverseProblem, measured: Path, archive: Archive) -> Path:
+def _at_lasting_trust(problem: InverseProblem, measured: Path, archive: Archive) -> Path:
     """The path of a measured cell, with its choice refitted at the trust `lasting`: the response within seconds
     identifies the effect, but the written model has to hold over hours.
 
@@ -326,7 +334,7 @@ def _recalibrated(problem: InverseProblem, recalibrations: Sequence[Option]) -> 
     return carries_best(recalibrations).state if recalibrations else ModelState(problem)
 
 
-def _adopted(
+def _with_found_effects(
     path: Path,
     paths: dict[Trust, Path],
     verdict: Verdict,
@@ -339,4 +347,4 @@ def _adopted(
     if fault is not None:
         names = " + ".join(path.chosen.hypothesis) or "the recalibrated model"
         return Evidence(path, paths, recalibrated, ModelState(path.problem), verdict, f"{names}: {fault}")
-    return Evidence(path, paths, recalibrated, chosen, verdict, None, limits_of(chosen))
+    return Evidence(path, paths, recalibrated, chosen, verdict, None, fast_load_limits(chosen))

@@ -20,15 +20,15 @@ from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.free_parameter import values_of
 from aesi.tracer.case.problem import STEP, InverseProblem
 from aesi.tracer.decide.carry_over import ORDINARY_C, full_course, temperatures_degc
-from aesi.tracer.decide.verdict import told_share
+from aesi.tracer.decide.verdict import prediction_weight
 from aesi.tracer.likelihood.fit import FittedHypothesis, covariance_at
 from aesi.tracer.likelihood.model_error import PRIORS
 
 
-def foretold_in_use(
+def predicted_share_in_use(
     problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis, allowed_v: float
 ) -> float:
-    """`verdict.foretold_share` for full discharges and charges at ordinary rates, within the voltage limits and at the
+    """`verdict.predicted_share` for full discharges and charges at ordinary rates, within the voltage limits and at the
     temperatures of the records, 0 to 1. It is 0 where the fit cannot be simulated there, 1 where the declared model
     cannot."""
     most = PRIORS[problem.trust].median._replace(delta_v=allowed_v)
@@ -39,7 +39,7 @@ def foretold_in_use(
         if slopes is None:
             return 0.0
         sd_v = np.sqrt(np.einsum("ij,jk,ik->i", slopes[rows], covariance, slopes[rows]))
-        told.append(told_share(problem.noise_v, sd_v, allowed_v))
+        told.append(prediction_weight(problem.noise_v, sd_v, allowed_v))
     return float(np.mean(np.concatenate(told))) if told else 1.0
 
 

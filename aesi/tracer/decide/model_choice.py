@@ -19,7 +19,7 @@ from typing import Protocol, TypeGuard
 from aesi.physics.simulation import MODEL_WORDS, ModelName
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.reduction import LEAST_V, Reduction, let_stand, reduction_of, with_fine_numerics
-from aesi.tracer.decide.evidence import Answer, Evidence, believed
+from aesi.tracer.decide.evidence import Answer, Evidence, second_is_believed
 from aesi.tracer.decide.verdict import Thresholds, across_models, structured_v, tolerance_v
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.path import Path
@@ -79,24 +79,24 @@ def with_model(
     reduced = _fine(problem, "espm")
     if declared is not None and not declared.notable:
         reduced = let_stand(reduced, declared.shift_v)
-    single = _Single(reduced, archive_of(reduced, None), search, max_effects, declared)
+    single = _SingleParticle(reduced, archive_of(reduced, None), search, max_effects, declared)
     if problem.has_good:
         return _chosen(
-            single.whole(), "espm", declared, ", since its approximations act on the good records, too"
+            single.full_search(), "espm", declared, ", since its approximations act on the good records, too"
         )
-    return _asked_by_records(single, problem, archive_of)
+    return _chosen_by_records(single, problem, archive_of)
 
 
 @dataclass(frozen=True, eq=False)
-class _Look:
-    """The answer of the single particle.  whole : whether it was searched for as many effects as may be named."""
+class _FirstSearch:
+    """The answer of the single particle.  complete : whether it was searched for as many effects as may be named."""
 
     answer: Answer
-    whole: bool
+    complete: bool
 
 
 @dataclass(frozen=True, eq=False)
-class _Single:
+class _SingleParticle:
     """The searches of a case with the single particle.
 
     declared : difference of the two models of the declared cell.
@@ -108,20 +108,20 @@ class _Single:
     max_effects: int
     declared: Reduction | None
 
-    def whole(self, shallower: Answer | None = None) -> Answer:
+    def full_search(self, shallower: Answer | None = None) -> Answer:
         """The search for as many effects as may be named.  shallower : the same for fewer."""
         return self.search(self.problem, self.archive, self.max_effects, shallower)
 
-    def looked(self) -> _Look:
+    def first_search(self) -> _FirstSearch:
         """The search for `FIRST_LOOK` effects where the two models differ notably. It goes on to all effects where the
         models do not differ, where the first search explains the data, and where no effect could."""
         few = min(FIRST_LOOK, self.max_effects) if _notable(self.declared) else self.max_effects
         first = self.search(self.problem, self.archive, few)
         if few == self.max_effects:
-            return _Look(first, True)
+            return _FirstSearch(first, True)
         if first.verdict.word == "found" or not _explains(first, self.declared):
-            return _Look(self.whole(first), True)
-        return _Look(first, False)
+            return _FirstSearch(self.full_search(first), True)
+        return _FirstSearch(first, False)
 
     def may_explain(self, answer: Answer) -> bool:
         """Whether an answer explains the data, or leaves no more than the two models may differ by. Where no effect was
@@ -134,40 +134,44 @@ class _Single:
         return _explains(self.search(beside, self.archive, self.max_effects), self.declared)
 
 
-def _asked_by_records(
-    single: _Single, problem: InverseProblem, archive_of: ArchiveOf
+def _chosen_by_records(
+    single: _SingleParticle, problem: InverseProblem, archive_of: ArchiveOf
 ) -> tuple[Evidence, ModelChoice]:
     """The single particle, where the two models do not differ notably (on the declared cell and on the one it ended
     with), or where it leaves far more than they differ by; else the believed one of both."""
-    look = single.looked()
-    explained = single.may_explain(look.answer)
-    reduction = _larger(single.declared, look.answer.paths["tight"]) if explained else single.declared
+    first = single.first_search()
+    explained = single.may_explain(first.answer)
+    reduction = _larger(single.declared, first.answer.paths["tight"]) if explained else single.declared
     if not _notable(reduction):
-        return _chosen(look.answer, "espm", reduction)
+        return _chosen(first.answer, "espm", reduction)
     if not explained:
         return _chosen(
-            look.answer,
+            first.answer,
             "espm",
             reduction,
             ", whose error is far larger than the difference of the two models",
         )
-    full = _fine(problem, "dfn")
-    return _weighed(single, look, full, archive_of(full, single.archive), reduction)
+    porous = _fine(problem, "dfn")
+    return _compared(single, first, porous, archive_of(porous, single.archive), reduction)
 
 
-def _weighed(
-    single: _Single, look: _Look, full: InverseProblem, archive: Archive, reduction: Reduction
+def _compared(
+    single: _SingleParticle,
+    first: _FirstSearch,
+    porous: InverseProblem,
+    archive: Archive,
+    reduction: Reduction,
 ) -> tuple[Evidence, ModelChoice]:
     """The model whose search is believed, after a search with each.
 
-    full, archive : of the porous electrode. Where that one needs effects, the single particle is searched for all.
+    porous, archive : of the porous electrode. Where that one needs effects, the single particle is searched for all.
     """
-    needs_names = not look.whole and single.search(full, archive, 0).verdict.word == "unknown"
-    by_single = single.whole(look.answer) if needs_names else look.answer
-    by_full = single.search(full, archive, most_names(by_single, single.max_effects))
-    if believed((by_full.path, by_full.verdict), (by_single.path, by_single.verdict)):
-        return _chosen(_of_both(by_single, by_full), "espm", reduction, _likelier(by_single))
-    return _chosen(_of_both(by_full, by_single), "dfn", reduction)
+    needs_effects = not first.complete and single.search(porous, archive, 0).verdict.word == "unknown"
+    by_single = single.full_search(first.answer) if needs_effects else first.answer
+    by_porous = single.search(porous, archive, most_effects_of_dfn(by_single, single.max_effects))
+    if second_is_believed((by_porous.path, by_porous.verdict), (by_single.path, by_single.verdict)):
+        return _chosen(_of_both(by_single, by_porous), "espm", reduction, _likelier(by_single))
+    return _chosen(_of_both(by_porous, by_single), "dfn", reduction)
 
 
 def _fine(problem: InverseProblem, name: ModelName) -> InverseProblem:
@@ -186,7 +190,7 @@ def _chosen(
     """(evidence from the answer of a search with one model, the choice of that model).  why : clause, the reason."""
     differ = "" if reduction is None else f"; {reduction.sentence}"
     words = f"all hypotheses use {MODEL_WORDS[name]}{why}{differ}."
-    return answer.settled(answer.verdict), ModelChoice(name, words, reduction)
+    return answer.evidence_for(answer.verdict), ModelChoice(name, words, reduction)
 
 
 def _likelier(answer: Answer) -> str:
@@ -209,7 +213,7 @@ def _larger(declared: Reduction | None, path: Path) -> Reduction | None:
     return max(known, key=lambda one: one.shift_v, default=None)
 
 
-def most_names(single: Answer, max_effects: int) -> int:
+def most_effects_of_dfn(single: Answer, max_effects: int) -> int:
     """Most effects that a search with the porous electrode may name and still be believed over the single particle's.
 
     It is `max_effects`, unless the single particle explains the data with a model error no larger than the difference

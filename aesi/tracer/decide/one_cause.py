@@ -9,14 +9,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from aesi.physics.effect import Effect
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import fitted_hypothesis
 from aesi.tracer.search.path import Path, Step
 from aesi.tracer.search.plausible import most_plausible
 
 
-def in_one(path: Path, archive: Archive) -> tuple[Path, tuple[str, ...]]:
+def with_one_effect(path: Path, archive: Archive) -> tuple[Path, tuple[str, ...]]:
     """(path with one effect in place of all of its effects, group of look-alikes that begins with it).
 
     The path as it was, with an empty group, where it does not name several declared parameters, or where no single
@@ -24,9 +23,9 @@ def in_one(path: Path, archive: Archive) -> tuple[Path, tuple[str, ...]]:
     """
     chosen = path.chosen
     effects = path.problem.effects
-    if len(chosen.hypothesis) < 2 or not all(_tolerated(effects[name]) for name in chosen.hypothesis):
+    if len(chosen.hypothesis) < 2 or not all(effects[name].restates_declared for name in chosen.hypothesis):
         return path, ()
-    causes = [e.id for e in effects.values() if e.kind == "parameter" and not _tolerated(e)]
+    causes = [e.id for e in effects.values() if e.kind == "parameter" and not e.restates_declared]
     fits = [fitted_hypothesis(path.problem, path.blocks, (cause,), path.base, archive) for cause in causes]
     inside = [fit for fit in fits if fit is not None and not fit.at_bounds]
     best = most_plausible([chosen, *inside], len(path.problem.competing()))
@@ -35,8 +34,3 @@ def in_one(path: Path, archive: Archive) -> tuple[Path, tuple[str, ...]]:
     step = Step((path.base,), (), (best,), best)
     group = (*best.hypothesis, *chosen.hypothesis)
     return replace(path, steps=(*path.steps, step), chosen=best), group
-
-
-def _tolerated(effect: Effect) -> bool:
-    """Whether the effect moves parameters that cell files declare, with a tolerance."""
-    return any(p.spread is not None for p in effect.parameters.values())

@@ -32,7 +32,9 @@ def other_temperatures(problem: InverseProblem) -> dict[int, OtherTemperature]:
     return {index: other for index, other in found.items() if other is not None}
 
 
-def of_unseen(fitted: ModelState, records: Sequence[PreparedRecord]) -> dict[str, OtherTemperature]:
+def contradicting_unseen(
+    fitted: ModelState, records: Sequence[PreparedRecord]
+) -> dict[str, OtherTemperature]:
     """Name of a record that was not fitted -> the temperature at which the declared model follows it, for records that
     contradict their own temperature and that the fitted model does not explain at it."""
     out = {}
@@ -48,10 +50,14 @@ def _other(problem: InverseProblem, record: PreparedRecord, seen: Measurement) -
     if seen.temperature_degc is None:
         return None
     declared_degc = problem.cell.initial_temperature_k - ZERO_CELSIUS_K
-    return other_temperature(seen.temperature_degc, declared_degc, partial(_left_v, problem, record, seen))
+    return other_temperature(
+        seen.temperature_degc, declared_degc, partial(_declared_rmse_v, problem, record, seen)
+    )
 
 
-def _left_v(problem: InverseProblem, record: PreparedRecord, seen: Measurement, degc: Array) -> float | None:
+def _declared_rmse_v(
+    problem: InverseProblem, record: PreparedRecord, seen: Measurement, degc: Array
+) -> float | None:
     there = replace(seen, temperature_degc=degc)
     try:
         run = problem.run(there, record.soc0, problem.fixed, record.thin_hold)
@@ -60,7 +66,9 @@ def _left_v(problem: InverseProblem, record: PreparedRecord, seen: Measurement, 
     return rms(there.voltage_v - run.voltage_v)
 
 
-def left_by_fit(fitted: ModelState, others: Mapping[int, OtherTemperature]) -> dict[int, OtherTemperature]:
+def still_contradicting(
+    fitted: ModelState, others: Mapping[int, OtherTemperature]
+) -> dict[int, OtherTemperature]:
     """Those of `others` that a fitted model does not explain at their own temperature: its error is larger than that of
     the declared model at another temperature, or it cannot be simulated to the end. With a smaller error (the kinetics
     were off) the record is explained."""
@@ -72,12 +80,12 @@ def left_by_fit(fitted: ModelState, others: Mapping[int, OtherTemperature]) -> d
 
 def _explains(fitted: ModelState, record: PreparedRecord, index: int | None, other: OtherTemperature) -> bool:
     try:
-        return _left_by_v(fitted, record, index) <= other.there_v
+        return _fitted_rmse_v(fitted, record, index) <= other.there_v
     except AesiError:
         return False
 
 
-def _left_by_v(fitted: ModelState, record: PreparedRecord, index: int | None) -> float:
+def _fitted_rmse_v(fitted: ModelState, record: PreparedRecord, index: int | None) -> float:
     """RMS residual, V, on the fitted rows of a record, or on all thinned rows of one that was not fitted.
     index : number among the fitted records, or None."""
     seen = record.thin.take(slice(0, record.n_fit))
@@ -85,7 +93,7 @@ def _left_by_v(fitted: ModelState, record: PreparedRecord, index: int | None) ->
     return rms(np.asarray(seen.voltage_v - run.voltage_v))
 
 
-def fitted_at_fault(written: ModelState, others: Mapping[int, OtherTemperature]) -> str | None:
+def temperature_fault(written: ModelState, others: Mapping[int, OtherTemperature]) -> str | None:
     """Why a fitted model is not written, a clause: on a record that contradicts its temperature it errs far more than
     the declared model at another temperature, so that its fit only makes up for the temperature. None where there is no
     such record."""
@@ -93,7 +101,7 @@ def fitted_at_fault(written: ModelState, others: Mapping[int, OtherTemperature])
         return None
     for index, other in others.items():
         record = written.problem.records[index]
-        left_v = _left_by_v(written, record, index)
+        left_v = _fitted_rmse_v(written, record, index)
         if left_v > LEAVES_TIMES * other.there_v:
             return (
                 f"the error on {record.name} is {MV_PER_V * left_v:.1f} mV with the fit at {other.degc:.4g} degC and "

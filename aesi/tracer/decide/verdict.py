@@ -27,9 +27,9 @@ MOST_SDS = 50.0
 """Margin, standard deviations, where no rival comes close."""
 RANGE_OF = {"rate": "current", "charge": "charge"}
 """Partition -> the quantity whose ranges it leaves out in turn, in words."""
-FORETOLD_SHARE = 0.5
+PREDICTED_SHARE = 0.5
 """Least share of the rows of left-out conditions that a fit to the other rows has to predict. A convention;
-`Thresholds` and `decide.written.Option` have measured values on either side of it."""
+`Thresholds` and `decide.model_to_write.Option` have measured values on either side of it."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Thresholds:
     solver_v: float = 4e-4
     alike_sds: float = ALIKE_SDS
     alike_nats: float = ALIKE_NATS
-    foretold_share: float = FORETOLD_SHARE
+    predicted_share: float = PREDICTED_SHARE
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Verdict:
         return tuple(one[:GROUP_SIZE] for one in self.confidence_sets)
 
     @property
-    def alike_too(self) -> tuple[str, ...]:
+    def look_alike_notes(self) -> tuple[str, ...]:
         """A sentence for each confidence set that has more members than are shown."""
         return tuple(
             f"the data do not distinguish {one[0]} from {', '.join(one[1:])}: these {len(one)} effects explain them "
@@ -95,14 +95,14 @@ class Verdict:
         )
 
 
-def beyond(rmse_v: float, noise_v: float) -> float:
+def beyond_noise(rmse_v: float, noise_v: float) -> float:
     """Error beyond white noise, V RMS: root of the difference of the mean squares, at least 0."""
     return float(np.sqrt(max(rmse_v**2 - noise_v**2, 0.0)))
 
 
 def structured_v(path: Path, one: Explanation) -> float:
     """Error of a hypothesis beyond noise on left-out blocks, V RMS."""
-    return beyond(unseen_rmse_v(path.blocks, one), path.problem.noise_v)
+    return beyond_noise(unseen_rmse_v(path.blocks, one), path.problem.noise_v)
 
 
 def unexplained_v(problem: InverseProblem, blocks: Blocks, one: Explanation, allowed_v: float) -> float:
@@ -118,32 +118,34 @@ def unexplained_v(problem: InverseProblem, blocks: Blocks, one: Explanation, all
     allowed_v : V beyond the noise that a right hypothesis may leave.
     """
     usual = PRIORS[problem.trust].median
-    counts = told_share(problem.white_v, prediction_sd_v(problem, blocks, one, usual), allowed_v)
+    counts = prediction_weight(problem.white_v, prediction_sd_v(problem, blocks, one, usual), allowed_v)
     square = float(np.mean(counts * held_out_residual(blocks, one) ** 2))
-    return beyond(float(np.sqrt(square)), problem.noise_v)
+    return beyond_noise(float(np.sqrt(square)), problem.noise_v)
 
 
-def told_share(white_v: Array | float, sd_v: Array, allowed_v: float) -> Array:
+def prediction_weight(white_v: Array | float, sd_v: Array, allowed_v: float) -> Array:
     """(n,) weight of each row by how well it is predicted: 1 for a certain prediction, towards 0 for an uncertain one.
 
     sd_v : (n,) V, standard deviation of the prediction.  white_v : V, noise.  allowed_v : as for `unexplained_v`.
     """
-    told_v2 = white_v**2 + allowed_v**2
-    return np.asarray(told_v2 / (told_v2 + sd_v**2))
+    allowed_v2 = white_v**2 + allowed_v**2
+    return np.asarray(allowed_v2 / (allowed_v2 + sd_v**2))
 
 
-def foretold_share(
+def predicted_share(
     problem: InverseProblem, blocks: Blocks, one: LinearForm, allowed_v: float, partition: str
 ) -> float:
-    """Share of the rows that test a hypothesis, 0 to 1, where the conditions of a partition are left out in turn.
+    """Share of the rows that a hypothesis predicts, 0 to 1, where the conditions of a partition are left out in turn:
+    the mean of `prediction_weight`.
 
     The other rows are predicted with so much uncertainty that no measured value would contradict the hypothesis. The
     parameters are as uncertain as a model error of `allowed_v` (V) leaves them: with a model without error, a smooth
     discharge predicts all of its ranges of charge, and with one that may be off by 0.4 mV hardly any.
+    partition : "rate" or "charge", a key of `blocks.folds`.
     """
     most = PRIORS[problem.trust].median._replace(delta_v=allowed_v)
     sd_v = prediction_sd_v(problem, blocks, one, most, partition)
-    return float(np.mean(told_share(problem.white_v, sd_v, allowed_v)))
+    return float(np.mean(prediction_weight(problem.white_v, sd_v, allowed_v)))
 
 
 def tolerance_v(problem: InverseProblem, thresholds: Thresholds) -> float:
@@ -151,7 +153,7 @@ def tolerance_v(problem: InverseProblem, thresholds: Thresholds) -> float:
     return float(np.hypot(thresholds.noise_share * problem.noise_v, thresholds.solver_v))
 
 
-def judged(path: Path, thresholds: Thresholds) -> Verdict:
+def verdict_on(path: Path, thresholds: Thresholds) -> Verdict:
     """The verdict on a search at the trust `tight` or `exact`.
 
     Its confidence is 0 until `evidence.with_confidence` sets it from the margin.
@@ -161,7 +163,7 @@ def judged(path: Path, thresholds: Thresholds) -> Verdict:
     if left > allowed:
         margin = float(np.log(left / allowed))
         reason = (
-            f"the error on unseen data is {1e3 * left:.2f} mV beyond the noise, {_with_what(path)} (a right model "
+            f"the error on unseen data is {1e3 * left:.2f} mV beyond the noise, {_tried_words(path)} (a right model "
             f"leaves at most {1e3 * allowed:.2f} mV)"
         )
         return Verdict("unknown", (), (), 0.0, left, allowed, reason, margin)
@@ -173,9 +175,9 @@ def judged(path: Path, thresholds: Thresholds) -> Verdict:
         return Verdict("none", (), (), 0.0, left, allowed, reason, -best_gain(path))
     conditions = [name for name in ("rate", "charge") if name in path.blocks.folds]
     tested, by = max(
-        (foretold_share(path.problem, path.blocks, path.chosen, allowed, name), name) for name in conditions
+        (predicted_share(path.problem, path.blocks, path.chosen, allowed, name), name) for name in conditions
     )
-    if tested < thresholds.foretold_share:
+    if tested < thresholds.predicted_share:
         reason = (
             f"{' + '.join(path.chosen.hypothesis)} fits the data to {1e3 * left:.2f} mV beyond the noise, but these "
             f"data hardly test it: where a range of {RANGE_OF[by]} is left out of the fit, it predicts only "
@@ -191,12 +193,13 @@ def judged(path: Path, thresholds: Thresholds) -> Verdict:
     return Verdict("found", path.chosen.hypothesis, groups, 0.0, left, allowed, reason, margin)
 
 
-def _with_what(path: Path) -> str:
+def _tried_words(path: Path) -> str:
+    """Clause on the effects behind an error that is left."""
     tried = path.beyond_reach_v is not None or any(step.grown or step.fitted for step in path.steps)
     return "whichever of the tried effects are added" if tried else "with no effect added"
 
 
-def partly(path: Path, verdict: Verdict, thresholds: Thresholds) -> Verdict:
+def partly_explained(path: Path, verdict: Verdict, thresholds: Thresholds) -> Verdict:
     """The verdict `unknown`, with the names of effects whose gain exceeds the usual error of measured cells.
 
     path : the search at the trust `measured`.

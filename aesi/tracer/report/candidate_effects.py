@@ -64,7 +64,7 @@ def ranking(
             continue
         best = chosen if effect.id in chosen.hypothesis else max(held, key=lambda e: e.score.total)
         named = effect.id in verdict.effects
-        remark = "in the verdict" if named else refused(path, best)
+        remark = "in the verdict" if named else why_not_chosen(path, best)
         rows.append(
             CandidateEffect(
                 effect.id,
@@ -84,7 +84,7 @@ def best_first(rows: Sequence[CandidateEffect]) -> tuple[CandidateEffect, ...]:
     return tuple(sorted(rows, key=lambda row: -round(row.score, DIGITS)))
 
 
-def refused(path: Path, one: Explanation) -> str:
+def why_not_chosen(path: Path, one: Explanation) -> str:
     """Why a hypothesis was not chosen, a clause."""
     rest = path.chosen.score.total
     if isinstance(one, FittedHypothesis) and one.at_bounds:
@@ -93,10 +93,10 @@ def refused(path: Path, one: Explanation) -> str:
     chosen = "the chosen hypothesis" if path.chosen.hypothesis else "the declared model"
     higher = "higher" if gained > 0.0 else "lower"
     remark = f"scores {abs(gained):.1f} nats {higher} on unseen data than {chosen}"
-    return f"{remark}, {_why_not(path, one)}" if gained > 0.0 else remark
+    return f"{remark}, {_deciding_rule(path, one)}" if gained > 0.0 else remark
 
 
-def _why_not(path: Path, better: Explanation) -> str:
+def _deciding_rule(path: Path, better: Explanation) -> str:
     """The rule by which a hypothesis with a higher score on unseen data was not chosen, a clause."""
     if not isinstance(better, FittedHypothesis):
         return "but only linearised: it was not among the best, which were fitted with the nonlinear model"

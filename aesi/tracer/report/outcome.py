@@ -99,13 +99,13 @@ def outcomes(
     """The models on every file, fit part and test part apart."""
     out = []
     for index, record in enumerate(records):
-        runs = {name: _followed(state, record, index) for name, state in states.items()}
+        runs = {name: _simulated(state, record, index) for name, state in states.items()}
         cut = record.n_fit_whole
         out.append(_outcome(record, "fit", slice(0, cut), runs, rng))
         if cut < len(record.data):
             out.append(_outcome(record, "test", slice(cut, len(record.data)), runs, rng))
     for record in tests:
-        runs = {name: _followed(state, record, None) for name, state in states.items()}
+        runs = {name: _simulated(state, record, None) for name, state in states.items()}
         rows = slice(record.lead_rows, len(record.data))
         found = _outcome(record, "test", rows, runs, rng)
         try:
@@ -117,7 +117,7 @@ def outcomes(
 
 
 @dataclass(frozen=True, eq=False)
-class _Followed:
+class _Simulated:
     """A simulation over the rows of a record.
 
     voltage_v, soc : (n,), NaN from the row on where it fails.  empty : (n,) True where lithium or salt ran out.
@@ -130,7 +130,7 @@ class _Followed:
     why: str
 
 
-def _followed(state: ModelState, record: PreparedRecord, index: int | None) -> _Followed:
+def _simulated(state: ModelState, record: PreparedRecord, index: int | None) -> _Simulated:
     """A simulation over a record, or over its fit part alone where it fails beyond that."""
     n = len(record.data)
     try:
@@ -145,20 +145,22 @@ def _followed(state: ModelState, record: PreparedRecord, index: int | None) -> _
         seen = replace(record, data=record.data.take(slice(0, fitted)))
         with suppress(AesiError):
             return _padded(state.simulated(seen, index, thin=False), n, why)
-    return _Followed(np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=bool), why)
+    return _Simulated(np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=bool), why)
 
 
-def _padded(run: Run, n: int, why: str) -> _Followed:
+def _padded(run: Run, n: int, why: str) -> _Simulated:
     rest = n - len(run)
     voltage_v, soc = (np.append(v, np.full(rest, np.nan)) for v in (run.voltage_v, run.series["soc"]))
-    return _Followed(voltage_v, soc, np.append(run.series["depleted"] > 0.0, np.zeros(rest, dtype=bool)), why)
+    return _Simulated(
+        voltage_v, soc, np.append(run.series["depleted"] > 0.0, np.zeros(rest, dtype=bool)), why
+    )
 
 
 def _outcome(
     record: PreparedRecord,
     part: Part,
     rows: slice,
-    runs: Mapping[State, _Followed],
+    runs: Mapping[State, _Simulated],
     rng: np.random.Generator,
 ) -> FileOutcome:
     data = record.data.take(rows)
@@ -190,7 +192,7 @@ def _outcome(
     )
 
 
-def emptied(files: Sequence[FileOutcome]) -> tuple[str, ...]:
+def depletion_notes(files: Sequence[FileOutcome]) -> tuple[str, ...]:
     """A sentence for each file on which a model ran out of lithium or salt, after which its voltage is meaningless."""
     first: dict[str, dict[State, float]] = {}
     for f in files:
@@ -218,7 +220,7 @@ def rmse_difference(
     return value, float(low), float(high)
 
 
-def test_rmse_v(
+def held_out_rmse_v(
     state: ModelState, records: Sequence[PreparedRecord], tests: Sequence[PreparedRecord]
 ) -> float:
     """RMSE on the test data, thinned, V; on the fit parts where there are no test data."""

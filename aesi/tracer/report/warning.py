@@ -9,8 +9,8 @@ import numpy as np
 
 from aesi.constants import MV_PER_V
 from aesi.numerics.metrics import rms
-from aesi.tracer.decide.verdict import Verdict, beyond
-from aesi.tracer.decide.written import AS_GOOD
+from aesi.tracer.decide.model_to_write import AS_GOOD
+from aesi.tracer.decide.verdict import Verdict, beyond_noise
 from aesi.tracer.report.outcome import NAMES, FileOutcome, State
 
 OTHERS: tuple[State, ...] = ("before", "recalibrated")
@@ -24,7 +24,7 @@ def contradicted_by_v(files: Sequence[FileOutcome], verdict: Verdict) -> float |
         return None
     noise_v = np.repeat([f.noise_v for f in tests], [len(f.time_s) for f in tests])
     left_v = rms(np.concatenate([f.beyond_start_v() for f in tests]))
-    over_v = beyond(left_v, rms(noise_v))
+    over_v = beyond_noise(left_v, rms(noise_v))
     return over_v if over_v > verdict.tolerance_v else None
 
 

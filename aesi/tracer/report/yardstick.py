@@ -59,7 +59,7 @@ class Yardstick:
     pointers: Mapping[str, Pointer] = field(default_factory=dict)
 
 
-def measure(runs: Sequence[Run], residuals: Sequence[Array]) -> Yardstick:
+def yardstick_of(runs: Sequence[Run], residuals: Sequence[Array]) -> Yardstick:
     """The yardstick over some records, from those with enough rows at their sampling rate.
 
     runs, residuals : one per record; residuals (n,) V, measured - model. Records of different sampling rates have a
@@ -67,12 +67,12 @@ def measure(runs: Sequence[Run], residuals: Sequence[Array]) -> Yardstick:
     """
     groups: dict[int, list[ErrorSeries]] = {}
     for run, residual in zip(runs, residuals, strict=True):
-        series = _even(run, residual)
+        series = _evenly_sampled(run, residual)
         groups.setdefault(round(np.log2(series.dt_s)), []).append(series)
     parts = [
         (part.explained_v, sum(map(len, group)), part)
         for group in groups.values()
-        if (part := _measured([_at(s, group[0].dt_s) for s in group])).explained_v is not None
+        if (part := _of_one_rate([_resampled(s, group[0].dt_s) for s in group])).explained_v is not None
     ]
     if not parts:
         return Yardstick()
@@ -81,7 +81,7 @@ def measure(runs: Sequence[Run], residuals: Sequence[Array]) -> Yardstick:
     return Yardstick(float(np.sqrt(square)), told[int(np.argmax(explained))].pointers)
 
 
-def _even(run: Run, residual: Array) -> ErrorSeries:
+def _evenly_sampled(run: Run, residual: Array) -> ErrorSeries:
     """The record resampled evenly at its median spacing. A row holds the inputs of the next row, which it predicts."""
     inputs = np.column_stack([run.current_a if name == "I" else run.series[name] for name in INPUT_NAMES])
     series = ErrorSeries(
@@ -93,14 +93,16 @@ def _even(run: Run, residual: Array) -> ErrorSeries:
         soc=run.series["soc"],
         model_v=run.voltage_v,
     )
-    return _ahead(with_inputs(_at(series, series.dt_s), INPUTS))
+    return _with_next_inputs(with_inputs(_resampled(series, series.dt_s), INPUTS))
 
 
-def _ahead(series: ErrorSeries) -> ErrorSeries:
+def _with_next_inputs(series: ErrorSeries) -> ErrorSeries:
+    """The series with the inputs of the next row in each row; the last row keeps its own."""
     return replace(series, inputs=np.vstack([series.inputs[1:], series.inputs[-1:]]))
 
 
-def _at(series: ErrorSeries, dt_s: float) -> ErrorSeries:
+def _resampled(series: ErrorSeries, dt_s: float) -> ErrorSeries:
+    """The series at even steps of `dt_s`, s, by linear interpolation; as it is if it has them already."""
     if series.dt_s == dt_s and np.ptp(np.diff(series.time_s)) < 0.01 * dt_s:
         return series
     time = np.arange(series.time_s[0], series.time_s[-1], dt_s)
@@ -113,27 +115,28 @@ def _at(series: ErrorSeries, dt_s: float) -> ErrorSeries:
     return replace(series, dt_s=dt_s, time_s=time, error_v=error, inputs=inputs, soc=soc, model_v=model)
 
 
-def _measured(records: Sequence[ErrorSeries]) -> Yardstick:
+def _of_one_rate(records: Sequence[ErrorSeries]) -> Yardstick:
+    """The yardstick of records of one sampling rate."""
     options = _options(records)
     try:
         problem = Problem.build(Split(tuple(records), (), ()), options)
     except DataError:  # too few samples, or nothing that varies
         return Yardstick()
     every = np.ones(len(problem.library), dtype=bool)
-    without = max((_candidate(problem, every, ridge, False) for ridge in RIDGES), key=_share)
-    whole = _candidate(problem, every, RIDGES[-1], True)
-    best = max(without, whole, key=_share)
+    without_past = max((_candidate(problem, every, ridge, feedback=False) for ridge in RIDGES), key=_share)
+    with_past = _candidate(problem, every, RIDGES[-1], feedback=True)
+    best = max(without_past, with_past, key=_share)
     if best is None:
         return Yardstick()
     square = float(np.mean(np.concatenate([r.error_v for r in records]) ** 2))
     shares = {
-        text: _share(whole) - _share(without)
+        text: _share(with_past) - _share(without_past)
         if ERROR in names
-        else _share(_candidate(problem, _of(problem.library, names), RIDGES[0], False))
+        else _share(_candidate(problem, _terms_in(problem.library, names), RIDGES[0], feedback=False))
         for text, names in POINTS_TO.items()
     }
     pointers = {
-        text: Pointer(max(share, 0.0), _chosen(best, POINTS_TO[text]) if share > 0 else ())
+        text: Pointer(max(share, 0.0), _largest_terms(best, POINTS_TO[text]) if share > 0 else ())
         for text, share in shares.items()
     }
     return Yardstick(float(np.sqrt(_share(best) * square)), pointers)
@@ -155,6 +158,8 @@ def _options(records: Sequence[ErrorSeries]) -> Options:
 
 
 def _candidate(problem: Problem, terms: BoolArray, ridge: float, feedback: bool) -> Candidate | None:
+    """The correction with these terms, (m,), or None if it cannot be fitted.  feedback : whether it may use the error's
+    own past."""
     genome = Genome.of(terms, ridge, THRESHOLD, 0.5, ORDER, DEGREE, feedback)
     outcome = evaluate(problem, genome)
     return None if isinstance(outcome, Failed) else outcome
@@ -165,13 +170,13 @@ def _share(candidate: Candidate | None) -> float:
     return 0.0 if candidate is None else max(0.0, 1.0 - candidate.loss_valid)
 
 
-def _of(library: Library, names: Sequence[str]) -> BoolArray:
+def _terms_in(library: Library, names: Sequence[str]) -> BoolArray:
     """(m,) True for the constant and for the terms in no other variables than these."""
     wanted = {library.variables.index(name) for name in names if name in library.variables}
     return np.array([{variable for variable, _ in term.factors} <= wanted for term in library.terms])
 
 
-def _chosen(candidate: Candidate | None, names: Sequence[str]) -> tuple[str, ...]:
+def _largest_terms(candidate: Candidate | None, names: Sequence[str]) -> tuple[str, ...]:
     """Names of the `SHOWN` terms with the largest coefficients that hold one of the variables, largest first."""
     if candidate is None:
         return ()

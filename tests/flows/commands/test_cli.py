@@ -19,7 +19,8 @@ import aesi
 from aesi.errors import InputError
 from aesi.pipeline.product.hybrid import HybridModel
 from flows import cli
-from flows.commands.options import dates, day, priors
+from flows.commands.options import day, priors
+from flows.commands.record_options import dates_by_record
 
 LG_M50 = str(Path(__file__).resolve().parents[3] / "experiments" / "cells" / "lg_m50_chen2020.bpx.json")
 SIMULATE = ("simulate", "--cell", LG_M50, "--current", "i.csv", "--out", "o.csv")
@@ -440,9 +441,9 @@ def test_the_range_of_an_impedance_was_that_of_its_real_part_without_a_word(call
 
 def test_days_of_records_are_read_by_record():
     file = Path("folder/pulses.csv.gz")
-    assert dates([f"{file}=2017-03-11"], [file]) == {"pulses": date(2017, 3, 11)}
+    assert dates_by_record([f"{file}=2017-03-11"], [file]) == {"pulses": date(2017, 3, 11)}
     with pytest.raises(InputError, match="has to read FILE=YYYY-MM-DD"):
-        dates(["pulses.csv=yesterday"], [file])
+        dates_by_record(["pulses.csv=yesterday"], [file])
     assert day("--as-of", "2017-03-11") == date(2017, 3, 11)
     with pytest.raises(InputError, match="has to read YYYY-MM-DD"):
         day("--as-of", "yesterday")

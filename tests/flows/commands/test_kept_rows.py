@@ -9,7 +9,7 @@ import pytest
 
 from aesi.bench.hybrid.splits import chosen_splits
 from flows.benchmarks import cases, left_out, real, splits
-from flows.benchmarks.cases import judged_once, kept
+from flows.benchmarks.cases import judged_once, kept_rows
 
 
 @dataclass(frozen=True)
@@ -45,12 +45,12 @@ def test_a_row_of_an_older_program_stood_for_the_present_one(judge, judged, tmp_
     assert judge(Asked("a")) == judge(Asked("a"))
     assert judged == ["a"]
     monkeypatch.setattr(cases, "_program", lambda: "changed")
-    assert kept(str(tmp_path / "kept")) == []
+    assert kept_rows(str(tmp_path / "kept")) == []
     assert "of another program, and left out: a." in capsys.readouterr().err
     judge(Asked("a"))
     assert judged == ["a", "a"]
     assert "judged again" in capsys.readouterr().err
-    assert kept(str(tmp_path / "kept")) == [{"case": "a", "verdict": "found"}]
+    assert kept_rows(str(tmp_path / "kept")) == [{"case": "a", "verdict": "found"}]
 
 
 def test_a_row_is_of_what_was_asked_and_of_the_files_that_it_rests_on(judge, judged, tmp_path):
@@ -68,7 +68,7 @@ def test_what_could_not_be_run_is_not_kept(judge, judged, tmp_path):
     judge(Asked("a", 10.0))
     judge(Asked("a", 10.0))
     assert len(judged) == 2
-    assert kept(str(tmp_path / "kept")) == []
+    assert kept_rows(str(tmp_path / "kept")) == []
 
 
 def test_a_row_without_its_program_is_judged_again(judge, judged, tmp_path):

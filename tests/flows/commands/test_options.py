@@ -7,7 +7,7 @@ import pytest
 
 from aesi.data.reading import Reading
 from aesi.errors import InputError
-from flows.commands import options
+from flows.commands import record_options
 
 
 @pytest.fixture
@@ -26,8 +26,8 @@ def files(tmp_path):
 
 
 def test_a_record_is_read_up_to_a_time_of_its_own_not_of_its_namesake(files):
-    until = options.by_file("--until", ["W8_0.2C.csv=60", f"{files[3]}=80"], files)
-    records = options.measurements(files, Reading(), None, until)
+    until = record_options.numbers_by_record("--until", ["W8_0.2C.csv=60", f"{files[3]}=80"], files)
+    records = record_options.measurements(files, Reading(), None, until)
     assert {record.name: len(record) for record in records} == {
         "W8_0.5C": 100,
         "W8_0.2C": 61,
@@ -45,12 +45,14 @@ def test_two_long_files_of_one_test_were_averaged_over_rows_of_their_own_and_no_
         raise AssertionError(f"{record.name} was averaged")
 
     monkeypatch.setattr("aesi.data.read.decimate", averaged)
-    assert [len(record) for record in options.measurements(files, Reading())] == [100, 101, 102, 103]
+    assert [len(record) for record in record_options.measurements(files, Reading())] == [100, 101, 102, 103]
 
 
 @pytest.mark.parametrize("said", ["W8_0.5C", "W8_0.5C.csv", "{folder}/W8_0.5C.csv"])
 def test_a_file_is_meant_by_its_path_its_name_or_its_record_s(files, said):
-    given = options.by_file("--temperature", [f"{said.format(folder=files[0].parent)}=10"], files)
+    given = record_options.numbers_by_record(
+        "--temperature", [f"{said.format(folder=files[0].parent)}=10"], files
+    )
     assert given == {"W8_0.5C": 10.0}
 
 
@@ -69,8 +71,10 @@ def test_a_file_is_meant_by_its_path_its_name_or_its_record_s(files, said):
 )
 def test_a_file_that_is_not_clear_is_asked_about(files, pairs, words):
     with pytest.raises(InputError, match=words):
-        options.by_file("--temperature", pairs, files)
+        record_options.numbers_by_record("--temperature", pairs, files)
 
 
 def test_a_day_is_that_of_its_file(files):
-    assert list(options.dates(["W8_0.2C.csv=2019-05-31"], [Path(f) for f in files])) == ["W8_0.2C"]
+    assert list(record_options.dates_by_record(["W8_0.2C.csv=2019-05-31"], [Path(f) for f in files])) == [
+        "W8_0.2C"
+    ]

@@ -159,7 +159,7 @@ def test_a_discovery_of_an_experiment_was_not_tracked_where_its_file_says(
     (workspace / "told.yaml").write_text(EXPERIMENT)
     uri = f"sqlite:///{workspace}/elsewhere.db"
     monkeypatch.setattr(cases, "case_of_experiment", lambda config: case)
-    monkeypatch.setattr(discovery, "_trace", _only_tracked)
+    monkeypatch.setattr(discovery, "_run_discovery", _only_tracked)
     if prefect:
         monkeypatch.setattr(start, "_with_or_without", lambda under_prefect, plainly, use: under_prefect())
         monkeypatch.setattr(prefect_flows, "discovery", prefect_flows.discovery.fn)

@@ -85,16 +85,16 @@ def test_a_candidate_could_not_be_made_again_from_what_was_tracked(store_alone, 
 
 
 def test_the_run_of_an_experiment_gives_the_candidate_that_it_chose(store_alone, tmp_path):
-    from flows.results.candidate import rebuild, said
+    from flows.results.candidate import rebuild, rebuilt_line
 
     (run,) = runs_of(store_alone, "run")
     for name in (run.info.run_id, run.info.run_id[:8]):  # as pages show it
         rebuilt = rebuild(name, store_alone)
         assert rebuilt.number == int(run.data.params["chosen_candidate"])
         assert rebuilt.members == (rebuilt.number,)
-    assert "one of several" not in said(rebuilt, tmp_path)
+    assert "one of several" not in rebuilt_line(rebuilt, tmp_path)
     one_of_two = replace(rebuilt, members=(rebuilt.number, 99))
-    assert f"the mean of candidates {rebuilt.number} and 99" in said(one_of_two, tmp_path)
+    assert f"the mean of candidates {rebuilt.number} and 99" in rebuilt_line(one_of_two, tmp_path)
 
 
 def test_another_run_is_refused_in_one_sentence(store_alone):

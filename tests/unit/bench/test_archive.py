@@ -5,7 +5,8 @@ from pathlib import PurePath
 import pytest
 
 from aesi.bench.physics.archive import ARCHIVE, chamber, degc_of
-from aesi.bench.physics.cells import ARCHIVED, RECORDS, archive_table
+from aesi.bench.physics.cells import ARCHIVED, RECORDS
+from aesi.bench.physics.cells_table import archive_table
 from aesi.bench.physics.tested import TESTED
 from aesi.data import catalogue
 from aesi.errors import DataError

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from aesi.bench.physics.cells import free_run, held_from, table, windows_mv
+from aesi.bench.physics.cells import free_run, held_from, windows_mv
+from aesi.bench.physics.cells_table import table
 from aesi.physics import Cell, simulate
 from aesi.records import Measurement
 

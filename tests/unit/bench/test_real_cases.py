@@ -9,9 +9,9 @@ import pytest
 from aesi.bench.detectable import seen_on_measured
 from aesi.bench.real import chosen, judged, plan, summary, table, write_report
 from aesi.bench.real.answers import initial_state_row, scored
-from aesi.bench.real.beside import of_model, of_spectrum
 from aesi.bench.real.faults import declared_with_fault, soc0_with_fault, with_fault
-from aesi.bench.real.judge import _known, declared_cell, record
+from aesi.bench.real.judge import _truth, declared_cell, record
+from aesi.bench.real.references import measured_resistances, model_resistances
 from aesi.physics import Cell
 from aesi.physics.effect import Record
 from aesi.physics.effects import CATALOGUE
@@ -293,17 +293,19 @@ def test_the_resistances_of_a_circuit_are_read_off_its_spectrum():
     omega = 2 * np.pi * hz
     lead = 1j * omega * 2e-7  # crosses zero where the semicircle is small
     z = 0.02 + lead + 0.008 / (1 + 1j * omega * 0.008 * 0.5)
-    found = of_spectrum(Spectrum("circuit", hz, z, soc=0.5))
+    found = measured_resistances(Spectrum("circuit", hz, z, soc=0.5))
     assert found.ohmic_ohm == pytest.approx(0.02, rel=0.02)
     assert found.transfer_ohm == pytest.approx(0.008, rel=0.05)
 
 
 def test_a_contact_is_in_the_ohmic_part_of_the_model_and_slow_kinetics_in_the_other():
     cell = Cell.from_bpx(f"{CELLS}/lg_m50_chen2020.bpx.json")
-    plain = of_model(cell, (), 0.5, 25.0)
-    contact = of_model(cell, (CATALOGUE["series_resistance"].activate(resistance_ohm=5e-3),), 0.5, 25.0)
+    plain = model_resistances(cell, (), 0.5, 25.0)
+    contact = model_resistances(
+        cell, (CATALOGUE["series_resistance"].activate(resistance_ohm=5e-3),), 0.5, 25.0
+    )
     slow = CATALOGUE["charge_transfer_kinetics"].activate(negative_factor=0.5, positive_factor=0.5)
-    slower = of_model(cell, (slow,), 0.5, 25.0)
+    slower = model_resistances(cell, (slow,), 0.5, 25.0)
     assert contact.ohmic_ohm - plain.ohmic_ohm == pytest.approx(5e-3)
     assert contact.transfer_ohm == pytest.approx(plain.transfer_ohm)
     assert slower.ohmic_ohm == pytest.approx(plain.ohmic_ohm, rel=1e-3)
@@ -313,7 +315,7 @@ def test_a_contact_is_in_the_ohmic_part_of_the_model_and_slow_kinetics_in_the_ot
 def known(name):
     case = next(case for case in plan() if case.name == name)
     data = record(case.take)
-    return case, data, _known(case, data, declared_cell(case.cell, CELLS))
+    return case, data, _truth(case, data, declared_cell(case.cell, CELLS))
 
 
 @pytest.mark.parametrize("name", ["control-about_energy_nmc-1C", "ageing-25degC_1c_end"])

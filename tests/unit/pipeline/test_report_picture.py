@@ -63,7 +63,7 @@ def test_a_finding_is_drawn_with_its_name_its_witness_and_the_errors_on_what_cho
     write_discovery_report(tmp_path / "report.html", view)
     (tmp_path / "discovery.json").write_text(json.dumps(view.discovery))
     out = tmp_path / "out.svg"
-    command = [sys.executable, FINDING, tmp_path, out, "--witness", "calorimeter: 1.3 W"]
+    command = [sys.executable, FINDING, tmp_path, out, "--reference", "calorimeter: 1.3 W"]
     subprocess.run(command, check=True, env=os.environ | {"PYTHONPATH": str(HOOK.parents[2])})
     text = "".join(ET.parse(out).getroot().itertext())
     assert "self heating" in text

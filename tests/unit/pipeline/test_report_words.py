@@ -430,7 +430,7 @@ def test_the_confidence_in_a_group_of_look_alikes_was_told_of_one_of_its_names()
     }
     said = "86 % confidence that it is one of: current sensor offset, leakage current"
     assert discoveries.name_confidence(found) == f" ({said})"
-    assert said in discoveries.short_finding(found, sure=True)
+    assert said in discoveries.short_finding(found, with_confidence=True)
     assert "(not told apart: current sensor offset or leakage current)" in discoveries.short_finding(found)
     two = {**found, "effects": ["current_sensor_offset", "series_resistance"]}
     assert discoveries.name_confidence(two).endswith(

@@ -11,7 +11,7 @@ from aesi.physics.effects import CATALOGUE
 from aesi.tracer import discover
 from aesi.tracer.case.free_parameter import acting_on, of_all_records
 from aesi.tracer.case.problem import BESIDE_TIMES
-from aesi.tracer.decide.beside import judged_beside, left_v, of_one_age
+from aesi.tracer.decide.beside import checked_against_ageing, error_beyond_noise_v, verdict_beside
 from aesi.tracer.decide.shared import in_all_records
 from aesi.tracer.decide.verdict import Thresholds, Verdict
 from aesi.tracer.discovery import inverse_problem
@@ -198,7 +198,7 @@ def test_the_noise_of_one_kind_of_record_was_taken_off_the_error_of_the_other(mo
     monkeypatch.setattr("aesi.tracer.decide.beside.held_out_residual", lambda blocks, one: residual_v)
     problem = SimpleNamespace(white_v=np.array([3e-3, 3e-3, 5e-3, 5e-3]), noise_v=np.sqrt(17.0) * 1e-3)
     path = SimpleNamespace(blocks=None, problem=problem)
-    assert [left_v(path, None, kind) for kind in (rows, ~rows)] == pytest.approx([4e-3, 12e-3])
+    assert [error_beyond_noise_v(path, None, kind) for kind in (rows, ~rows)] == pytest.approx([4e-3, 12e-3])
 
 
 @dataclass(frozen=True)
@@ -226,10 +226,11 @@ def test_what_leaves_more_than_the_good_records_has_to_say_it_at_that_error(monk
     )
     left = {base: 16e-3, chosen: 8e-3}
     monkeypatch.setattr(
-        "aesi.tracer.decide.beside.left_v", lambda path, one, rows: 4e-3 if rows[0] else left[one]
+        "aesi.tracer.decide.beside.error_beyond_noise_v",
+        lambda path, one, rows: 4e-3 if rows[0] else left[one],
     )
     monkeypatch.setattr("aesi.tracer.decide.beside.look_alikes", lambda *given: ((), 1.0))
-    verdict = judged_beside(path, Thresholds())
+    verdict = verdict_beside(path, Thresholds())
     assert (verdict.word, verdict.effects) == ("unknown", named)
     assert verdict.structured_v == (8e-3 if named else 16e-3)
     assert ("8.0 mV with it" in verdict.reason) == bool(named)
@@ -253,12 +254,12 @@ def test_what_an_age_says_as_well_is_a_look_alike_and_what_it_says_better_takes_
     )
     gain = said("current_sensor_gain", 40.0)
     worse, same, better = (said("lithium_inventory_loss", total) for total in (10.0, 39.0, 70.0))
-    assert of_one_age(named, gain, [worse]) == named
-    alike = of_one_age(named, gain, [worse, same])
+    assert checked_against_ageing(named, gain, [worse]) == named
+    alike = checked_against_ageing(named, gain, [worse, same])
     assert (alike.word, alike.effects) == ("found", named.effects)
     assert alike.confidence_sets == (("current_sensor_gain", "clock_skew", "lithium_inventory_loss"),)
     assert "of another age" in alike.reason
-    other = of_one_age(named, gain, [worse, better])
+    other = checked_against_ageing(named, gain, [worse, better])
     assert (other.word, other.effects, other.confidence_sets) == ("unknown", (), ())
     assert other.aged == ("lithium_inventory_loss",)
     assert "30.0 nats higher" in other.reason
@@ -268,18 +269,18 @@ def test_what_an_age_says_as_well_is_a_look_alike_and_what_it_says_better_takes_
 def test_an_age_that_lags_less_than_any_other_rival_is_what_the_confidence_is_read_off():
     named = Verdict("found", ("series_resistance",), (), 0.0, 0.0, 1.0, "so", margin=9.0)
     believed = said("series_resistance", 40.0)
-    assert of_one_age(named, believed, [said("film_growth", 10.0)]).margin == 9.0
+    assert checked_against_ageing(named, believed, [said("film_growth", 10.0)]).margin == 9.0
     scattered = said("film_growth", 10.0, scatter=3.0)
     nats, deviation = lag(believed, scattered)
-    assert of_one_age(named, believed, [scattered]).margin == nats / deviation < 9.0
+    assert checked_against_ageing(named, believed, [scattered]).margin == nats / deviation < 9.0
 
 
 def test_where_nothing_is_named_an_age_that_says_enough_is_told():
     left = Verdict("unknown", (), (), 0.0, 8e-3, 4e-3, "left", margin=0.7)
-    told = of_one_age(left, said("nothing", 0.0), [said("lithium_inventory_loss", 30.0)])
+    told = checked_against_ageing(left, said("nothing", 0.0), [said("lithium_inventory_loss", 30.0)])
     assert (told.word, told.effects, told.aged) == ("unknown", (), ("lithium_inventory_loss",))
     assert "than no effect, and" in told.reason
-    assert of_one_age(left, said("nothing", 0.0), []) == left
+    assert checked_against_ageing(left, said("nothing", 0.0), []) == left
 
 
 def test_an_aged_cell_was_a_current_that_reads_too_low(cell, erring):

@@ -9,11 +9,17 @@ import pytest
 from aesi.physics.effects import CATALOGUE
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import prepare_all
-from aesi.tracer.decide.verdict import Thresholds, judged
+from aesi.tracer.decide.verdict import Thresholds, verdict_on
 from aesi.tracer.likelihood.credible import reaches
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.gaussian import BlockSums, Posterior
-from aesi.tracer.report.candidate_effects import CandidateEffect, best_first, estimates, ranking, refused
+from aesi.tracer.report.candidate_effects import (
+    CandidateEffect,
+    best_first,
+    estimates,
+    ranking,
+    why_not_chosen,
+)
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.forward import searched
 
@@ -59,7 +65,7 @@ def test_a_parameter_that_ended_at_zero_has_an_interval_with_a_width_and_a_unit(
     data = make((CATALOGUE["ocv_hysteresis"].activate(magnitude_v=0.006),))
     problem = InverseProblem(cell, prepare_all(cell, [data], 0.9, 0.3), few)
     path = searched(problem, 2, Archive(None, ""))
-    rows = ranking(path, judged(path, Thresholds()), lambda one: None)
+    rows = ranking(path, verdict_on(path, Thresholds()), lambda one: None)
     assert {row.effect for row in rows} == set(few)
     for row in rows:
         assert set(row.parameters) == set(few[row.effect].parameters)
@@ -85,16 +91,16 @@ def test_what_said_more_of_unseen_data_and_was_not_taken_had_no_reason():
         chosen=chosen, admission_nats=5.0, problem=SimpleNamespace(competing=lambda: range(20))
     )
     more = fitted(("series_resistance", "porosity"), 103.9, 91.0)
-    assert refused(path, more) == (
+    assert why_not_chosen(path, more) == (
         "scores 3.9 nats higher on unseen data than the chosen hypothesis, but not by more than the 5.0 nats that "
         "chance may give one more effect"
     )
     other = fitted(("porosity", "electrolyte_transport"), 100.7, 88.0)
-    assert refused(path, other) == (
+    assert why_not_chosen(path, other) == (
         "scores 0.7 nats higher on unseen data than the chosen hypothesis, but 5.0 nats lower in marginal likelihood, "
         "which has a penalty for each effect"
     )
-    assert refused(path, fitted(("porosity",), 99.0, 95.0)) == (
+    assert why_not_chosen(path, fitted(("porosity",), 99.0, 95.0)) == (
         "scores 1.0 nats lower on unseen data than the chosen hypothesis"
     )
 

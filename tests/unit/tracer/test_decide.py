@@ -21,27 +21,27 @@ from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import prepare_all
 from aesi.tracer.decide.carry_over import LeftOut, full_course, left_out_errors, range_fault
 from aesi.tracer.decide.confidence import HIGHEST, FrequencyMap, fitted_map
-from aesi.tracer.decide.evidence import consistent, named_options
-from aesi.tracer.decide.one_cause import in_one
+from aesi.tracer.decide.evidence import named_options, plausible_or_unknown
+from aesi.tracer.decide.model_to_write import (
+    UNTESTED,
+    Option,
+    carries_best,
+    model_to_write,
+    stand_in_notes,
+    why_not_refit,
+    worst_ratio,
+)
+from aesi.tracer.decide.one_cause import with_one_effect
 from aesi.tracer.decide.verdict import (
     Thresholds,
     Verdict,
     across_models,
-    foretold_share,
-    judged,
     look_alikes,
-    partly,
+    partly_explained,
+    predicted_share,
     structured_v,
     unexplained_v,
-)
-from aesi.tracer.decide.written import (
-    UNTESTED,
-    Option,
-    carries_best,
-    of_refit,
-    stand_ins,
-    worst_ratio,
-    written,
+    verdict_on,
 )
 from aesi.tracer.likelihood.fit import prediction_sd_v, scored
 from aesi.tracer.likelihood.growth import Parent
@@ -72,8 +72,8 @@ def path(cell, few, make, archive):
 
 def test_a_search_leaves_what_a_verdict_needs(path):
     assert path.chosen.hypothesis == ("ocv_hysteresis",)
-    verdict = judged(path, Thresholds())
-    assert verdict == judged(path, Thresholds())
+    verdict = verdict_on(path, Thresholds())
+    assert verdict == verdict_on(path, Thresholds())
     assert verdict.word == "found"
     assert verdict.margin > 0
     assert path.gain(path.chosen) > 50
@@ -85,18 +85,18 @@ def test_a_search_leaves_what_a_verdict_needs(path):
 
 def test_what_is_left_beyond_the_tolerance_is_unknown_and_names_nothing(path):
     bare = replace(path, chosen=path.base)
-    verdict = judged(bare, Thresholds())
+    verdict = verdict_on(bare, Thresholds())
     assert (verdict.word, verdict.effects) == ("unknown", ())
     left_v = unexplained_v(path.problem, path.blocks, path.base, verdict.tolerance_v)
     assert verdict.structured_v == left_v > verdict.tolerance_v
     assert left_v == pytest.approx(structured_v(path, path.base), rel=0.05)  # few parameters, well known
-    generous = judged(bare, Thresholds(solver_v=0.1))
+    generous = verdict_on(bare, Thresholds(solver_v=0.1))
     assert generous.word == "none"
 
 
 def test_what_needs_declared_parameters_that_no_cell_has_is_unknown(path):
-    verdict = judged(path, Thresholds())
-    assert consistent(path, verdict) == verdict
+    verdict = verdict_on(path, Thresholds())
+    assert plausible_or_unknown(path, verdict) == verdict
     place = [f.key for f in path.chosen.free].index(("solid_diffusivity", "positive_factor"))
     x = path.chosen.point.x.copy()
     x[place] = 3.9
@@ -104,11 +104,11 @@ def test_what_needs_declared_parameters_that_no_cell_has_is_unknown(path):
     covariance[place, place] = 0.5**2
     point, score = replace(path.chosen.point, x=x), replace(path.chosen.score, covariance=covariance)
     far = replace(path, chosen=replace(path.chosen, point=point, score=score))
-    told = consistent(far, verdict)
+    told = plausible_or_unknown(far, verdict)
     assert (told.word, told.effects, told.groups, told.margin) == ("unknown", (), (), 0.0)
     assert "ocv_hysteresis explains the data only if solid_diffusivity is further" in told.reason
     covariance[place, place] = 2.0**2  # may as well be as declared
-    assert consistent(far, verdict) == verdict
+    assert plausible_or_unknown(far, verdict) == verdict
 
 
 def test_a_wrong_parameter_is_named_with_what_is_needed_beside_it(cell, few, make, archive):
@@ -186,8 +186,8 @@ def test_what_a_hypothesis_cannot_tell_of_a_block_is_not_asked_of_it(path):
 
 def test_what_the_data_could_not_have_spoken_against_is_not_found(path):
     blocks, one = path.blocks, path.chosen
-    assert foretold_share(path.problem, blocks, one, 1e-3, "charge") > Thresholds().foretold_share
-    assert judged(path, Thresholds()).word == "found"
+    assert predicted_share(path.problem, blocks, one, 1e-3, "charge") > Thresholds().predicted_share
+    assert verdict_on(path, Thresholds()).word == "found"
     by_charge = np.zeros((len(one.point.residual_v), len(blocks.folds["charge"])))
     for k, fold in enumerate(blocks.folds["charge"]):
         by_charge[np.isin(blocks.of_row, fold), k] = 1.0  # a parameter for each range of charge
@@ -199,8 +199,8 @@ def test_what_the_data_could_not_have_spoken_against_is_not_found(path):
     )
     anything = replace(one, point=point, score=scored(path.problem, blocks, point))
     steady = replace(blocks, folds={k: v for k, v in blocks.folds.items() if k != "rate"})
-    assert foretold_share(path.problem, steady, anything, 1e-3, "charge") < 0.1
-    verdict = judged(replace(path, chosen=anything, blocks=steady), Thresholds())
+    assert predicted_share(path.problem, steady, anything, 1e-3, "charge") < 0.1
+    verdict = verdict_on(replace(path, chosen=anything, blocks=steady), Thresholds())
     assert (verdict.word, verdict.effects) == ("unknown", ())
     assert "other currents" in verdict.reason
 
@@ -216,7 +216,7 @@ def test_what_only_a_model_without_error_could_tell_is_not_foretold(path):
         bounds=np.vstack([one.point.bounds, [[-9.0, 9.0]]]),
     )
     smooth = replace(one, point=point, score=scored(path.problem, blocks, point))
-    shares = [foretold_share(path.problem, blocks, each, 4e-4, "charge") for each in (one, smooth)]
+    shares = [predicted_share(path.problem, blocks, each, 4e-4, "charge") for each in (one, smooth)]
     assert shares[0] > 0.8
     assert shares[1] < shares[0] - 0.2
 
@@ -241,21 +241,21 @@ def test_at_one_current_there_are_no_ranges_of_it_and_own_parameters_are_not_wri
     assert Option.of(held, blocks, base_of(held, blocks_of(held), archive)).tested(declared.usual_error_v)
     moved = Option.of(one, blocks, base)
     declared = replace(declared, left_out=LeftOut((1.0,), (1.0,)))
-    assert written(declared, [moved])[0] is declared.state
-    assert of_refit(declared, [moved], [moved], declared.state) == f"the recalibrated model: {UNTESTED}"
-    assert of_refit(declared, [moved], [moved], moved.state) is None
+    assert model_to_write(declared, [moved])[0] is declared.state
+    assert why_not_refit(declared, [moved], [moved], declared.state) == f"the recalibrated model: {UNTESTED}"
+    assert why_not_refit(declared, [moved], [moved], moved.state) is None
     third = replace(declared, state=replace(declared.state), left_out=LeftOut((0.5,), (0.5,)))
-    why = of_refit(declared, [moved], [moved, third], third.state)  # it was written without a reason
+    why = why_not_refit(declared, [moved], [moved, third], third.state)  # it was written without a reason
     assert why.startswith(f"the recalibrated model: {UNTESTED}; model/ holds another fit of its parameters")
     assert "left-out data is 500.0 mV (1000.0 mV with the declared model)" in why
     named = replace(moved, state=replace(moved.state, hypothesis=("ambient_temperature",)))
-    assert written(declared, [moved], [named]) == (declared.state, f"ambient_temperature: {UNTESTED}")
+    assert model_to_write(declared, [moved], [named]) == (declared.state, f"ambient_temperature: {UNTESTED}")
 
 
 def test_data_that_order_nothing_give_look_alikes(path):
     lenient = replace(path, steps=tuple(replace(step, admission_nats=-1e6) for step in path.steps))
-    verdict = judged(lenient, Thresholds(alike_sds=1e6, solver_v=0.1))
-    (group,), (every,), (told,) = verdict.groups, verdict.confidence_sets, verdict.alike_too
+    verdict = verdict_on(lenient, Thresholds(alike_sds=1e6, solver_v=0.1))
+    (group,), (every,), (told,) = verdict.groups, verdict.confidence_sets, verdict.look_alike_notes
     assert group[0] == "ocv_hysteresis"
     assert len(group) == 3
     assert every[:3] == group
@@ -264,7 +264,7 @@ def test_data_that_order_nothing_give_look_alikes(path):
 
 
 def test_what_is_named_beside_unknown_is_what_the_search_on_a_measured_cell_left(path):
-    verdict = partly(path, judged(replace(path, chosen=path.base), Thresholds()), Thresholds())
+    verdict = partly_explained(path, verdict_on(replace(path, chosen=path.base), Thresholds()), Thresholds())
     assert (verdict.word, verdict.effects) == ("unknown", ("ocv_hysteresis",))
     assert verdict.structured_v == structured_v(path, path.chosen)
 
@@ -347,20 +347,20 @@ def test_what_is_written_is_never_far_worse_than_another_model_on_a_record_left_
     assert worst_ratio(cold, [cold, declared, both]) == pytest.approx(1.6)
     assert carries_best([declared, cold, both]) is both
     assert carries_best([declared, option(1.0, np.inf)]) is declared
-    assert written(declared, [cold, both])[0] is both.state
+    assert model_to_write(declared, [cold, both])[0] is both.state
     nowhere = [option(20.0, np.inf), option(5.0, np.inf)]  # of a record that none runs on nothing is told
     assert carries_best(nowhere) is nowhere[1]
     assert worst_ratio(nowhere[0], nowhere) == pytest.approx(4.0)
     nearly = option(5.0, 39.0)  # its worst ratio within 5 % of the least, which is above 1.05 itself
     assert worst_ratio(nearly, [nearly, cold, both]) > worst_ratio(both, [nearly, cold, both]) > 1.05
-    assert written(nearly, [cold, both])[0] is nearly.state
-    state, why = written(declared, [both], [cold])
+    assert model_to_write(nearly, [cold, both])[0] is nearly.state
+    state, why = model_to_write(declared, [both], [cold])
     assert state is both.state
     assert "another model has a smaller error on left-out records" in str(why)
     named = option(5.2, 38.5)  # within 5 % of the best on either
-    assert written(declared, [option(5.4, 38.0)], [named]) == (named.state, None)
+    assert model_to_write(declared, [option(5.4, 38.0)], [named]) == (named.state, None)
     refined = option(4.0, 20.0)  # what was named, with the own parameters open
-    assert written(declared, [option(5.4, 38.0)], [named, refined]) == (refined.state, None)
+    assert model_to_write(declared, [option(5.4, 38.0)], [named, refined]) == (refined.state, None)
 
 
 def test_all_that_may_be_written_is_held_against_each_other_on_the_same_rows(cell, few, make, archive):
@@ -375,7 +375,7 @@ def test_all_that_may_be_written_is_held_against_each_other_on_the_same_rows(cel
     options = named_options(measured, tight, tight.blocks, archive)
     assert [one.state.problem.trust for one in options] == ["measured", "tight"]
     assert {len(one.left_out.by_range) for one in options} == {len(declared.left_out.by_range)}
-    assert written(declared, [], options)[1] is None
+    assert model_to_write(declared, [], options)[1] is None
 
 
 def test_effects_that_stand_in_are_written_where_they_leave_less_and_are_said_to_be_no_finding(path):
@@ -384,13 +384,13 @@ def test_effects_that_stand_in_are_written_where_they_leave_less_and_are_said_to
         return Option(ModelState(path.problem, hypothesis=effects), LeftOut(left_v, left_v))
 
     declared, plain, more = option(20.0), option(15.0), option(9.0, "series_resistance")
-    assert written(declared, [plain, more])[0] is more.state
-    assert written(declared, [plain, option(16.0, "series_resistance")])[0] is plain.state
-    (said,) = stand_ins(more.state, ())
+    assert model_to_write(declared, [plain, more])[0] is more.state
+    assert model_to_write(declared, [plain, option(16.0, "series_resistance")])[0] is plain.state
+    (said,) = stand_in_notes(more.state, ())
     assert "series_resistance" in said
     assert "does not show that the cell lacks it" in said
-    assert stand_ins(more.state, ("series_resistance",)) == stand_ins(plain.state, ()) == ()
-    _, why = written(declared, [more], [option(19.9, "ocv_hysteresis")])
+    assert stand_in_notes(more.state, ("series_resistance",)) == stand_in_notes(plain.state, ()) == ()
+    _, why = model_to_write(declared, [more], [option(19.9, "ocv_hysteresis")])
     assert "recalibrated model with series_resistance, whose error on left-out data is 9.0 mV" in str(why)
 
 
@@ -403,14 +403,14 @@ def test_what_does_harm_in_a_range_of_charge_is_not_written(path):
     chance = option(18.0, 10.0, 36.0)  # by a fifth an RMS of some seven independent samples may be off
     harmful = option(12.0, 17.0, 2.0)
     may_err = option(18.0, 16.0, 20.0)  # models of measured cells err by 13 mV at most
-    assert written(declared, [harmful])[0] is declared.state
-    assert written(declared, [option(21.5, 9.0, 29.0)])[0] is declared.state  # as good
-    assert written(declared, [harmful, may_err])[0] is may_err.state
-    assert written(declared, [chance])[0] is chance.state
+    assert model_to_write(declared, [harmful])[0] is declared.state
+    assert model_to_write(declared, [option(21.5, 9.0, 29.0)])[0] is declared.state  # as good
+    assert model_to_write(declared, [harmful, may_err])[0] is may_err.state
+    assert model_to_write(declared, [chance])[0] is chance.state
     assert "larger than that of the declared model in a range of charge" in str(
-        written(declared, [], [harmful])[1]
+        model_to_write(declared, [], [harmful])[1]
     )
-    assert written(declared, [], [harmful, may_err]) == (may_err.state, None)
+    assert model_to_write(declared, [], [harmful, may_err]) == (may_err.state, None)
 
 
 def test_a_model_that_runs_out_of_salt_where_the_declared_one_does_not_is_refused(path):
@@ -444,7 +444,7 @@ def test_running_empty_at_the_end_of_a_discharge_is_no_fault(path, monkeypatch, 
     def end(state, rate, temperature):
         return (1000.0 * share, "runs empty") if state.values else (1000.0, None)
 
-    monkeypatch.setattr("aesi.tracer.decide.carry_over._end", end)
+    monkeypatch.setattr("aesi.tracer.decide.carry_over._course_end", end)
     moved = ModelState(path.problem, {"soc0": {"0": 0.9}})
     assert range_fault(moved) == ("runs empty" if at_fault else None)
 
@@ -520,7 +520,7 @@ def test_of_three_names_that_one_cause_stands_for_the_third_was_lost(monkeypatch
     path = Path(problem, None, SimpleNamespace(), (), SimpleNamespace(hypothesis=names))
     monkeypatch.setattr("aesi.tracer.decide.one_cause.fitted_hypothesis", lambda *given: one)
     monkeypatch.setattr("aesi.tracer.decide.one_cause.most_plausible", lambda fits, many: fits[1])
-    assert in_one(path, None)[1] == (cause.id, *names)
+    assert with_one_effect(path, None)[1] == (cause.id, *names)
 
 
 def test_an_effect_that_is_a_dataclass_with_other_code_is_another_effect(tmp_path):

@@ -224,7 +224,7 @@ def test_a_candidate_that_the_test_part_cannot_be_simulated_with_has_no_error_th
     def fails(*arguments):
         raise SimulationError("there is no solution")
 
-    monkeypatch.setattr("aesi.tracer.discovery.test_rmse_v", fails)
+    monkeypatch.setattr("aesi.tracer.discovery.held_out_rmse_v", fails)
     found = discover(cell, [make()], soc0=0.9, effects=few)
     assert {c.test_rmse_v for c in found.candidates} == {None}
     assert {c["test_rmse_mv"] for c in discovery_content(found)["candidates"]} == {None}

@@ -11,7 +11,7 @@ from aesi.pipeline.discovery.discover import discovery_content
 from aesi.pipeline.report.words.discoveries import short_finding
 from aesi.tracer import discover
 from aesi.tracer.case.fit_simulation import fit_simulation
-from aesi.tracer.decide.temperatures import fitted_at_fault, left_by_fit, other_temperatures
+from aesi.tracer.decide.temperatures import other_temperatures, still_contradicting, temperature_fault
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.model_state import ModelState
 
@@ -76,16 +76,16 @@ def test_a_model_was_written_that_made_up_for_a_dead_temperature(cell, make):
     others = other_temperatures(problem)
     assert others[0].there_degc in (30.0, 40.0)
     moved = ModelState(problem, {"soc0": {"0": 0.91}})
-    fault = fitted_at_fault(moved, others)
+    fault = temperature_fault(moved, others)
     assert fault.startswith("the error on made is ")
     assert "with the fit at 0 degC" in fault
     assert fault.endswith("the fit compensates for a temperature that the record contradicts")
-    assert fitted_at_fault(ModelState(problem), others) is None  # nothing was fitted
+    assert temperature_fault(ModelState(problem), others) is None  # nothing was fitted
     as_good = {0: replace(others[0], there_v=others[0].left_v)}
-    assert fitted_at_fault(moved, as_good) is None
-    assert left_by_fit(moved, others) == others
-    assert left_by_fit(ModelState(problem), others) == others
-    assert left_by_fit(ModelState(problem), as_good) == {}
+    assert temperature_fault(moved, as_good) is None
+    assert still_contradicting(moved, others) == others
+    assert still_contradicting(ModelState(problem), others) == others
+    assert still_contradicting(ModelState(problem), as_good) == {}
 
 
 def test_a_temperature_that_the_record_contradicts_is_told(cell, make):

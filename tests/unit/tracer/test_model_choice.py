@@ -15,8 +15,8 @@ from aesi.records import Measurement
 from aesi.tracer import discover
 from aesi.tracer.case.reduction import Reduction
 from aesi.tracer.decide import model_choice
-from aesi.tracer.decide.evidence import believed
-from aesi.tracer.decide.model_choice import _likelier, most_names, with_model
+from aesi.tracer.decide.evidence import second_is_believed
+from aesi.tracer.decide.model_choice import _likelier, most_effects_of_dfn, with_model
 from aesi.tracer.discovery import inverse_problem
 
 from .conftest import CELLS, NOISE_V, steps
@@ -94,10 +94,10 @@ def explained(names, total, delta_v=5e-5, word="found"):
 
 
 def test_the_porous_electrode_is_tried_with_as_many_names_as_could_be_believed():
-    assert most_names(explained(("a",), 100.0), 3) == 1
-    assert most_names(explained((), 100.0, word="none"), 3) == 0
-    assert most_names(explained(("a",), 100.0, 2e-4), 3) == 3  # there is more to explain
-    assert most_names(explained(("a",), 100.0, word="unknown"), 3) == 3
+    assert most_effects_of_dfn(explained(("a",), 100.0), 3) == 1
+    assert most_effects_of_dfn(explained((), 100.0, word="none"), 3) == 0
+    assert most_effects_of_dfn(explained(("a",), 100.0, 2e-4), 3) == 3  # there is more to explain
+    assert most_effects_of_dfn(explained(("a",), 100.0, word="unknown"), 3) == 3
 
 
 def test_a_difference_far_above_the_noise_was_told_as_a_power_of_ten():
@@ -118,12 +118,12 @@ def test_both_kinds_of_evidence_have_to_speak_for_a_further_name():
         return one.path, one.verdict
 
     one = searched(("a",), 100.0, 50.0)
-    assert believed(one, searched(("b", "c"), 110.0, 51.0))
-    assert not believed(one, searched(("b", "c"), 110.0, 49.0))
-    assert not believed(one, searched(("b", "c"), 96.0, 60.0))
-    assert believed(searched(("b", "c"), 110.0, 49.0), one)
-    assert believed(one, searched(("d",), 110.0, 49.0))
-    assert believed(searched((), 120.0, 70.0, "unknown"), one)
+    assert second_is_believed(one, searched(("b", "c"), 110.0, 51.0))
+    assert not second_is_believed(one, searched(("b", "c"), 110.0, 49.0))
+    assert not second_is_believed(one, searched(("b", "c"), 96.0, 60.0))
+    assert second_is_believed(searched(("b", "c"), 110.0, 49.0), one)
+    assert second_is_believed(one, searched(("d",), 110.0, 49.0))
+    assert second_is_believed(searched((), 120.0, 70.0, "unknown"), one)
 
 
 def test_the_porous_electrode_is_not_searched_where_the_single_particle_ends_far_beyond_what_they_differ_by(
@@ -137,7 +137,7 @@ def test_the_porous_electrode_is_not_searched_where_the_single_particle_ends_far
         path = SimpleNamespace(beyond_reach_v=beyond_v, problem=SimpleNamespace(noise_v=1e-4), chosen=left_v)
         verdict = SimpleNamespace(word="unknown")
         return SimpleNamespace(
-            path=path, verdict=verdict, paths={"tight": path}, settled=lambda verdict: model
+            path=path, verdict=verdict, paths={"tight": path}, evidence_for=lambda verdict: model
         )
 
     def search(problem, archive, most, shallower=None):

@@ -25,7 +25,7 @@ STATE = SimpleNamespace(
 
 
 def error_v(records, tests=()):
-    return outcome.test_rmse_v(STATE, records, tests)
+    return outcome.held_out_rmse_v(STATE, records, tests)
 
 
 def test_fitted_rows_of_good_records_were_among_those_that_judge_a_candidate():

@@ -14,8 +14,8 @@ from aesi.tracer.case.problem import SHARE_SD, InverseProblem, share_of
 from aesi.tracer.case.records import prepare_all, prepare_test
 from aesi.tracer.decide.carry_over import LeftOut
 from aesi.tracer.decide.evidence import of_several_ages
-from aesi.tracer.decide.in_use import foretold_in_use
-from aesi.tracer.decide.written import Option
+from aesi.tracer.decide.in_use import predicted_share_in_use
+from aesi.tracer.decide.model_to_write import Option
 from aesi.tracer.likelihood.model_error import MEASURED_V
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.report.own_parameters import ages_told, own_parameters
@@ -118,9 +118,9 @@ def test_what_says_nothing_of_ordinary_use_is_not_written(cell, few, discharge):
     half = [discharge(until=0.5), discharge(until=0.45)]
     problem, blocks, fit = fitted(cell, few, half, "loose")
     untold = replace(fit, point=replace(fit.point, jacobian_v=1e-9 * fit.point.jacobian_v))
-    share, as_believed = (foretold_in_use(problem, blocks, one, MEASURED_V) for one in (fit, untold))
+    share, as_believed = (predicted_share_in_use(problem, blocks, one, MEASURED_V) for one in (fit, untold))
     assert as_believed < 0.5 < share < 1.0
-    assert foretold_in_use(problem, blocks, untold, 10.0) == pytest.approx(1.0, abs=1e-3)
+    assert predicted_share_in_use(problem, blocks, untold, 10.0) == pytest.approx(1.0, abs=1e-3)
     declared = Option.of(problem, blocks, None)
     assert Option.of(problem, blocks, fit).tested(declared.usual_error_v)
     assert not Option.of(problem, blocks, untold).tested(declared.usual_error_v)

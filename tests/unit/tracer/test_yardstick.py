@@ -7,7 +7,7 @@ import pytest
 
 from aesi.physics import simulate
 from aesi.physics.effects import CATALOGUE
-from aesi.tracer.report.yardstick import POINTS_TO, measure
+from aesi.tracer.report.yardstick import POINTS_TO, yardstick_of
 
 CURRENT, ELECTROLYTE, SURFACES, RECENT, PAST = POINTS_TO
 
@@ -27,7 +27,7 @@ def bare(cell, make):
 
 def test_noise_holds_nothing_to_explain(bare, rng):
     run, _ = bare
-    found = measure([run], [1e-3 * rng.normal(size=len(run.time_s))])
+    found = yardstick_of([run], [1e-3 * rng.normal(size=len(run.time_s))])
     assert found.explained_v < 1e-4
     assert all(pointer.share < 0.02 and not pointer.terms for pointer in found.pointers.values())
 
@@ -35,7 +35,7 @@ def test_noise_holds_nothing_to_explain(bare, rng):
 def test_an_ohmic_drop_is_explained_to_the_noise_and_points_to_the_current(bare, rng):
     run, change = bare
     drop = change("series_resistance", resistance_ohm=2e-4)
-    found = measure([run], [drop + 1e-3 * rng.normal(size=len(drop))])
+    found = yardstick_of([run], [drop + 1e-3 * rng.normal(size=len(drop))])
     assert found.explained_v == pytest.approx(np.sqrt(np.mean(drop**2)), rel=0.05)
     shares = {text: pointer.share for text, pointer in found.pointers.items()}
     assert shares[CURRENT] > 0.8
@@ -47,7 +47,7 @@ def test_an_ohmic_drop_is_explained_to_the_noise_and_points_to_the_current(bare,
 def test_hysteresis_points_to_the_past(bare, rng):
     run, change = bare
     hysteresis = change("ocv_hysteresis", magnitude_v=0.01)
-    found = measure([run], [hysteresis + 1e-3 * rng.normal(size=len(hysteresis))])
+    found = yardstick_of([run], [hysteresis + 1e-3 * rng.normal(size=len(hysteresis))])
     assert found.explained_v > 0.8 * np.sqrt(np.mean(hysteresis**2))
     assert found.pointers[RECENT].share > 0.5
 
@@ -58,7 +58,7 @@ def test_what_is_random_but_slow_points_to_its_own_past_at_most(bare, rng):
     wandering = np.zeros_like(steps)
     for k in range(1, len(steps)):
         wandering[k] = 0.99 * wandering[k - 1] + 1e-3 * steps[k]
-    found = measure([run], [wandering])
+    found = yardstick_of([run], [wandering])
     assert found.explained_v < 0.6 * np.sqrt(np.mean(wandering**2))
 
 
@@ -75,7 +75,7 @@ def test_records_of_different_and_uneven_sampling_are_taken_together(cell, bare,
     )
     slow_time = np.arange(0.0, 7200.0, 30.0)
     slow = simulate(cell, slow_time, np.full(len(slow_time), 3.0), 0.9)
-    found = measure([thin, slow], [drop[keep], 1e-5 * rng.normal(size=len(slow_time))])
+    found = yardstick_of([thin, slow], [drop[keep], 1e-5 * rng.normal(size=len(slow_time))])
     assert found.pointers[CURRENT].share > 0.5
     assert found.explained_v < np.sqrt(np.mean(drop**2))
 
@@ -83,4 +83,4 @@ def test_records_of_different_and_uneven_sampling_are_taken_together(cell, bare,
 def test_too_few_samples_explain_nothing(cell):
     time = np.arange(30.0)
     run = simulate(cell, time, np.full(30, 3.0), 0.9)
-    assert measure([run], [np.full(30, 1e-3)]).explained_v is None
+    assert yardstick_of([run], [np.full(30, 1e-3)]).explained_v is None

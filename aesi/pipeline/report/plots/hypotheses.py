@@ -41,7 +41,7 @@ def ranking_figure(candidates: Sequence[Row], titles: Mapping[str, str], chosen:
         shown = [row for row in rows if row["kind"] == kind]
         if shown:
             labels = [_label(row, titles, chosen) for row in shown]
-            _add_dots(fig, kind, labels, behind, [_test_told(row) for row in shown])
+            _add_dots(fig, kind, labels, behind, [_test_rmse_words(row) for row in shown])
     _add_dots(fig, "declared", [DECLARED], behind, [""])
     order = sorted(behind, key=lambda label: -behind[label])
     fig.update_yaxes(categoryorder="array", categoryarray=order)
@@ -56,7 +56,7 @@ def ranking_figure(candidates: Sequence[Row], titles: Mapping[str, str], chosen:
     return fig
 
 
-def _test_told(row: Row) -> str:
+def _test_rmse_words(row: Row) -> str:
     """The error on the test part; '' where the hypothesis cannot be simulated there."""
     error_mv = row.get("test_rmse_mv")
     return "" if error_mv is None else f", test RMSE {error_mv:.2f} mV"

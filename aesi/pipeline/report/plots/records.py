@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 BESIDE_SERIES = 0.1
 """Room above and below the series that an axis is made for, as a share of their span."""
+BAND = "band"
+"""Beginning of the name of a band, by which its traces are told from lines."""
 ROLE_NAMES = {"train": "I training", "valid": "II validation", "test": "III test"}
 
 
@@ -42,7 +44,7 @@ def profile_figure(traces: Sequence[RecordTrace], quantity: str) -> Figure:
         assert isinstance(trace, RecordTrace)
         y = trace.current_a if quantity == "current" else trace.measured_v
         role = ROLE_NAMES[trace.role]
-        line(fig, item.x, y, role, colours[trace.role], first=role not in seen)
+        line(fig, item.x, y, role, colours[trace.role], in_legend=role not in seen)
         seen.add(role)
     mark_records(fig, placed)
     fig.update_xaxes(title_text=time_title(placed, unit))
@@ -59,19 +61,17 @@ def voltage_figure(traces: Sequence[RecordTrace], chosen: str, physics: str) -> 
         trace = item.trace
         assert isinstance(trace, RecordTrace)
         first = i == 0
-        line(fig, item.x, trace.physics_v, physics, style.PHYSICS, first=first)
-        line(fig, item.x, _error(trace, trace.physics_v), physics, style.PHYSICS, 2, first=False)
-        prediction = trace.predictions.get(chosen)
-        if prediction is not None:
-            if prediction.free_run_lower_v is not None and prediction.free_run_upper_v is not None:
-                # The band of the voltage, seen from the measurement: e = V_measured - V, so its edges swap.
-                low = _error(trace, prediction.free_run_upper_v)
-                high = _error(trace, prediction.free_run_lower_v)
-                band(fig, item.x, low, high, f"band of {chosen}", style.BLUE, 2, first)
-            line(fig, item.x, prediction.free_run_v, chosen, style.BLUE, first=first)
-            line(fig, item.x, _error(trace, prediction.free_run_v), chosen, style.BLUE, 2, first=False)
+        line(fig, item.x, trace.physics_v, physics, style.PHYSICS, in_legend=first)
+        line(fig, item.x, _error(trace, trace.physics_v), physics, style.PHYSICS, 2, in_legend=False)
+        _add_free_run(fig, item, chosen, in_legend=first)
         line(
-            fig, item.x, trace.measured_v, "measured", style.MEASURED, first=first, width=style.MEASURED_WIDTH
+            fig,
+            item.x,
+            trace.measured_v,
+            "measured",
+            style.MEASURED,
+            in_legend=first,
+            width=style.MEASURED_WIDTH,
         )
     mark_outside(fig, placed, chosen)
     mark_records(fig, placed)
@@ -83,19 +83,43 @@ def voltage_figure(traces: Sequence[RecordTrace], chosen: str, physics: str) -> 
         f"Top: measured voltage, {physics} alone, and {chosen} in free run (no measured voltage after the "
         "first sample of a record). Bottom: measured minus model."
     )
-    if any(trace.name.startswith("band") for trace in fig.data):
-        caption += " The measurement lies inside the band where the band contains zero."
-        least, most = _roomy([t.y for t in fig.data if t.yaxis == "y2" and not t.name.startswith("band")])
-        if any(
-            np.nanmin(t.y) < least or np.nanmax(t.y) > most for t in fig.data if t.name.startswith("band")
-        ):
-            fig.update_yaxes(range=(least, most), row=2)
-            caption += (
-                " The axis spans the errors, and the band goes on beyond it: a double click shows all of it."
-            )
+    caption += _fit_error_axis(fig)
     return style.framed(
         fig, f"Voltage on the {_role_word(role)} records", caption, 560, hovermode="x unified"
     )
+
+
+def _add_free_run(fig: Figure, item: Placed, model: str, in_legend: bool) -> None:
+    """Add the voltage of a model in free run (panel 1), and its error with the band (panel 2), mV, where it has one."""
+    trace = item.trace
+    assert isinstance(trace, RecordTrace)
+    prediction = trace.predictions.get(model)
+    if prediction is None:
+        return
+    if prediction.free_run_lower_v is not None and prediction.free_run_upper_v is not None:
+        # The band of the voltage, seen from the measurement: e = V_measured - V, so its edges swap.
+        low = _error(trace, prediction.free_run_upper_v)
+        high = _error(trace, prediction.free_run_lower_v)
+        band(fig, item.x, low, high, f"{BAND} of {model}", style.BLUE, 2, in_legend)
+    line(fig, item.x, prediction.free_run_v, model, style.BLUE, in_legend=in_legend)
+    line(fig, item.x, _error(trace, prediction.free_run_v), model, style.BLUE, 2, in_legend=False)
+
+
+def _fit_error_axis(fig: Figure) -> str:
+    """Let the axis of panel 2 span the errors rather than a wider band. Returns sentences for the caption, '' without a
+    band."""
+    bands = [trace.y for trace in fig.data if trace.name.startswith(BAND)]
+    if not bands:
+        return ""
+    caption = " The measurement lies inside the band where the band contains zero."
+    errors = [trace.y for trace in fig.data if trace.yaxis == "y2" and not trace.name.startswith(BAND)]
+    low, high = _roomy(errors)
+    if any(np.nanmin(y) < low or np.nanmax(y) > high for y in bands):
+        fig.update_yaxes(range=(low, high), row=2)
+        caption += (
+            " The axis spans the errors, and the band goes on beyond it: a double click shows all of it."
+        )
+    return caption
 
 
 def residual_figure(traces: Sequence[DiscoveryTrace], labels: Mapping[str, str]) -> Figure:
@@ -108,7 +132,7 @@ def residual_figure(traces: Sequence[DiscoveryTrace], labels: Mapping[str, str])
         assert isinstance(trace, DiscoveryTrace)
         for state in first_and_last:
             voltage = getattr(trace, f"{state}_v")
-            line(fig, item.x, voltage, labels[state], style.STATE_COLOURS[state], 1, first=False)
+            line(fig, item.x, voltage, labels[state], style.STATE_COLOURS[state], 1, in_legend=False)
         line(fig, item.x, trace.measured_v, "measured", style.MEASURED, 1, i == 0, style.MEASURED_WIDTH)
         line(fig, item.x, trace.current_a, "current", style.GREY, 2, i == 0, 1.0)
         for state, label in labels.items():
@@ -152,7 +176,7 @@ def interval_figure(traces: Sequence[RecordTrace], model: str, zoom_s: float | N
     fig = stack(2)
     placed, unit = end_to_end(usable)
     for i, item in enumerate(placed):
-        _add_interval(fig, item, model, first=i == 0)
+        _add_interval(fig, item, model, in_legend=i == 0)
     mark_records(fig, placed)
     fig.update_xaxes(title_text=time_title(placed, unit), row=2)
     fig.update_yaxes(title_text="voltage error, mV", row=1)
@@ -170,16 +194,17 @@ def interval_figure(traces: Sequence[RecordTrace], model: str, zoom_s: float | N
     return style.framed(fig, title, caption, 480, hovermode="x unified")
 
 
-def _add_interval(fig: Figure, item: Placed, model: str, first: bool) -> None:
+def _add_interval(fig: Figure, item: Placed, model: str, in_legend: bool) -> None:
+    """Add the error, its one-step prediction and interval (panel 1), and these minus the prediction (panel 2), mV."""
     trace = item.trace
     assert isinstance(trace, RecordTrace)
     prediction = trace.predictions[model]
     edges = (prediction.one_step_lower_v, prediction.one_step_upper_v)
     low, high, centre = (_estimate(trace, v) for v in (*edges, prediction.one_step_v))
     error = _error(trace, trace.physics_v)
-    band(fig, item.x, low, high, "interval", style.INTERVAL, first=first)
-    line(fig, item.x, error, "measured error", style.MEASURED, first=first, width=1.0)
-    line(fig, item.x, centre, "predicted error", style.BLUE, first=first)
+    band(fig, item.x, low, high, "interval", style.INTERVAL, in_legend=in_legend)
+    line(fig, item.x, error, "measured error", style.MEASURED, in_legend=in_legend, width=1.0)
+    line(fig, item.x, centre, "predicted error", style.BLUE, in_legend=in_legend)
     line(fig, item.x, error - centre, "measured error", style.MEASURED, 2, False, 0.8)
     band(fig, item.x, low - centre, high - centre, "interval", style.INTERVAL, 2, False, edge=1.2)
 

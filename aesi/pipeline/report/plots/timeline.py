@@ -25,7 +25,7 @@ SHARE_A_LETTER = 0.008
 
 @dataclass(frozen=True)
 class Placed:
-    """A record and where it starts on the common time axis, in the axis's unit."""
+    """A record on the common time axis.  x : (n,) time of its rows there, in the unit of the axis."""
 
     trace: RecordTrace | DiscoveryTrace
     x: Array
@@ -47,17 +47,21 @@ def line(
     name: str,
     colour: str,
     row: int = 1,
-    first: bool = True,
+    in_legend: bool = True,
     width: float = 1.2,
 ) -> None:
-    """A series over time; the page thins it out for display and refines it on zoom."""
+    """Add a series over time to panel `row`; the page thins it for display and refines it on zoom.
+
+    in_legend : once for each name. The lines of one name, of several records or panels, are switched together.
+    width : px.
+    """
     fig.add_scatter(
         x=x,
         y=y,
         mode="lines",
         name=name,
         legendgroup=name,
-        showlegend=first,
+        showlegend=in_legend,
         line={"color": colour, "width": width},
         meta={"keep": "minmax"},
         row=row,
@@ -73,10 +77,10 @@ def band(
     name: str,
     colour: str,
     row: int = 1,
-    first: bool = True,
+    in_legend: bool = True,
     edge: float = 0.0,
 ) -> None:
-    """A shaded band between two series; `edge` is the width of its outline, px."""
+    """Add a shaded band between two series in panel `row`.  in_legend : as `line`.  edge : width of the outline, px."""
     look = {
         "mode": "lines",
         "line": {"width": edge, "color": colour},
@@ -88,7 +92,7 @@ def band(
         x=x,
         y=high,
         name=name,
-        showlegend=first,
+        showlegend=in_legend,
         fill="tonexty",
         fillcolor=style.translucent(colour),
         meta={"keep": "max"},
@@ -130,14 +134,14 @@ def mark_records(fig: Figure, placed: Sequence[Placed]) -> None:
 
 def mark_outside(fig: Figure, placed: Sequence[Placed], model: str) -> None:
     """A thick line along zero error where an input lies outside the range that this model was trained on."""
-    first = True
+    in_legend = True
     for item in placed:
         assert isinstance(item.trace, RecordTrace)
         prediction = item.trace.predictions.get(model)
         if prediction is not None and prediction.outside is not None and prediction.outside.any():
             y = np.where(prediction.outside, 0.0, np.nan)
-            line(fig, item.x, y, OUTSIDE, style.ORANGE, 2, first, 5.0)
-            first = False
+            line(fig, item.x, y, OUTSIDE, style.ORANGE, 2, in_legend, 5.0)
+            in_legend = False
 
 
 def time_title(placed: Sequence[Placed], unit: str) -> str:

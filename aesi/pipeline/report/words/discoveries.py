@@ -18,7 +18,7 @@ from aesi.pipeline.report.words.sizes import (
     unexplained_by,
     with_size,
 )
-from aesi.tracer.decide.written import AS_GOOD
+from aesi.tracer.decide.model_to_write import AS_GOOD
 from aesi.tracer.likelihood.model_error import MEASURED_V
 
 LARGE_SHARE = 0.5
@@ -26,31 +26,43 @@ LARGE_SHARE = 0.5
 convention."""
 CERTAIN = 0.99
 """A confidence above this is not told to the per cent: the noise model behind it is itself a model."""
+ALONE = {"before": "the declared model", "recalibrated": "recalibration alone"}
+"""State of the model -> words for it beside what is written."""
+WITH_FINDING = "with the finding added"
+"""Name of the last state where what was found is what is written."""
+UNSEEN = "in cross-validation (each piece of the data predicted by a fit to the others)"
+"""Words for the data by which hypotheses are judged: their errors are larger than those of the fit."""
+OF_MEASURED = (
+    "A measured cell nearly always ends as unknown without a known-good record: models of measured cells have errors "
+    f"of some {MV_PER_V * MEASURED_V:.0f} mV. An effect that is named all the same explains only what exceeds these."
+)
+"""Sentence on a verdict of `unknown`, which measured cells nearly always have."""
 
 
 def discovery_finding(view: DiscoveryView) -> str:
-    """The verdict, with missing physics, wrong parameters and instrument faults named as such, and what speaks against
-    it: a temperature that a record contradicts, a test part that does, a written model that does worse than another. By
-    how much it does, the sentences below say."""
-    return " ".join([_verdict(view), *(f"{raised(one)}." for one in _against(view.discovery))])
+    """The verdict, with missing physics, wrong parameters and instrument faults named as such, and a sentence for each
+    objection: a record contradicts its temperature, the test part contradicts the verdict, or the written model errs
+    more than another one."""
+    return " ".join([_verdict(view), *(f"{capitalised(one)}." for one in _objections(view.discovery))])
 
 
-def short_finding(discovery: Mapping[str, Any], sure: bool = False) -> str:
+def short_finding(discovery: Mapping[str, Any], with_confidence: bool = False) -> str:
     """The verdict in one line, with what speaks against it, for a terminal, a row of a table or a tracked run.
 
-    sure : whether the confidence in the names stands behind them.
+    with_confidence : add the confidence in the names, if the verdict is `found`, in place of the look-alikes.
     """
-    behind = (name_confidence(discovery) if sure else "") or _or_look_alikes(discovery)
-    return "; ".join([finding_line(discovery) + behind, *_against(discovery)])
+    behind = (name_confidence(discovery) if with_confidence else "") or _or_look_alikes(discovery)
+    return "; ".join([finding_line(discovery) + behind, *_objections(discovery)])
 
 
 def _or_look_alikes(discovery: Mapping[str, Any]) -> str:
     """Clause that names what the data do not tell from the names; '' where there is nothing."""
-    groups = look_alikes_told(discovery, {})
+    groups = look_alike_names(discovery, {})
     return f" (not told apart: {'; '.join(' or '.join(group) for group in groups)})" if groups else ""
 
 
-def _against(discovery: Mapping[str, Any]) -> list[str]:
+def _objections(discovery: Mapping[str, Any]) -> list[str]:
+    """Clauses on what contradicts a verdict or the written model; empty if nothing does."""
     records = discovery.get("other_temperature", ())
     said = (
         f"the voltage of {listed(records)} contradicts its temperature" if records else "",
@@ -68,10 +80,6 @@ def _worse_on_fit(discovery: Mapping[str, Any]) -> str:
         return ""
     worse = left["after"] > AS_GOOD * left["recalibrated"]
     return f"{ALONE['recalibrated']} has a lower error on the fitted part" if worse else ""
-
-
-ALONE = {"before": "the declared model", "recalibrated": "recalibration alone"}
-"""State of the model -> words for it beside what is written."""
 
 
 def _worse_on_test(discovery: Mapping[str, Any]) -> str:
@@ -106,14 +114,14 @@ def _verdict(view: DiscoveryView) -> str:
         if not effects:
             return f'The declared model of "{view.cell}" has a systematic error{rest}.'
         names = [with_size(effect, view.discovery, _title(view.titles, effect)) for effect in effects]
-        return f"{raised(listed(names))} {explain_part(names)}. A systematic error remains{rest}."
-    sure = name_confidence(view.discovery, view.titles)
+        return f"{capitalised(listed(names))} {explain_part(names)}. A systematic error remains{rest}."
+    confidence = name_confidence(view.discovery, view.titles)
     if refit_does_as_well(view.discovery):
         return (
-            f"One of two explanations: {_lowered(_named(view, effects))}{sure}; or the model's own parameters are off: "
-            "recalibrating them gives as low an error on the held-out data."
+            f"One of two explanations: {_decapitalised(_named(view, effects))}{confidence}; or the model's own "
+            "parameters are off: recalibrating them gives as low an error on the held-out data."
         )
-    return f"{_named(view, effects)}{sure}."
+    return f"{_named(view, effects)}{confidence}."
 
 
 def _tried(discovery: Mapping[str, Any]) -> bool:
@@ -131,7 +139,7 @@ def name_confidence(discovery: Mapping[str, Any], titles: Mapping[str, str] | No
     value = discovery["confidence"]
     share = f"over {100 * CERTAIN:.0f} %" if value > CERTAIN else f"{100 * value:.0f} %"
     one = len(discovery["effects"]) == 1
-    groups = look_alikes_told(discovery, titles or {})
+    groups = look_alike_names(discovery, titles or {})
     if groups and one:
         return f" ({share} confidence that it is one of: {', '.join(groups[0])})"
     names = "this name" if one else "these names"
@@ -139,10 +147,6 @@ def name_confidence(discovery: Mapping[str, Any], titles: Mapping[str, str] | No
         f", or in look-alikes of them: {'; '.join(' or '.join(group) for group in groups)}" if groups else ""
     )
     return f" ({share} confidence in {names}{alike})"
-
-
-WITH_FINDING = "with the finding added"
-"""Name of the last state where what was found is what is written."""
 
 
 def states_of(discovery: Mapping[str, Any]) -> dict[str, str]:
@@ -183,10 +187,6 @@ def written_finding(discovery: Mapping[str, Any]) -> str:
     return f"{text}."
 
 
-UNSEEN = "in cross-validation (each piece of the data predicted by a fit to the others)"
-"""Words for the data by which hypotheses are judged: their errors are larger than those of the fit."""
-
-
 def reason_finding(discovery: Mapping[str, Any]) -> str:
     """A sentence on what the verdict rests on: the error left beyond the noise against what any such model may
     leave."""
@@ -204,13 +204,6 @@ def reason_finding(discovery: Mapping[str, Any]) -> str:
         why = f"Why: {found}{amount}; only up to {allowed:.2f} mV would count as explained."
         return f"{why} {OF_MEASURED}" if _tried(discovery) else why
     return f"Why: {discovery['reason']}."
-
-
-OF_MEASURED = (
-    "A measured cell nearly always ends as unknown without a known-good record: models of measured cells have errors "
-    f"of some {MV_PER_V * MEASURED_V:.0f} mV. An effect that is named all the same explains only what exceeds these."
-)
-"""Sentence on a verdict of `unknown`, which measured cells nearly always have."""
 
 
 def next_finding(discovery: Mapping[str, Any], titles: Mapping[str, str] | None = None) -> str:
@@ -275,15 +268,15 @@ def _named(view: DiscoveryView, effects: Sequence[str]) -> str:
         parts.append(f"{subject} {_verb(groups['parameter'])} not as declared")
     if "instrument" in groups:
         parts.append(f"the data, not the cell, show {listed(groups['instrument'])}")
-    return raised("; ".join(parts))
+    return capitalised("; ".join(parts))
 
 
-def raised(text: str) -> str:
+def capitalised(text: str) -> str:
     """With a capital letter, as a sentence begins."""
     return text[:1].upper() + text[1:]
 
 
-def _lowered(text: str) -> str:
+def _decapitalised(text: str) -> str:
     return text[:1].lower() + text[1:]
 
 
@@ -310,13 +303,13 @@ def discovery_consequence(view: DiscoveryView) -> str:
 
 def look_alike_finding(discovery: Mapping[str, Any], titles: Mapping[str, str] | None = None) -> str:
     """A sentence on what else fits as well, beside the verdict."""
-    groups = look_alikes_told(discovery, titles or {})
+    groups = look_alike_names(discovery, titles or {})
     if not groups:
         return ""
     return f"These data cannot tell apart {'; nor '.join(listed(group) for group in groups)}."
 
 
-def look_alikes_told(discovery: Mapping[str, Any], titles: Mapping[str, str]) -> list[list[str]]:
+def look_alike_names(discovery: Mapping[str, Any], titles: Mapping[str, str]) -> list[list[str]]:
     """The names of each group that the data cannot tell apart; what fits as well only beside others, with these."""
     beside = {row["effect"]: row.get("hypothesis", ()) for row in discovery.get("candidates", ())}
     named = set(discovery["effects"])

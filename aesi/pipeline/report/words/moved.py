@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from aesi.pipeline.report.views import Row
-from aesi.pipeline.report.words.discoveries import WITH_FINDING, listed, raised, states_of
+from aesi.pipeline.report.words.discoveries import WITH_FINDING, capitalised, listed, states_of
 from aesi.pipeline.report.words.sizes import PERCENT, TELLING, name_words, resized, rounded, two_digits
 
 MOST_NAMED = 3
@@ -58,7 +58,7 @@ def _sentence(words: str, rows: Sequence[Row]) -> str:
     ended = [parameter_words(row) for row in rows if row["at_limit"]]
     if ended:
         bound = "its bound, and its value is" if len(ended) == 1 else "their bounds, and their values are"
-        text += f" {raised(listed(ended))} ended on {bound} not determined by the data."
+        text += f" {capitalised(listed(ended))} ended on {bound} not determined by the data."
     return text
 
 

@@ -22,7 +22,7 @@ ON_TEST = "On held-out test records, in free run, the RMSE"
 def run_finding(view: RunView) -> str:
     """A sentence on what the correction gains on the test records in free run, on where a mere refit does better,
     and on the error before a simulation ran out, where one did."""
-    return f"{_bought(view).removesuffix('.')}{_refit_better(view)}{_ran_out(view)}."
+    return f"{_gain_sentence(view).removesuffix('.')}{_refit_better(view)}{_ran_out(view)}."
 
 
 def _refit_better(view: RunView) -> str:
@@ -33,7 +33,7 @@ def _refit_better(view: RunView) -> str:
         return ""
     return (
         f"; with its own parameters refitted to the training records, and nothing learnt, the {view.physics} errs less "
-        f"there: {_told(refitted, ours)[0]} mV"
+        f"there: {_distinct_mv(refitted, ours)[0]} mV"
     )
 
 
@@ -74,7 +74,8 @@ def _ran_out(view: RunView) -> str:
     return f"{text}: before that the error is {told}" if told else text
 
 
-def _bought(view: RunView) -> str:
+def _gain_sentence(view: RunView) -> str:
+    """A sentence on the error of the chosen model on the test records in free run, beside that of the physics."""
     model, physics = view.model(view.chosen), view.model(view.physics)
     before, after = (_figure(row, "free_run", "test_rmse_mv") for row in (physics, model))
     reduction = _figure(model, "free_run", "test_mser_pct")
@@ -87,12 +88,12 @@ def _bought(view: RunView) -> str:
         )
     corrected = _figure(view.model(view.corrected), "free_run", "test_rmse_mv")
     if corrected is not None and view.corrected != view.chosen and corrected < min(before, after):
-        between, last = _told(corrected, after)
+        between, last = _distinct_mv(corrected, after)
         return (
             f"{ON_TEST} is {between} mV with the {view.corrected} and {before:.1f} mV with the {view.physics} as "
             f"declared. The correction learnt on top of it does not help: {view.chosen} leaves {last} mV."
         )
-    first, last = _told(before, after)
+    first, last = _distinct_mv(before, after)
     if reduction <= 0:
         return (
             "The data-driven correction does not help here: in free run on the test records the error "
@@ -104,7 +105,7 @@ def _bought(view: RunView) -> str:
             f"{ON_TEST} is {last} mV with {view.chosen} and {first} mV with the {view.physics} alone. The correction "
             f"removes {reduction:.1f} % of its mean squared error."
         )
-    between, last = _told(corrected, after)
+    between, last = _distinct_mv(corrected, after)
     # Else the correction would be credited with what the recalibration does.
     return (
         f"{ON_TEST} is {last} mV with {view.chosen}, {between} mV with the {view.corrected} alone and {before:.1f} mV "
@@ -137,7 +138,7 @@ def refit_finding(view: RunView) -> str:
         return advice if _refit_better(view) else ""
     return (
         f"With its own parameters refitted to the training records and nothing learnt, the {view.physics} errs by "
-        f"{_told(refitted, after)[0]} mV there: the correction leaves {beyond:.1f} % less mean "
+        f"{_distinct_mv(refitted, after)[0]} mV there: the correction leaves {beyond:.1f} % less mean "
         "squared error than that."
     )
 
@@ -169,7 +170,7 @@ def _worse_refitted(view: RunView, figure: str) -> tuple[str, str] | None:
     )
     if declared is None or refitted is None or refitted <= declared:
         return None
-    return _told(declared, refitted)
+    return _distinct_mv(declared, refitted)
 
 
 def constant_finding(view: RunView) -> str:
@@ -181,7 +182,7 @@ def constant_finding(view: RunView) -> str:
     ours = _figure(view.model(view.chosen), "free_run", "test_rmse_mv")
     if row is None or row["name"] == view.chosen or error is None or ours is None:
         return ""
-    left = _told(error, ours)[0]
+    left = _distinct_mv(error, ours)[0]
     return f"The mean error of the training records, added as a constant, gives an RMSE of {left} mV there."
 
 
@@ -198,7 +199,7 @@ def others_finding(view: RunView) -> str:
     if not better or ours is None:
         return ""
     best = min(better, key=lambda name: better[name])
-    least = _told(better[best], ours)[0]
+    least = _distinct_mv(better[best], ours)[0]
     if len(left) == 1:
         return f"The other correction learnt on the same records, {best}, has a lower RMSE there: {least} mV."
     has = "has a lower RMSE" if len(better) == 1 else "have a lower RMSE"
@@ -266,8 +267,8 @@ def interval_finding(model: Row) -> str:
     )
 
 
-def _told(first: float, other: float) -> tuple[str, str]:
-    """Two errors to a tenth, or to as many digits as tell them apart."""
+def _distinct_mv(first: float, other: float) -> tuple[str, str]:
+    """Two errors, mV, as text: to a tenth, or to as many decimals as tell them apart."""
     for digits in range(1, MOST_DIGITS + 1):
         if f"{first:.{digits}f}" != f"{other:.{digits}f}":
             break

@@ -29,10 +29,10 @@ ENDINGS = {"ohm/(A*hour)": "_ohm_ah", "ohm/hour**0.5": "_ohm"}
 def with_size(effect: str, discovery: Mapping[str, Any], title: str | None = None) -> str:
     """The effect's name with its fitted parameters and their 90 % intervals; the name alone where there are none."""
     name = title or effect.replace("_", " ")
-    known, told = _known(effect), _told(effect, discovery)
-    if not told:
+    known, parameters = _known(effect), _shown_parameters(effect, discovery)
+    if not parameters:
         return name
-    ((key, value), *others) = told.items()
+    ((key, value), *others) = parameters.items()
     if not others and value["unit"] != "dimensionless":
         if (shift := _declared_of(known.get(key), discovery)) is not None:
             declared, unit = shift
@@ -42,8 +42,8 @@ def with_size(effect: str, discovery: Mapping[str, Any], title: str | None = Non
         parameter = known.get(key)
         more = " more" if parameter is not None and parameter.counted == "added" else " of"
         return f"{quantity(value)}{more} {name}"
-    parts = [_part(key, value, known.get(key)) for key, value in list(told.items())[:MOST_PARAMETERS]]
-    rest = ", ..." if len(told) > MOST_PARAMETERS else ""
+    parts = [_part(key, value, known.get(key)) for key, value in list(parameters.items())[:MOST_PARAMETERS]]
+    rest = ", ..." if len(parameters) > MOST_PARAMETERS else ""
     return f"{name} ({', '.join(parts)}{rest})"
 
 
@@ -51,8 +51,8 @@ def resized(effect: str, discovery: Mapping[str, Any]) -> list[tuple[str, str, s
     """The parameter of an effect that the written model has at another size than the finding, as far as one sees it:
     in words, its value there, and the finding's; ('ambient temperature', '14.0 degC', '11.8 degC')."""
     written = discovery.get("written_parameters", {}).get(effect, {})
-    name, told, out = effect.replace("_", " "), _told(effect, discovery), []
-    for key, value in list(told.items())[:MOST_PARAMETERS]:
+    name, parameters, out = effect.replace("_", " "), _shown_parameters(effect, discovery), []
+    for key, value in list(parameters.items())[:MOST_PARAMETERS]:
         if key not in written:
             continue
         parameter = _known(effect).get(key)
@@ -64,7 +64,7 @@ def resized(effect: str, discovery: Mapping[str, Any]) -> list[tuple[str, str, s
         shown = _with_ends(value, times, declared, unit)
         unit, (there, found) = _digits_of(shown, [declared + times * written[key], shown["value"]])
         if there != found:
-            words = name if len(told) == 1 else f"{name} ({name_words(key, value['unit'])})"
+            words = name if len(parameters) == 1 else f"{name} ({name_words(key, value['unit'])})"
             out.append((words, f"{there}{unit}", f"{found}{unit}"))
     return out
 
@@ -78,10 +78,11 @@ def _known(effect: str) -> Mapping[str, Parameter]:
     return CATALOGUE[effect].parameters if effect in CATALOGUE else {}
 
 
-def _told(effect: str, discovery: Mapping[str, Any]) -> dict[str, Any]:
-    """The fitted parameters of an effect that say something, all where none does."""
+def _shown_parameters(effect: str, discovery: Mapping[str, Any]) -> dict[str, Any]:
+    """Name -> estimate, for the fitted parameters of an effect that are informative (`_is_informative`); for all of
+    them if none is."""
     fitted, known = dict(_row(effect, discovery).get("parameters", {})), _known(effect)
-    return {key: value for key, value in fitted.items() if _tells(value, known.get(key))} or fitted
+    return {key: value for key, value in fitted.items() if _is_informative(value, known.get(key))} or fitted
 
 
 def _declared_of(parameter: Parameter | None, discovery: Mapping[str, Any]) -> tuple[float, str] | None:
@@ -180,8 +181,9 @@ def refit_does_as_well(discovery: Mapping[str, Any]) -> bool:
     return not moved or not moved <= set(discovery["effects"])
 
 
-def _tells(value: Mapping[str, Any], parameter: Parameter | None) -> bool:
-    """Whether a parameter differs from the value at which it does nothing, and is not all of its range."""
+def _is_informative(value: Mapping[str, Any], parameter: Parameter | None) -> bool:
+    """Whether the 90 % interval of a parameter leaves out the value at which it has no effect, and is not the whole
+    range of the parameter."""
     if parameter is None:
         return True
     low, high = parameter.bounds

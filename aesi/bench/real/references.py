@@ -1,4 +1,4 @@
-"""Independent checks: quantities measured beside a record, compared with the written model of a discovery.
+"""Independent checks: reference quantities measured beside a record, against the written model of a discovery.
 
 The quantities are the temperature of the thermocouple that was withheld from the tracer, the capacity from a check-up,
 and two resistances from an impedance spectrum:
@@ -32,7 +32,7 @@ AT_HZ = 1.0
 """Frequency at which the charge-transfer resistance of (1) is read, Hz. A convention."""
 HIGH_HZ = 1e5
 """Frequency at which the diffusion of the model contributes nothing to its resistance, Hz. A convention."""
-HALF = 0.5
+HALF_CHARGE = 0.5
 """State of charge at which spectra are compared."""
 FAST = 1e6
 """Factor on the rate constants that makes the resistance of the kinetics negligible. A convention."""
@@ -48,15 +48,15 @@ class Resistances:
     transfer_ohm: float
 
 
-def course_row(found: Discovery, told: Measurement, measured_degc: Array) -> dict[str, float]:
+def temperature_row(found: Discovery, record: Measurement, measured_degc: Array) -> dict[str, float]:
     """Comparison of the temperature in the written model with the measured one.
 
-    told : the record as the tracer had it, without the temperature.  measured_degc : (n,) degC, the thermocouple.
+    record : as the tracer had it, without the temperature.  measured_degc : (n,) degC, the thermocouple.
     Returns the mean of the measured temperature, degC, and the mean and the RMS of the difference model minus measured,
     K.
     """
     run = simulate(
-        found.cell, told.time_s, told.current_a, found.soc0, found.model_effects, None, found.hold,
+        found.cell, record.time_s, record.current_a, found.soc0, found.model_effects, None, found.hold,
         on_depletion="clip",
     )  # fmt: skip
     difference = run.series["temperature_k"] - ZERO_CELSIUS_K - measured_degc
@@ -82,16 +82,16 @@ def capacity_row(found: Discovery, declared: Cell, lost: float) -> dict[str, flo
     }
 
 
-def witness_row(found: Discovery, declared: Cell, spectra: Sequence[Spectrum]) -> dict[str, float]:
+def resistance_row(found: Discovery, declared: Cell, spectra: Sequence[Spectrum]) -> dict[str, float]:
     """The resistances (1) of the measured spectrum nearest to half charge, of the written model and of the declared
     one, mohm, and the relative errors of those of the written model.
 
-    Raises DataError if the resistances cannot be read from the spectrum (`of_spectrum`).
+    Raises DataError if the resistances cannot be read from the spectrum (`measured_resistances`).
     """
-    spectrum = next_to_half(spectra, declared)
-    measured = of_spectrum(spectrum)
+    spectrum = nearest_half_charge(spectra, declared)
+    measured = measured_resistances(spectrum)
     ours, before = (
-        of_model(cell, effects, _soc(spectrum, declared), spectrum.temperature_degc)
+        model_resistances(cell, effects, _soc(spectrum, declared), spectrum.temperature_degc)
         for cell, effects in ((found.cell, found.model_effects), (declared, ()))
     )
     return {
@@ -106,10 +106,10 @@ def witness_row(found: Discovery, declared: Cell, spectra: Sequence[Spectrum]) -
     }
 
 
-def next_to_half(spectra: Sequence[Spectrum], cell: Cell) -> Spectrum:
+def nearest_half_charge(spectra: Sequence[Spectrum], cell: Cell) -> Spectrum:
     """The spectrum whose state of charge is nearest to one half; without a stated one it follows from the charge passed
     since the full charge."""
-    return min(spectra, key=lambda spectrum: abs(_soc(spectrum, cell) - HALF))
+    return min(spectra, key=lambda spectrum: abs(_soc(spectrum, cell) - HALF_CHARGE))
 
 
 def _soc(spectrum: Spectrum, cell: Cell) -> float:
@@ -118,7 +118,7 @@ def _soc(spectrum: Spectrum, cell: Cell) -> float:
     return 1.0 - (spectrum.discharged_ah or 0.0) / cell.capacity_ah
 
 
-def of_spectrum(spectrum: Spectrum) -> Resistances:
+def measured_resistances(spectrum: Spectrum) -> Resistances:
     """The resistances (1) of a measured spectrum, with linear interpolation between its frequencies.
 
     Raises DataError if the imaginary part does not cross zero, or if the frequencies do not include 1 Hz in their
@@ -138,7 +138,9 @@ def of_spectrum(spectrum: Spectrum) -> Resistances:
     return Resistances(ohmic, float(np.interp(np.log(AT_HZ), np.log(hz), z.real)) - ohmic)
 
 
-def of_model(cell: Cell, effects: Sequence[Any], soc: float, temperature_degc: float | None) -> Resistances:
+def model_resistances(
+    cell: Cell, effects: Sequence[Any], soc: float, temperature_degc: float | None
+) -> Resistances:
     """The resistances (1) of a model cell with effects at rest.
 
     soc : state of charge, 0 to 1.  temperature_degc : degC; None takes 25.

@@ -12,8 +12,8 @@ from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.trust import MEASURED_CELL
 from aesi.tracer.decide.carry_over import FAST_C, ORDINARY_C, LeftOut, left_out_errors, range_fault
-from aesi.tracer.decide.in_use import foretold_in_use
-from aesi.tracer.decide.verdict import FORETOLD_SHARE, foretold_share
+from aesi.tracer.decide.in_use import predicted_share_in_use
+from aesi.tracer.decide.verdict import PREDICTED_SHARE, predicted_share
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.model_error import MEASURED_V
 from aesi.tracer.likelihood.model_state import ModelState
@@ -67,10 +67,10 @@ def _tested(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis, allo
     and, if own parameters are open, its ranges of current too, since the response to the current determines these
     parameters."""
     if len(problem.records) > 1:
-        return foretold_in_use(problem, blocks, fit, allowed_v) >= FORETOLD_SHARE
+        return predicted_share_in_use(problem, blocks, fit, allowed_v) >= PREDICTED_SHARE
     conditions = ("charge",) if problem.trust in MEASURED_CELL else ("rate", "charge")
     return all(
-        name in blocks.folds and foretold_share(problem, blocks, fit, allowed_v, name) >= FORETOLD_SHARE
+        name in blocks.folds and predicted_share(problem, blocks, fit, allowed_v, name) >= PREDICTED_SHARE
         for name in conditions
     )
 
@@ -91,7 +91,7 @@ def carries_best(options: Sequence[Option]) -> Option:
     return min(options, key=lambda one: worst_ratio(one, options))
 
 
-def written(
+def model_to_write(
     declared: Option, recalibrated: Sequence[Option], named: Sequence[Option] = ()
 ) -> tuple[ModelState, str | None]:
     """(model to write, why it is not the one with the named effects; None where it is, or where nothing was named).
@@ -116,10 +116,10 @@ def written(
     names = " + ".join(named[0].state.hypothesis)
     fault = faults[0] if not sound else None
     why = f"{names}: {fault or LESS_ELSEWHERE}"
-    return best.state, why if best is declared else f"{why}; {_instead(best, declared)}"
+    return best.state, why if best is declared else f"{why}; {_refit_instead(best, declared)}"
 
 
-def of_refit(
+def why_not_refit(
     declared: Option, recalibrations: Sequence[Option], options: Sequence[Option], taken: ModelState
 ) -> str | None:
     """Why the recalibrated model that carries over best is not written, a clause that also names the refit written in
@@ -144,7 +144,7 @@ def of_refit(
     )
 
 
-def stand_ins(state: ModelState, named: Sequence[str]) -> tuple[str, ...]:
+def stand_in_notes(state: ModelState, named: Sequence[str]) -> tuple[str, ...]:
     """A sentence on effects of the written model that the verdict does not name; empty where there is none."""
     beside = [name for name in state.hypothesis if name not in named]
     if not beside:
@@ -155,7 +155,7 @@ def stand_ins(state: ModelState, named: Sequence[str]) -> tuple[str, ...]:
     )
 
 
-def limits_of(state: ModelState) -> tuple[str, ...]:
+def fast_load_limits(state: ModelState) -> tuple[str, ...]:
     """Sentences on fast full discharges and charges that the declared model can run and the written one cannot."""
     fast = range_fault(state, FAST_C)
     return () if fast is None else (f"with the finding, {fast}; the declared model does not.",)
@@ -167,7 +167,7 @@ def _fault(one: Option, declared: Option, rates_c: Sequence[float]) -> str | Non
     return HARM if one.left_out.harms(declared.left_out) else range_fault(one.state, rates_c)
 
 
-def _instead(taken: Option, declared: Option) -> str:
+def _refit_instead(taken: Option, declared: Option) -> str:
     left_mv, before_mv = 1e3 * taken.left_out.pooled_v, 1e3 * declared.left_out.pooled_v
     names = " + ".join(taken.state.hypothesis)
     beside = f" with {names}" if names else ""
