@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
+from aesi.constants import MILLI, MV_PER_V, ZERO_CELSIUS_K
 from aesi.numerics.files.whole import write_whole
 from aesi.physics.cell import Soh
 from aesi.physics.effects import CATALOGUE, Effect, known_effects, selected
@@ -31,6 +31,7 @@ from aesi.tracer.discovery import Progress
 from aesi.tracer.report.candidate_effects import CandidateEffect
 from aesi.tracer.report.outcome import Errors, Part, State
 from aesi.tracer.report.own_parameters import OwnParameter
+from aesi.tracer.report.step_resistance import MEASURED, CurrentSteps, StepResistance
 from aesi.tracer.report.yardstick import POINTS_TO, Pointer
 
 SCHEMA = "aesi.discovery/1"
@@ -234,6 +235,7 @@ def discovery_content(found: Discovery, asked: Sequence[str] = ()) -> dict[str, 
         "files": _file_rows(found),
         "dependence": _dependence(found),
         "points_to": _pointers(found),
+        "step_resistance": _step_resistance(found),
         "experiments": [{"effects": list(g), "experiment": text} for g, text in found.experiments],
         "not_adopted": found.not_adopted,
         "notes": list(together((*asked, *found.notes))),
@@ -310,6 +312,36 @@ def _file_rows(found: Discovery) -> list[dict[str, Any]]:
 def _dependence(found: Discovery) -> list[dict[str, Any]]:
     before, after = found.before.shares, found.after.shares
     return [{"variable": name, "before": before[name], "after": after.get(name, 0.0)} for name in before]
+
+
+def _step_resistance(found: Discovery) -> dict[str, list[dict[str, Any]]]:
+    """Rows by state of charge and by current: the resistance within seconds of a step, measured and of each state,
+    milliohm; none where no record shows it."""
+    records = [
+        CurrentSteps.of(
+            f.time_s, f.current_a, f.soc, {MEASURED: f.measured_v} | {s: f.voltages[s] for s in STATES}
+        )
+        for f in found.files
+    ]
+    told = [one for one in records if one is not None]
+    if not told:
+        return {"by_soc": [], "by_current": []}
+    steps = CurrentSteps.together(told)
+    return {
+        "by_soc": _resistance_rows("soc", steps.by_soc()),
+        "by_current": _resistance_rows("current_a", steps.by_current()),
+    }
+
+
+def _resistance_rows(variable: str, found: StepResistance) -> list[dict[str, Any]]:
+    return [
+        {variable: float(x)}
+        | {
+            f"{name}_mohm": MILLI * float(ohm[k]) if np.isfinite(ohm[k]) else None
+            for name, ohm in found.ohm.items()
+        }
+        for k, x in enumerate(found.x)
+    ]
 
 
 def _pointers(found: Discovery) -> list[dict[str, Any]]:

@@ -11,7 +11,7 @@ import numpy as np
 from aesi.pipeline.report import sections, tables
 from aesi.pipeline.report.figures import paper_figures, predicted_models
 from aesi.pipeline.report.page import write_page
-from aesi.pipeline.report.plots import hypotheses, maps, records
+from aesi.pipeline.report.plots import hypotheses, maps, records, step_response
 from aesi.pipeline.report.views import DiscoveryTrace, DiscoveryView, Row, RunView
 from aesi.pipeline.report.words import discoveries, runs
 from aesi.pipeline.report.words.moved import (
@@ -128,6 +128,7 @@ def discovery_figures(view: DiscoveryView) -> dict[str, Figure]:
             figures[f"residual_{part}"] = records.residual_figure(view.of(part), states)
     if tested:
         figures |= _over_the_range(tested, states)
+    figures |= step_response.figures(view.discovery.get("step_resistance", {}), states)
     if view.discovery["candidates"]:
         figures["scores"] = hypotheses.ranking_figure(
             view.discovery["candidates"], view.titles, view.discovery["effects"]

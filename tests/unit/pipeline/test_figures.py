@@ -301,6 +301,19 @@ def test_the_refit_was_left_out_of_the_residuals_beside_a_finding(views):
     assert {name for name in without if name.startswith("map_")} == {"map_before", "map_recalibrated"}
 
 
+def test_the_resistance_within_seconds_is_drawn_measured_and_of_each_state(views):
+    view = views.discovery_view(400)
+    row = {"measured_mohm": 6.0, "before_mohm": 9.0, "recalibrated_mohm": None, "after_mohm": 6.1}
+    told = {"by_soc": [{"soc": 0.25, **row}, {"soc": 0.75, **row}], "by_current": []}
+    figures = discovery_figures(replace(view, discovery={**view.discovery, "step_resistance": told}))
+    assert "step_by_current" not in figures
+    drawn = {t.name: t for t in figures["step_by_soc"].data}
+    assert list(drawn) == ["measured", "as declared", "recalibrated", "with the finding added"]
+    assert list(drawn["measured"].x) == [25.0, 75.0]
+    assert list(drawn["as declared"].y) == [9.0, 9.0]
+    assert not {"step_by_soc", "step_by_current"} & set(discovery_figures(view))
+
+
 def test_what_was_measured_is_a_wider_black_line(views):
     view = views.discovery_view(200)
     fig = records.residual_figure(view.of("test"), {"before": "as declared", "after": "as written"})
