@@ -51,7 +51,7 @@ from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError, FitError, InputError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
-from aesi.physics.belongs import check_voltage, unlike
+from aesi.physics.belongs import check_voltage, other_materials_sentence
 from aesi.physics.cell import Cell
 from aesi.physics.cell.energies import SPAN_K
 from aesi.physics.cell.health import day_of
@@ -264,7 +264,7 @@ def problem(
     )
     declared, start = start, with_activation(start)
     telling = () if conditions.same_cell else tell_the_size(cell, records)
-    of_potentials = filter(None, (unlike(start, records[i]) for i in telling))
+    of_potentials = filter(None, (other_materials_sentence(start, records[i]) for i in telling))
     cut = [r.name for r, whole in zip(placed, records, strict=True) if r.time_s[0] > whole.time_s[0]]
     model_name = conditions.model or "espm"
     ready = prepared(start, placed, conditions.soc0, model_name, conditions.same_cell, cut)
