@@ -14,12 +14,12 @@ from aesi.calibration import Calibration, Conditions, calibrate
 from aesi.calibration.fit import OnStep
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.parameters import check_names
-from aesi.calibration.posterior import PosteriorSamples, check_posterior, sampled
+from aesi.calibration.posterior import PosteriorSamples, check_posterior, sample_posterior
 from aesi.calibration.records.prepared import with_temperatures
 from aesi.calibration.records.spectra import BAND_HZ, check_spectra
 from aesi.calibration.result import RecordError
-from aesi.calibration.rewind import start_soc
-from aesi.calibration.start import sized, tell_the_size
+from aesi.calibration.start import full_discharge_numbers, scaled_to_discharge
+from aesi.calibration.written_cell import start_soc
 from aesi.constants import CM_PER_M, MV_PER_V, ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError
 from aesi.numerics.files.whole import write_whole
@@ -143,7 +143,7 @@ def calibrate_files(
     )
     name = declared.name if asked.title is None else asked.title
     found = replace(found, cell=replace(found.cell, name=name, description=_made_from(found)))
-    posterior = sampled(found, asked.posterior, asked.seed) if asked.posterior else None
+    posterior = sample_posterior(found, asked.posterior, asked.seed) if asked.posterior else None
     spectra, told = held_against(found.cell, asked.impedance, model=model, fitted=conditions.spectra)
     read = [note for m in measurements for note in m.notes]
     content = calibration_content(found, [*effects_left(given), *body, *read, *told], posterior, spectra)
@@ -236,9 +236,9 @@ def scaled_to(
     temperatures_degc : of records without a column, by name.  Raises DataError for a record that cannot be of it, at
     its temperature.
     """
-    start = sized(declared, measurements)[0]
+    start = scaled_to_discharge(declared, measurements)[0]
     placed = with_temperatures(start, measurements, temperatures_degc or {})[0]
-    check_measured(start, placed, tell_the_size(declared, measurements))
+    check_measured(start, placed, full_discharge_numbers(declared, measurements))
     return start
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aesi.calibration.records.spectra import BAND_HZ, degc_of, in_band, state_of, usable
+from aesi.calibration.records.spectra import BAND_HZ, comparable_spectra, degc_of, in_band, state_of
 from aesi.data.channels.spectrum_columns import find_frequency
 from aesi.data.readers import open_table
 from aesi.data.readers.table import names_listed
@@ -178,7 +178,7 @@ def held_against(
 
     fitted : those that the cell was fitted to, which come first.
     """
-    kept, told = usable(cell, [*fitted, *spectra])
+    kept, told = comparable_spectra(cell, [*fitted, *spectra])
     out = []
     for spectrum in kept:
         soc, seen = state_of(cell, spectrum), in_band(spectrum)
