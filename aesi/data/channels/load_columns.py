@@ -37,7 +37,7 @@ def load_columns(
     notes = [*table.notes, *mapped.notes]
     _orient(table, data, mapped, reading, notes)
     for name in reading.selectors:
-        data, context = _of_number(data, context, name, getattr(reading, name), notes)
+        data, context = _with_number(data, context, name, getattr(reading, name), notes)
     data = {quantity: column for quantity, column in data.items() if quantity in QUANTITIES}
     data, context = _window(data, context, reading, notes)
     duplicates: Duplicates = reading.duplicates or ("first" if mapped.maker else "refuse")
@@ -88,16 +88,16 @@ def _orient(table: TableFile, data: Columns, mapped: Mapped, reading: Reading, n
             f"{table.path.name}: --state-word says what words of a column mean, and no column is known to say which "
             f'way the current flows; name it: --state "NAME". There are: {", ".join(map(repr, table.header))}.'
         )
-    if _turned_by_words(table, data, mapped, reading, notes):
+    if _orient_by_words(table, data, mapped, reading, notes):
         return
     if reading.state_words:
         notes.append(
             "Words of a state were declared, and the sign of the current comes from itself; name their column: --state."
         )
-    _turn_by_declaration(data, mapped, reading, notes)
+    _orient_by_declaration(data, mapped, reading, notes)
 
 
-def _turned_by_words(
+def _orient_by_words(
     table: TableFile, data: Columns, mapped: Mapped, reading: Reading, notes: list[str]
 ) -> bool:
     """Take the direction of the current from a column of words such as `charge`, where the user named one or the
@@ -120,7 +120,7 @@ def _turned_by_words(
     return True
 
 
-def _turn_by_declaration(data: Columns, mapped: Mapped, reading: Reading, notes: list[str]) -> None:
+def _orient_by_declaration(data: Columns, mapped: Mapped, reading: Reading, notes: list[str]) -> None:
     """Make the current discharge-positive by the sign that the user declares, else by that of the format or maker."""
     if mapped.bdf_current and reading.sign == "discharge-positive":
         notes.append("The current was declared positive on discharge, which BDF's is not; its sign was left.")
@@ -158,7 +158,7 @@ def _where_kept(context: Context, kept: AnyArray, row: int) -> str:
     return context.where(int(kept[row]))
 
 
-def _of_number(
+def _with_number(
     data: Columns, context: Context, name: str, text: str, notes: list[str]
 ) -> tuple[Columns, Context]:
     """The rows of a cycle or a step."""
