@@ -59,7 +59,7 @@ class RowsAhead:
 
 def rows_ahead(model: ErrorModel, series: ErrorSeries, steps: int = 1) -> RowsAhead:
     """The measured rows of a record, predicted so many steps ahead by a model of its error."""
-    known, own = series.as_known, series if series.own is None else series.own
+    known, own = series.with_known_error, series if series.own is None else series.own
     until = rows_until(own.time_s, series.time_s)
     behind = until[-1] < len(own)
     until[-1] = len(own)

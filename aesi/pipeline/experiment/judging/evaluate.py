@@ -144,9 +144,9 @@ def _free_run(judged: Mapping[Role, Sequence[_Judged]]) -> dict[str, float]:
                 left_share = np.mean((error - predicted) ** 2) / np.mean(physics**2)
                 figures[f"{role}_{key}"] = 100.0 * (1.0 - float(left_share))
             figures[f"{role}_rmse_mv"] = MV_PER_V * rmse(error, predicted)
-            runs = _joined(r.series.runs for r in records)
-            if runs.any() and not runs.all():
-                figures[f"{role}_until_ran_out_rmse_mv"] = MV_PER_V * rms((error - predicted)[runs])
+            before = _joined(r.series.before_depletion for r in records)
+            if before.any() and not before.all():
+                figures[f"{role}_until_ran_out_rmse_mv"] = MV_PER_V * rms((error - predicted)[before])
     test = judged["test"]
     figures["diverged"] = sum(r.free.diverged_at is not None for r in test)
     figures["outside_pct"] = 100.0 * float(np.mean(_joined(r.free.outside for r in test)))
@@ -216,10 +216,10 @@ def _record_figures(one: Fitted, record: _Judged) -> dict[str, float | None]:
     series, model = record.series, one.model
     left, declared = series.error_v - record.free.error_v, series.left_by(DECLARED)
     kept = model.kept(series) if isinstance(model, SparseModel) else np.ones(len(series))
-    visited, runs = trained_on(model, one.bands), series.runs
-    ran_out = {} if runs.all() else {"ran_out_s": series.ran_out_s}
-    if ran_out and runs.any():
-        ran_out["until_ran_out_mv"] = MV_PER_V * rms(left[runs])
+    visited, before = trained_on(model, one.bands), series.before_depletion
+    ran_out = {} if before.all() else {"ran_out_s": series.ran_out_s}
+    if ran_out and before.any():
+        ran_out["until_ran_out_mv"] = MV_PER_V * rms(left[before])
     return {
         "rmse_mv": MV_PER_V * rms(left),
         **ran_out,
