@@ -14,7 +14,7 @@ from aesi.data.channels.checks import Columns, Context, check_resolution
 from aesi.data.channels.columns import QUANTITIES, Mapped, map_columns
 from aesi.data.readers.table import TableFile
 from aesi.data.reading import Duplicates, Reading, bounds
-from aesi.data.state import both_ways, signs, turned
+from aesi.data.state import directions, has_both_directions, with_directions
 from aesi.errors import DataError
 from aesi.numerics.typing import AnyArray, Array
 
@@ -112,10 +112,10 @@ def _orient_by_words(
     if signed and not asked:
         return False
     (words,) = table.read_text((mapped.position["state"],))
-    way, note = signs(words, current, reading.state_words, table.path.name, mapped.header["state"])
+    way, note = directions(words, current, reading.state_words, table.path.name, mapped.header["state"])
     if not asked and not np.any(way != 0):
         return False
-    data["current_a"], changes = turned(current, way, data["time_s"], bool(signed))
+    data["current_a"], changes = with_directions(current, way, data["time_s"], bool(signed))
     notes += [note, *changes]
     return True
 
@@ -139,7 +139,7 @@ def _orient_by_declaration(data: Columns, mapped: Mapped, reading: Reading, note
 def _check_words(table: TableFile, current: Array, mapped: Mapped, reading: Reading) -> None:
     """Refuse magnitudes where a column of words states both directions and the user neither named nor left it out."""
     name = None if "state" in reading.columns else headers.nearest("state", table.header)
-    if name is None or not both_ways(table.read_text((table.header.index(name),))[0], current):
+    if name is None or not has_both_directions(table.read_text((table.header.index(name),))[0], current):
         return
     raise DataError(
         f"{table.path.name}: the current ({mapped.header['current_a']!r}) never changes its sign, and yet column "

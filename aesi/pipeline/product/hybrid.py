@@ -326,7 +326,7 @@ class HybridModel:
         error[0] = 0.0  # nothing was measured before the first sample
         low = high = np.full(len(own), np.nan)
         if self.intervals is not None:
-            residual = ahead.left_v
+            residual = ahead.residual_v
             residual[0] = np.nan
             band = self.intervals.intervals(residual, ahead.current_a)
             at = np.searchsorted(ahead.stamps, step)
