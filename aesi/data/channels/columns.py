@@ -259,7 +259,7 @@ class _Finder:
                 if _without_blanks(there) == _without_blanks(name)
             ]
         )
-        other = form.to_subtract(quantity, found[0], self._table.header) if form else None
+        other = form.reference_column(quantity, found[0], self._table.header) if form else None
         if other is not None:
             raise DataError(
                 f"{self._file}: {name!r} and {other!r} are potentials against a reference, and {quantity} of the cell "
