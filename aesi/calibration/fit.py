@@ -270,29 +270,33 @@ def prepared_model(
     Raises DataError for records that do not fit the cell.
     """
     records = _checked_records(cell, records, conditions)
-    start, zero, of_size = _size_and_zero(cell, records, conditions.same_cell)
-    kept = [discharge_branch(start, data) for data in records]
-    placed, of_temperature = with_temperatures(
-        start, [data for data, _ in kept], conditions.temperatures_degc
+    start, zero, size_sentences = _size_and_zero(cell, records, conditions.same_cell)
+    branches = [discharge_branch(start, data) for data in records]
+    at_temperatures, temperature_sentences = with_temperatures(
+        start, [data for data, _ in branches], conditions.temperatures_degc
     )
     declared, start = start, with_activation(start)
-    telling = () if conditions.same_cell else full_discharge_numbers(cell, records)
-    of_potentials = filter(None, (other_materials_sentence(start, records[i]) for i in telling))
-    cut = [r.name for r, whole in zip(placed, records, strict=True) if r.time_s[0] > whole.time_s[0]]
+    full_discharges = () if conditions.same_cell else full_discharge_numbers(cell, records)
+    potential_sentences = filter(None, (other_materials_sentence(start, records[i]) for i in full_discharges))
+    cut_names = [
+        r.name for r, whole in zip(at_temperatures, records, strict=True) if r.time_s[0] > whole.time_s[0]
+    ]
     model_name = conditions.model or "espm"
-    ready = prepared(start, placed, conditions.soc0, model_name, conditions.same_cell, cut)
-    for one in ready:
+    prepared_records = prepared(
+        start, at_temperatures, conditions.soc0, model_name, conditions.same_cell, cut_names
+    )
+    for one in prepared_records:
         check_charge(start, one)
-    spectra, of_spectra = fitted_spectra(start, conditions.spectra)
-    span = _span_k(start, ready, spectra)
-    on_case = any(r.kelvin is not None and measured_on_case(r.kelvin) for r in ready)
+    spectra, spectrum_sentences = fitted_spectra(start, conditions.spectra)
+    span = _span_k(start, prepared_records, spectra)
+    on_case = any(r.kelvin is not None and measured_on_case(r.kelvin) for r in prepared_records)
     start = with_interfaces(start, on_case)
     free = with_priors(free_parameters(start, span, conditions.same_cell, on_case), conditions.priors)
     energies = {f.name: (f.start, f.sd) for f in free if f.name.endswith("_energy")}
-    ageing = Ageing.of(ready, conditions.dates, conditions.as_of)
+    ageing = Ageing.of(prepared_records, conditions.dates, conditions.as_of)
     model = Model(
         start,
-        ready,
+        prepared_records,
         free,
         Shapes.over(start, span),
         zero,
@@ -301,17 +305,17 @@ def prepared_model(
         spectra,
     )
     return model, (
-        *of_size,
-        *of_potentials,
+        *size_sentences,
+        *potential_sentences,
         *zero.sentences,
-        *(sentence for _, of_branch in kept for sentence in of_branch),
-        *of_temperature,
-        *(f"{name}: {OF_ROWS_LEFT_OUT}" for name in cut if conditions.soc0 is not None),
-        *_small_span_sentences(span, len(ready)),
+        *(sentence for _, branch_sentences in branches for sentence in branch_sentences),
+        *temperature_sentences,
+        *(f"{name}: {OF_ROWS_LEFT_OUT}" for name in cut_names if conditions.soc0 is not None),
+        *_small_span_sentences(span, len(prepared_records)),
         *activation_sentences(declared, start, energies, [f.name for f in free if f.given]),
-        *(r.start.sentence for r in ready if not r.start.against_voltage),  # those are warnings
-        *of_spectra,
-        *map(fitted_rows_sentence, ready),
+        *(r.start.sentence for r in prepared_records if not r.start.against_voltage),  # those are warnings
+        *spectrum_sentences,
+        *map(fitted_rows_sentence, prepared_records),
         *ageing.sentences,
     )
 
