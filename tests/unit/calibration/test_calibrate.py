@@ -248,7 +248,10 @@ def test_the_posterior_says_how_far_the_linear_intervals_were_off(found):
 def test_a_posterior_kept_to_itself_that_it_takes_losses_between_days_to_be_linear():
     posterior = PosteriorSamples(np.zeros((1, 1)), {}, {"negative.rate": 1.1}, 0.2, 5.0)
     assert "losses" not in posterior.sentence
-    assert "losses between dated records are taken to be linear" in replace(posterior, dated=True).sentence
+    assert (
+        "losses between dated records are taken to be linear"
+        in replace(posterior, linearised_losses=True).sentence
+    )
 
 
 def test_a_posterior_of_too_few_samples_is_refused(found):

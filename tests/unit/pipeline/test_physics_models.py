@@ -64,9 +64,9 @@ def test_a_series_knows_from_when_on_a_physics_model_ran_out():
     run = whole.simulate(record, 0.3, "linear")
     first = int(np.argmax(run.series["depleted"] > 0.0))
     assert series.ran_out_s == time_s[first] > 900.0
-    np.testing.assert_array_equal(series.runs, time_s < first)
-    assert series.take(slice(0, first)).runs.all()
-    assert not series.take(slice(first, None)).runs.any()
+    np.testing.assert_array_equal(series.before_depletion, time_s < first)
+    assert series.take(slice(0, first)).before_depletion.all()
+    assert not series.take(slice(first, None)).before_depletion.any()
     full, empty = models.series(no_rows(record, 0.9), 1.0, "linear")
     assert (empty, full.ran_out_s) == (False, None)
 
