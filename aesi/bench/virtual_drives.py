@@ -16,7 +16,7 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebval
 
 from aesi.constants import SECONDS_PER_HOUR
-from aesi.data.profiles.profile import Bench, Profile, paper_profiles
+from aesi.data.profiles.profile import Profile, ProfileBuilder, paper_profiles
 from aesi.errors import SimulationError
 from aesi.numerics.typing import Array
 from aesi.physics import ActiveEffect, Cell, simulate
@@ -145,13 +145,13 @@ def _in_turn(
 ) -> dict[str, tuple[Profile, ...]]:
     """One record of N_REPEATS WLTC cycles, the training cycles changed by `train`, the test cycles by `test` (both map
     (n,) A to (n,) A)."""
-    once = Bench(capacity_ah, DT_S).drive("wltc_3b")
+    once = ProfileBuilder(capacity_ah, DT_S).drive("wltc_3b")
     drives = [(test if k + 1 in TEST_REPEATS else train)(once) for k in range(N_REPEATS)]
     return {"record": (_emptying("drive", drives, capacity_ah),)}
 
 
 def _one(capacity_ah: float) -> dict[str, tuple[Profile, ...]]:
-    bench = Bench(capacity_ah, DT_S)
+    bench = ProfileBuilder(capacity_ah, DT_S)
     train, test = (
         _emptying(name, N_REPEATS * [bench.drive(name)], capacity_ah) for name in ("wltc_3b", "udds")
     )
@@ -161,7 +161,7 @@ def _one(capacity_ah: float) -> dict[str, tuple[Profile, ...]]:
 def _emptying(name: str, drives: Sequence[Array], capacity_ah: float) -> Profile:
     """The drives one after the other, after 60 s of rest, with the current scaled so that they discharge the cell from
     SOC_START to SOC_END."""
-    bench = Bench(capacity_ah, DT_S)
+    bench = ProfileBuilder(capacity_ah, DT_S)
     share = float(np.sum(np.concatenate(drives))) * DT_S / SECONDS_PER_HOUR / capacity_ah
     scale = (SOC_START - SOC_END) / share
     return bench.profile(name, [bench.rest(60.0), *(scale * drive for drive in drives)], SOC_START)

@@ -130,14 +130,14 @@ def _file_day(records: Sequence[Prepared], days: Sequence[date | None], as_of: d
 
     Raises DataError for one asked for that is not between the first and the last.
     """
-    told = [d for d in days if d is not None]
-    if as_of is not None and not min(told) <= as_of <= max(told):
+    dated = [d for d in days if d is not None]
+    if as_of is not None and not min(dated) <= as_of <= max(dated):
         raise DataError(
-            f"as of {as_of}: the dated records are of {min(told)} to {max(told)}, and nothing shows what the cell was "
-            "on another day; give a day from the first to the last of them."
+            f"as of {as_of}: the dated records are of {min(dated)} to {max(dated)}, and nothing shows what the cell "
+            "was on another day; give a day from the first to the last of them."
         )
     loaded = [d for r, d in zip(records, days, strict=True) if d is not None and not r.slow]
-    return as_of or max(loaded or told, default=None)
+    return as_of or max(loaded or dated, default=None)
 
 
 def _chain_and_sd(since: Array, dated: BoolArray) -> tuple[Array, Array]:

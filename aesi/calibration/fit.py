@@ -17,41 +17,47 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from aesi.calibration.ageing import Ageing
-from aesi.calibration.heat import with_heat
+from aesi.calibration.heat import with_fitted_heat
 from aesi.calibration.model import FitState, Model
 from aesi.calibration.parameters import free_parameters, with_interfaces, with_priors
 from aesi.calibration.records.conditions import Conditions
-from aesi.calibration.records.named import named_apart
-from aesi.calibration.records.prepared import Prepared, check_charge, hold_told, prepared, with_temperatures
-from aesi.calibration.records.spectra import degc_of, fitted_ones
+from aesi.calibration.records.named import uniquely_named
+from aesi.calibration.records.prepared import (
+    Prepared,
+    check_charge,
+    fitted_rows_sentence,
+    prepared,
+    with_temperatures,
+)
+from aesi.calibration.records.spectra import degc_of, fitted_spectra
 from aesi.calibration.records.temperature import against_temperature
 from aesi.calibration.records.zero import Zero, zero_of
 from aesi.calibration.result import (
     Calibration,
     RecordError,
     at_bounds,
+    ends_sentences,
     information_weights,
     intervals,
-    told_of_ends,
     undetermined,
 )
-from aesi.calibration.rewind import capacities, rewound
 from aesi.calibration.shapes import Shapes
 from aesi.calibration.silicon import SILICON_V
 from aesi.calibration.start import (
-    of_activation,
-    of_area,
-    one_branch,
+    activation_sentences,
+    discharge_branch,
+    full_discharge_numbers,
+    scaled_to_discharge,
     size_assumed,
-    sized,
-    tell_the_size,
     with_activation,
+    with_area_factor,
 )
+from aesi.calibration.written_cell import capacities, written_cell
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError, FitError, InputError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
-from aesi.physics.belongs import check_voltage, unlike
+from aesi.physics.belongs import check_voltage, other_materials_sentence
 from aesi.physics.cell import Cell
 from aesi.physics.cell.energies import SPAN_K
 from aesi.physics.cell.health import day_of
@@ -109,8 +115,8 @@ def calibrate(
     conditions = conditions or Conditions()
     if starts < 1:
         raise InputError(f"starts = {starts}: give the number of fits, at least 1.")
-    start_model, notes = problem(cell, records, conditions)
-    ends = _ends(start_model, starts, seed, evaluations, on_step)
+    start_model, notes = prepared_model(cell, records, conditions)
+    ends = _fit_ends(start_model, starts, seed, evaluations, on_step)
     model, x, found = ends[0].model, ends[0].x, ends[0].cell
     states = model.states(cell, x)
     scaled = model.jacobian(x) * information_weights(model, x)[:, None]
@@ -118,7 +124,7 @@ def calibrate(
     shares = capacities(model, x)
     parameters = [intervals(model, end.x, covariance) for end in ends]
     return Calibration(
-        cell=_with_what_it_is_of(found, cell, model, shares, conditions.dates),
+        cell=_with_provenance(found, cell, model, shares, conditions.dates),
         declared=cell,
         parameters=parameters[0],
         undetermined=undetermined(model, scaled),
@@ -128,11 +134,11 @@ def calibrate(
         size_assumed="" if conditions.same_cell else size_assumed(cell, records),
         notes=(
             *notes,
-            *_of_priors(model, x),
-            *_of_own(model, x),
-            *_ran_out(model, states),
-            *ends[0].of_heat,
-            *told_of_ends(
+            *_contradicted_prior_sentences(model, x),
+            *_own_parameter_sentences(model, x),
+            *_ran_out_sentences(model, states),
+            *ends[0].heat_sentences,
+            *ends_sentences(
                 [end.cost for end in ends], parameters, [end.from_file for end in ends].index(True)
             ),
         ),
@@ -141,12 +147,15 @@ def calibrate(
         x=x,
         covariance=covariance,
         against_temperature=against_temperature(
-            _of_size(cell, model.cell), model.records, model.model_name, conditions.temperatures_degc
+            _start_file_at_size(cell, model.cell),
+            model.records,
+            model.model_name,
+            conditions.temperatures_degc,
         ),
     )
 
 
-class _Told:
+class _ReportingModel:
     """A model that reports the progress of its descents.  on_step : callback, or None."""
 
     def __init__(self, model: Model, on_step: OnStep | None) -> None:
@@ -169,10 +178,10 @@ class _Told:
 
 
 @dataclass(frozen=True, eq=False)
-class _End:
+class _FitEnd:
     """The end of the descents from one start.
 
-    model : with the thermal data that it was fitted with.  cell : fitted.  of_heat : sentences on its thermal data.
+    model : with the thermal data that it was fitted with.  cell : fitted.  heat_sentences : on its thermal data.
     cost : minus the logarithm of the posterior density, up to a constant, nats.  from_file : True where the start file
     is where it began, not a cell drawn from the priors.
     """
@@ -180,50 +189,54 @@ class _End:
     model: Model
     x: Array
     cell: Cell
-    of_heat: tuple[str, ...]
+    heat_sentences: tuple[str, ...]
     cost: float
     from_file: bool
 
 
-def _ends(model: Model, starts: int, seed: int, evaluations: int, on_step: OnStep | None) -> list[_End]:
+def _fit_ends(
+    model: Model, starts: int, seed: int, evaluations: int, on_step: OnStep | None
+) -> list[_FitEnd]:
     """The ends of the descents from each start that can be simulated, the best first.
 
     Raises FitError where the start file itself cannot be simulated on the records.
     """
     drawn = np.random.default_rng(seed).standard_normal((starts - 1, model.layout.size))
-    ends: list[_End] = []
+    ends: list[_FitEnd] = []
     for start in (np.zeros(model.layout.size), *np.clip(drawn, model.low, model.high)):
         one = copy(model)  # which takes thermal data of its own
         try:
-            x, cell, of_heat = _fitted_twice(_Told(one, on_step), evaluations, start)
+            x, cell, sentences = _fitted_twice(_ReportingModel(one, on_step), evaluations, start)
         except FitError:
             if not ends:
                 raise
             continue
         residual = one.residual(x)
-        ends.append(_End(one, x, cell, of_heat, 0.5 * float(residual @ residual), from_file=not ends))
+        ends.append(_FitEnd(one, x, cell, sentences, 0.5 * float(residual @ residual), from_file=not ends))
     return sorted(ends, key=lambda end: end.cost)
 
 
-def _fitted_twice(told: _Told, evaluations: int, start: Array) -> tuple[Array, Cell, tuple[str, ...]]:
+def _fitted_twice(
+    reporting: _ReportingModel, evaluations: int, start: Array
+) -> tuple[Array, Cell, tuple[str, ...]]:
     """(working vector at the end of the descents, cell there with the heat fitted to its temperatures, sentences on
     that).
 
     The second descent is skipped where no record determines the heat, since nothing would change.
     """
-    model = told.model
-    x = _descended(told, evaluations, start)
-    plain = rewound(model, x)
-    found, of_heat = with_heat(plain, model.records)
+    model = reporting.model
+    x = _descend(reporting, evaluations, start)
+    plain = written_cell(model, x)
+    found, sentences = with_fitted_heat(plain, model.records)
     if found is not plain:
         # The thermal lag of the winding behind its case is part of the file, so that the fit has to include it.
-        model.take_heat_of(found)
-        x = _descended(told, evaluations, x)
-        found = rewound(model, x)
-    return x, found, of_heat
+        model.set_thermal_data(found)
+        x = _descend(reporting, evaluations, x)
+        found = written_cell(model, x)
+    return x, found, sentences
 
 
-def _with_what_it_is_of(
+def _with_provenance(
     found: Cell, declared: Cell, model: Model, shares: Mapping[str, float], days: Mapping[str, date]
 ) -> Cell:
     """The fitted cell as it is written, with the name of the model and the records of the fit.
@@ -249,37 +262,41 @@ def _errors(model: Model, states: Mapping[FitState, tuple[Cell, Array]]) -> tupl
     )
 
 
-def problem(
+def prepared_model(
     cell: Cell, records: Sequence[Measurement], conditions: Conditions
 ) -> tuple[Model, tuple[str, ...]]:
-    """The model that is fitted, and sentences on how it was set up.
+    """(model that is fitted, sentences on how it was set up, in the order of the steps).
 
     Raises DataError for records that do not fit the cell.
     """
     records = _checked_records(cell, records, conditions)
-    start, zero, of_size = _sized(cell, records, conditions.same_cell)
-    kept = [one_branch(start, data) for data in records]
-    placed, of_temperature = with_temperatures(
-        start, [data for data, _ in kept], conditions.temperatures_degc
+    start, zero, size_sentences = _size_and_zero(cell, records, conditions.same_cell)
+    branches = [discharge_branch(start, data) for data in records]
+    at_temperatures, temperature_sentences = with_temperatures(
+        start, [data for data, _ in branches], conditions.temperatures_degc
     )
     declared, start = start, with_activation(start)
-    telling = () if conditions.same_cell else tell_the_size(cell, records)
-    of_potentials = filter(None, (unlike(start, records[i]) for i in telling))
-    cut = [r.name for r, whole in zip(placed, records, strict=True) if r.time_s[0] > whole.time_s[0]]
+    full_discharges = () if conditions.same_cell else full_discharge_numbers(cell, records)
+    potential_sentences = filter(None, (other_materials_sentence(start, records[i]) for i in full_discharges))
+    cut_names = [
+        r.name for r, whole in zip(at_temperatures, records, strict=True) if r.time_s[0] > whole.time_s[0]
+    ]
     model_name = conditions.model or "espm"
-    ready = prepared(start, placed, conditions.soc0, model_name, conditions.same_cell, cut)
-    for one in ready:
+    prepared_records = prepared(
+        start, at_temperatures, conditions.soc0, model_name, conditions.same_cell, cut_names
+    )
+    for one in prepared_records:
         check_charge(start, one)
-    spectra, of_spectra = fitted_ones(start, conditions.spectra)
-    span = _span_k(start, ready, spectra)
-    on_case = any(r.kelvin is not None and measured_on_case(r.kelvin) for r in ready)
+    spectra, spectrum_sentences = fitted_spectra(start, conditions.spectra)
+    span = _span_k(start, prepared_records, spectra)
+    on_case = any(r.kelvin is not None and measured_on_case(r.kelvin) for r in prepared_records)
     start = with_interfaces(start, on_case)
     free = with_priors(free_parameters(start, span, conditions.same_cell, on_case), conditions.priors)
     energies = {f.name: (f.start, f.sd) for f in free if f.name.endswith("_energy")}
-    ageing = Ageing.of(ready, conditions.dates, conditions.as_of)
+    ageing = Ageing.of(prepared_records, conditions.dates, conditions.as_of)
     model = Model(
         start,
-        ready,
+        prepared_records,
         free,
         Shapes.over(start, span),
         zero,
@@ -288,17 +305,17 @@ def problem(
         spectra,
     )
     return model, (
-        *of_size,
-        *of_potentials,
+        *size_sentences,
+        *potential_sentences,
         *zero.sentences,
-        *(sentence for _, of_branch in kept for sentence in of_branch),
-        *of_temperature,
-        *(f"{name}: {OF_ROWS_LEFT_OUT}" for name in cut if conditions.soc0 is not None),
-        *_of_small_span(span, len(ready)),
-        *of_activation(declared, start, energies, [f.name for f in free if f.given]),
-        *(r.start.sentence for r in ready if not r.start.against_voltage),  # those are warnings
-        *of_spectra,
-        *map(hold_told, ready),
+        *(sentence for _, branch_sentences in branches for sentence in branch_sentences),
+        *temperature_sentences,
+        *(f"{name}: {OF_ROWS_LEFT_OUT}" for name in cut_names if conditions.soc0 is not None),
+        *_small_span_sentences(span, len(prepared_records)),
+        *activation_sentences(declared, start, energies, [f.name for f in free if f.given]),
+        *(r.start.sentence for r in prepared_records if not r.start.against_voltage),  # those are warnings
+        *spectrum_sentences,
+        *map(fitted_rows_sentence, prepared_records),
         *ageing.sentences,
     )
 
@@ -312,7 +329,7 @@ def _checked_records(
     """
     if not records:
         raise DataError("give at least one record to calibrate with.")
-    named = named_apart(records, {"temperature": conditions.temperatures_degc, "date": conditions.dates})
+    named = uniquely_named(records, {"temperature": conditions.temperatures_degc, "date": conditions.dates})
     for record in named:
         check_voltage(cell, record)
         if not record.current_a.any():
@@ -322,28 +339,32 @@ def _checked_records(
     return named
 
 
-def _sized(cell: Cell, records: Sequence[Measurement], same_cell: bool) -> tuple[Cell, Zero, tuple[str, ...]]:
+def _size_and_zero(
+    cell: Cell, records: Sequence[Measurement], same_cell: bool
+) -> tuple[Cell, Zero, tuple[str, ...]]:
     """(cell of the size that the records indicate, zero offset of their cycler's current, sentences on the size).
 
     Each needs the other: a first size gives the offset, and currents without the offset give the final size.
     """
     if same_cell:
         return cell, zero_of(cell, records), ()
-    roughly, _ = sized(cell, records)
+    roughly, _ = scaled_to_discharge(cell, records)
     zero = zero_of(roughly, records)
-    start, sentences = sized(cell, [zero.taken_out(r, roughly.nominal_capacity_ah) for r in records])
+    start, sentences = scaled_to_discharge(
+        cell, [zero.subtracted_from(r, roughly.nominal_capacity_ah) for r in records]
+    )
     return start, zero, sentences
 
 
-def _of_size(cell: Cell, sized_cell: Cell) -> Cell:
+def _start_file_at_size(cell: Cell, sized_cell: Cell) -> Cell:
     """The start file at the size that the records indicate, without the typical values that a fit fills in. The limits
     beyond which a record contradicts its temperature were set with such files."""
-    return of_area(
+    return with_area_factor(
         cell, sized_cell.electrode_area_m2 / cell.electrode_area_m2, sized_cell.nominal_capacity_ah
     )
 
 
-def _of_small_span(span_k: float, n_records: int) -> tuple[str, ...]:
+def _small_span_sentences(span_k: float, n_records: int) -> tuple[str, ...]:
     """A sentence where the records span too few kelvin to determine the temperature dependence; else empty."""
     if span_k > SPAN_K:
         return ()
@@ -355,16 +376,19 @@ def _of_small_span(span_k: float, n_records: int) -> tuple[str, ...]:
     return (f"{apart}: activation energies and entropy stay as they are.",)
 
 
-def _descended(told: _Told, evaluations: int, x0: Array) -> Array:
-    """Working vector at which bounded least squares ends."""
-    model = told.model
+def _descend(reporting: _ReportingModel, evaluations: int, x0: Array) -> Array:
+    """Working vector at which bounded least squares ends.
+
+    Raises FitError where the model cannot be simulated at x0.
+    """
+    model = reporting.model
     if not np.isfinite(model.residual(x0)).all():
         raise FitError(
             f"{model.cell.name}: the start file cannot be simulated on these records; start from a cell of the same "
             "chemistry."
         )
     found = least_squares(
-        told.residual, x0, told.jacobian, (model.low, model.high), ftol=GAIN, xtol=1e-5, gtol=1e-8,
+        reporting.residual, x0, reporting.jacobian, (model.low, model.high), ftol=GAIN, xtol=1e-5, gtol=1e-8,
         max_nfev=evaluations,
     )  # fmt: skip
     return np.asarray(found.x, dtype=float)
@@ -378,7 +402,7 @@ STATE_WORDS: dict[FitState, str] = {
 """State of the cell -> what notes call it."""
 
 
-def _ran_out(model: Model, states: Mapping[FitState, tuple[Cell, Array]]) -> tuple[str, ...]:
+def _ran_out_sentences(model: Model, states: Mapping[FitState, tuple[Cell, Array]]) -> tuple[str, ...]:
     """A sentence for each record on which the cell runs out of lithium or salt in one of the states."""
     out = []
     for i, record in enumerate(model.records):
@@ -388,7 +412,7 @@ def _ran_out(model: Model, states: Mapping[FitState, tuple[Cell, Array]]) -> tup
     return tuple(out)
 
 
-def _of_priors(model: Model, x: Array) -> tuple[str, ...]:
+def _contradicted_prior_sentences(model: Model, x: Array) -> tuple[str, ...]:
     """A sentence for each prior that was given and that the records contradict."""
     out = []
     for free, z in zip(model.free, x, strict=False):
@@ -400,7 +424,7 @@ def _of_priors(model: Model, x: Array) -> tuple[str, ...]:
     return tuple(out)
 
 
-def _of_own(model: Model, x: Array) -> tuple[str, ...]:
+def _own_parameter_sentences(model: Model, x: Array) -> tuple[str, ...]:
     """Sentences on the parameters of single records: offset of the current, active material and silicon."""
     out = []
     zero_a = model.zero.at(float(x[model.layout.zero]))
@@ -428,6 +452,7 @@ def _of_own(model: Model, x: Array) -> tuple[str, ...]:
 
 
 def _degc(record: Prepared) -> float | None:
+    """Mean temperature of a record, degC; None where it has none."""
     return None if record.mean_kelvin is None else record.mean_kelvin - ZERO_CELSIUS_K
 
 

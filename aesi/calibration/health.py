@@ -8,7 +8,7 @@ from dataclasses import astuple, dataclass, fields
 import numpy as np
 
 from aesi.calibration.result import NINETY_FIVE, Calibration
-from aesi.calibration.rewind import rewound
+from aesi.calibration.written_cell import written_cell
 from aesi.constants import MILLI
 from aesi.physics.cell import Cell
 
@@ -55,13 +55,13 @@ def health_of(cell: Cell) -> Health:
 def health_intervals(found: Calibration) -> Mapping[str, tuple[float, float]]:
     """Quantity -> its 95 % interval, by linear propagation of the fit's covariance. A parameter on an upper bound has
     its slope taken towards the inside."""
-    at = np.array(astuple(health_of(rewound(found.model, found.x))))
+    at = np.array(astuple(health_of(written_cell(found.model, found.x))))
     slopes = np.zeros((len(at), len(found.x)))
     for j in range(len(found.x)):
         h = STEP if found.x[j] + STEP <= found.model.high[j] else -STEP
         there = found.x.copy()
         there[j] += h
-        slopes[:, j] = (np.array(astuple(health_of(rewound(found.model, there)))) - at) / h
+        slopes[:, j] = (np.array(astuple(health_of(written_cell(found.model, there)))) - at) / h
     reach = NINETY_FIVE * np.sqrt(np.einsum("ij,jk,ik->i", slopes, found.covariance, slopes))
     middle = np.array(astuple(health_of(found.cell)))
     return {

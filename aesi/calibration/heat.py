@@ -65,29 +65,29 @@ class HeatFit:
         )
 
 
-def with_heat(cell: Cell, records: Sequence[Prepared]) -> tuple[Cell, tuple[str, ...]]:
+def with_fitted_heat(cell: Cell, records: Sequence[Prepared]) -> tuple[Cell, tuple[str, ...]]:
     """(cell with its thermal data fitted, sentences). The same cell object is returned where no record determines the
     heat, or where the file declares no volume."""
     warming = [r for r in records if r.kelvin is not None and float(np.ptp(r.kelvin)) > LEAST_RISE_K]
     declared = cell.heat_capacity_j_k
     if not warming or declared is None or cell.surface_area_m2 is None or cell.specific_heat_j_kg_k is None:
         return cell, ()
-    telling = (
+    explained = (
         warming if _losses_explain(cell, warming) else [r for r in warming if _losses_explain(cell, [r])]
     )
-    mute = [r.name for r in warming if r not in telling]
+    unexplained = [r.name for r in warming if r not in explained]
     notes = (
         (
-            f"heat: the losses of the cell do not explain the temperature of {', '.join(mute)}; it is not used.",
+            f"heat: the losses of the cell do not explain the temperature of {', '.join(unexplained)}; it is not used.",
         )
-        if mute
+        if unexplained
         else ()
     )
-    if not telling:
+    if not explained:
         return cell, notes
-    fit = fitted(cell, telling, declared)
+    fit = fit_heat(cell, explained, declared)
     specific = cell.specific_heat_j_kg_k * fit.heat_capacity_j_k / declared
-    changed = replace(_cooled(cell, fit.conductance_w_k), specific_heat_j_kg_k=specific)
+    changed = replace(_with_conductance(cell, fit.conductance_w_k), specific_heat_j_kg_k=specific)
     return changed, (fit.sentence, *notes)
 
 
@@ -95,7 +95,7 @@ def _losses_explain(cell: Cell, records: Sequence[Prepared]) -> bool:
     """True where the losses explain the temperatures and the surroundings alone do not, with plausible thermal data."""
     declared = cell.heat_capacity_j_k
     assert declared is not None
-    fit, by_surroundings = (fitted(cell, records, declared, losses=losses) for losses in (True, False))
+    fit, by_surroundings = (fit_heat(cell, records, declared, losses=losses) for losses in (True, False))
     if not fit.rmse_k <= LOSSES_LEAVE * by_surroundings.rmse_k:
         return False
     found = {
@@ -105,7 +105,7 @@ def _losses_explain(cell: Cell, records: Sequence[Prepared]) -> bool:
     return all(low <= found[name] <= high for name, (low, high) in ((n, PARAMETERS[n].bounds) for n in found))
 
 
-def fitted(cell: Cell, records: Sequence[Prepared], start_j_k: float, *, losses: bool = True) -> HeatFit:
+def fit_heat(cell: Cell, records: Sequence[Prepared], start_j_k: float, *, losses: bool = True) -> HeatFit:
     """Least-squares fit to all records. Each record counts as one reading, since its errors are correlated.
 
     start_j_k : heat capacity at the start, J/K.  losses : False for a cell that releases no heat and only follows its
@@ -113,9 +113,10 @@ def fitted(cell: Cell, records: Sequence[Prepared], start_j_k: float, *, losses:
     """
     driven = [(r, heat_w(cell, r) if losses else np.zeros(len(r.rows))) for r in records]
 
-    def off(z: Array) -> Array:
+    def residual(z: Array) -> Array:
+        # The logarithms of both thermal values, then the surroundings of each record.
         capacity, conductance = start_j_k * np.exp(z[0]), TYPICAL_W_K * np.exp(z[1])
-        through = _cooled(cell, conductance).conductance_w_k
+        through = _with_conductance(cell, conductance).conductance_w_k
         assert through is not None
         share = through / conductance
         parts = []
@@ -123,13 +124,13 @@ def fitted(cell: Cell, records: Sequence[Prepared], start_j_k: float, *, losses:
             assert record.kelvin is not None
             ambient = record.kelvin[0] + SURROUNDINGS_UNIT * AMBIENT_SD_K * shift
             winding = temperature_k(record.rows.time_s, watts, record.kelvin[0], ambient, capacity, through)
-            course = ambient + share * (winding - ambient)
-            parts.append((course - record.kelvin) / READING_K / len(course) ** 0.5)
+            case_k = ambient + share * (winding - ambient)
+            parts.append((case_k - record.kelvin) / READING_K / len(case_k) ** 0.5)
         return np.concatenate([*parts, SURROUNDINGS_UNIT * z[2:]])
 
-    z = least_squares(off, np.zeros(2 + len(driven)), loss="soft_l1").x
+    z = least_squares(residual, np.zeros(2 + len(driven)), loss="soft_l1").x
     rows = sum(len(watts) for _, watts in driven)
-    errors = off(z)[:rows]
+    errors = residual(z)[:rows]
     counts = np.concatenate([np.full(len(w), len(w) ** 0.5) for _, w in driven])
     rmse = rms(errors * counts * READING_K)
     return HeatFit(
@@ -140,8 +141,8 @@ def fitted(cell: Cell, records: Sequence[Prepared], start_j_k: float, *, losses:
     )
 
 
-def _cooled(cell: Cell, conductance_w_k: float) -> Cell:
-    """The cell with this conductance from its case to the surroundings."""
+def _with_conductance(cell: Cell, conductance_w_k: float) -> Cell:
+    """The cell with this conductance from its case to the surroundings, W/K; it has a surface."""
     assert cell.surface_area_m2 is not None
     return replace(cell, heat_transfer_w_m2_k=conductance_w_k / cell.surface_area_m2)
 
@@ -166,7 +167,10 @@ def heat_w(cell: Cell, record: Prepared) -> Array:
 def temperature_k(
     time_s: Array, watts: Array, start_k: float, ambient_k: float, capacity_j_k: float, conductance_w_k: float
 ) -> Array:
-    """(n,) K of one lump, exact for heat that is constant since the row before."""
+    """(n,) K of one lump, exact for heat that is constant since the row before.
+
+    watts : (n,) W released.  start_k, ambient_k : of the lump at the first row, and of its surroundings, K.
+    """
     out = np.empty_like(time_s)
     out[0] = start_k
     decay = np.exp(-conductance_w_k / capacity_j_k * np.diff(time_s))

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from aesi.calibration.ageing import LOADED_SD, SLOW_SD, Ageing
-from aesi.calibration.parameters import Free, moved
+from aesi.calibration.parameters import FitParameter, with_parameters
 from aesi.calibration.records.prepared import Prepared
 from aesi.calibration.records.spectra import FittedSpectra
 from aesi.calibration.records.zero import Zero
@@ -111,7 +111,7 @@ class Model:
         self,
         cell: Cell,
         records: tuple[Prepared, ...],
-        free: tuple[Free, ...],
+        free: tuple[FitParameter, ...],
         shapes: Shapes,
         zero: Zero,
         ageing: Ageing,
@@ -132,7 +132,7 @@ class Model:
         self.low[self.layout.ages] = -self.high[self.layout.ages]
         self.simulations = 0
 
-    def take_heat_of(self, found: Cell) -> None:
+    def set_thermal_data(self, found: Cell) -> None:
         """Set the heat capacity and the conductance to the surroundings of the start cell to those of `found`."""
         self.cell = replace(
             self.cell,
@@ -143,7 +143,7 @@ class Model:
     def cell_at(self, x: Array) -> Cell:
         """The cell with the global parameters of a working vector."""
         values = {f.name: f.value(float(z)) for f, z in zip(self.free, x, strict=False)}
-        changed = moved(self.cell, values, self.ageing.dated)
+        changed = with_parameters(self.cell, values, self.ageing.dated)
         return self.shapes.on(changed, x[self.layout.shapes])
 
     def material(self, index: int, x: Array) -> float:
@@ -165,14 +165,14 @@ class Model:
 
         more : factor on the active material that its cell has.
         """
-        return self._solved(index, cell, x, more)[0]
+        return self._simulated(index, cell, x, more)[0]
 
     def ran_out_s(self, index: int, cell: Cell, x: Array) -> float | None:
         """Time at which a record's simulation runs out of lithium or salt, s; None where it does not."""
-        at = self._solved(index, cell, x, 1.0)[1]
+        at = self._simulated(index, cell, x, 1.0)[1]
         return None if at < 0 else float(self.records[index].rows.time_s[at])
 
-    def _solved(self, index: int, cell: Cell, x: Array, more: float) -> tuple[Array, int]:
+    def _simulated(self, index: int, cell: Cell, x: Array, more: float) -> tuple[Array, int]:
         """(rows of a record's simulation, number of the first row without lithium or salt, -1 for none)."""
         self.simulations += 1
         record = self.records[index]

@@ -31,10 +31,12 @@ COURSE_POINTS = 65
 
 
 @dataclass(frozen=True)
-class Free:
-    """One free scalar: start value (1 for a factor on the start file's value), prior standard deviation, unit, source.
+class FitParameter:
+    """One parameter that a fit moves.
 
-    factor : True where the standard deviation is that of the natural logarithm.  given : True for a user's prior.
+    start : value at the start, 1 for a factor on the start file's value.  sd : standard deviation of the prior about
+    it.  source : of the prior.  factor : True where `sd` is that of the natural logarithm.  low, high : bounds of the
+    value.  given : True for a user's prior.
     """
 
     name: str
@@ -120,7 +122,7 @@ HALF_CELLS = "convention: cells of one chemistry are balanced alike within a ten
 
 def free_parameters(
     cell: Cell, span_k: float, same_cell: bool = False, on_case: bool = False
-) -> tuple[Free, ...]:
+) -> tuple[FitParameter, ...]:
     """The parameters that a fit moves, for records whose temperatures span `span_k` (K).
 
     Activation energies are free where the records tell them; records at one temperature do not, and they stay.
@@ -132,33 +134,33 @@ def free_parameters(
     n_full, p_full = cell.negative.theta_max, cell.positive.theta_min
     most, least = max(FULLEST, n_full), min(1.0 - FULLEST, p_full)  # what a file has is what a cell may have
     out = [
-        Free("negative.capacity", 1.0, 0.10, "factor", HALF_CELLS, True),
-        Free("positive.capacity", 1.0, 0.10, "factor", HALF_CELLS, True),
-        Free("negative.full_stoichiometry", n_full, full["negative"], "1", HALF_CELLS, low=0.0, high=most),
-        Free("positive.full_stoichiometry", p_full, full["positive"], "1", HALF_CELLS, low=least, high=1.0),
-        Free("negative.diffusivity", 1.0, 1.2, "factor", RATES, True),
-        Free("positive.diffusivity", 1.0, 1.2, "factor", RATES, True),
-        Free("negative.rate", 1.0, RATE_SD, "factor", RATES, True),
-        Free("positive.rate", 1.0, RATE_SD, "factor", RATES, True),
-        Free("electrolyte.conductivity", 1.0, SALT_SD, "factor", TORTUOSITY, True),
-        Free("electrolyte.diffusivity", 1.0, SALT_SD, "factor", TORTUOSITY, True),
-        Free("contact.resistance", cell.contact_resistance_ohm, ohm, "ohm", CONTACTS, low=0.0, high=most_ohm),
+        FitParameter("negative.capacity", 1.0, 0.10, "factor", HALF_CELLS, True),
+        FitParameter("positive.capacity", 1.0, 0.10, "factor", HALF_CELLS, True),
+        FitParameter("negative.full_stoichiometry", n_full, full["negative"], "1", HALF_CELLS, low=0.0, high=most),
+        FitParameter("positive.full_stoichiometry", p_full, full["positive"], "1", HALF_CELLS, low=least, high=1.0),
+        FitParameter("negative.diffusivity", 1.0, 1.2, "factor", RATES, True),
+        FitParameter("positive.diffusivity", 1.0, 1.2, "factor", RATES, True),
+        FitParameter("negative.rate", 1.0, RATE_SD, "factor", RATES, True),
+        FitParameter("positive.rate", 1.0, RATE_SD, "factor", RATES, True),
+        FitParameter("electrolyte.conductivity", 1.0, SALT_SD, "factor", TORTUOSITY, True),
+        FitParameter("electrolyte.diffusivity", 1.0, SALT_SD, "factor", TORTUOSITY, True),
+        FitParameter("contact.resistance", cell.contact_resistance_ohm, ohm, "ohm", CONTACTS, low=0.0, high=most_ohm),
         *_courses(),
         *_interfaces(cell),
     ]  # fmt: skip
     k = cell.thermal_conductivity_w_m_k
     if on_case and k is not None and cell.winding_resistance_k_w:
-        out.append(Free("thermal.conductivity", k, CONDUCTIVITY_SD, "W/(m K)", CONDUCTIVITIES, True))
+        out.append(FitParameter("thermal.conductivity", k, CONDUCTIVITY_SD, "W/(m K)", CONDUCTIVITIES, True))
     if span_k > SPAN_K:
         out += [
-            Free(f"{part}.{rate}_energy", one.mean_j_mol, one.sd_j_mol, "J/mol", one.source, low=0.0)
+            FitParameter(f"{part}.{rate}_energy", one.mean_j_mol, one.sd_j_mol, "J/mol", one.source, low=0.0)
             for (part, rate), one in energy_priors(cell).items()
         ]
     return tuple(out)
 
 
-def _courses() -> Iterator[Free]:
-    """Factors at places over the stoichiometry of each electrode."""
+def _courses() -> Iterator[FitParameter]:
+    """Factors at the knots over the stoichiometry of each electrode: of diffusivity, rate and film."""
     for side in ("negative", "positive"):
         for what, sd, source in (
             ("diffusivity", COURSE_SD, COURSES),
@@ -166,18 +168,20 @@ def _courses() -> Iterator[Free]:
             ("film", FILM_COURSE_SD, FILM_COURSES),
         ):
             for place in range(len(PLACES)):
-                yield Free(course(side, what, place), 1.0, sd, "factor", source, True)
+                yield FitParameter(knot_name(side, what, place), 1.0, sd, "factor", source, True)
 
 
-def _interfaces(cell: Cell) -> Iterator[Free]:
+def _interfaces(cell: Cell) -> Iterator[FitParameter]:
     """Double layer and film of each electrode."""
     for side, electrode in (("negative", cell.negative), ("positive", cell.positive)):
         typical = electrode.double_layer_f_m2 or DOUBLE_LAYER_F_M2
-        yield Free(f"{side}.double_layer", typical, LAYER_SD, "F/m2", LAYERS, True)
-        yield Free(f"{side}.film", 1.0, FILM_SD, "factor", FILMS, True)
+        yield FitParameter(f"{side}.double_layer", typical, LAYER_SD, "F/m2", LAYERS, True)
+        yield FitParameter(f"{side}.film", 1.0, FILM_SD, "factor", FILMS, True)
 
 
-def with_priors(free: Sequence[Free], priors: Mapping[str, tuple[float, float]]) -> tuple[Free, ...]:
+def with_priors(
+    free: Sequence[FitParameter], priors: Mapping[str, tuple[float, float]]
+) -> tuple[FitParameter, ...]:
     """The parameters with what is known of some from elsewhere in place of their own priors.
 
     Raises InputError for a name that is none of them, and for a value that none of them has.
@@ -208,7 +212,7 @@ def _check_name(name: str, known: Collection[str]) -> None:
     )
 
 
-def _with_prior(one: Free, prior: Prior) -> Free:
+def _with_prior(one: FitParameter, prior: Prior) -> FitParameter:
     above = 0.0 < prior.value < np.inf
     if not (above if one.factor else one.low <= prior.value <= one.high) or not 0.0 < prior.sd < np.inf:
         most = "" if np.isinf(one.high) else f" to {one.high:.4g}"
@@ -217,11 +221,11 @@ def _with_prior(one: Free, prior: Prior) -> Free:
             f"the prior of {one.name}: {prior.value:g} with a standard deviation of {prior.sd:g} is not possible; the "
             f"value, in {one.unit}, is {between}, the deviation{OF_LOGARITHM if one.factor else ''} above 0."
         )
-    told = f"given: {prior.value:g}, standard deviation{OF_LOGARITHM if one.factor else ''} {prior.sd:g}"
-    return replace(one, start=prior.value, sd=prior.sd, source=told, given=True)
+    source = f"given: {prior.value:g}, standard deviation{OF_LOGARITHM if one.factor else ''} {prior.sd:g}"
+    return replace(one, start=prior.value, sd=prior.sd, source=source, given=True)
 
 
-def moved(cell: Cell, values: Mapping[str, float], ages: bool = False) -> Cell:
+def with_parameters(cell: Cell, values: Mapping[str, float], ages: bool = False) -> Cell:
     """The cell with global parameters replaced; the stoichiometry windows follow from its capacity in the new
     electrodes.
 
@@ -258,8 +262,8 @@ def moved(cell: Cell, values: Mapping[str, float], ages: bool = False) -> Cell:
     )
 
 
-def course(side: str, what: str, place: int) -> str:
-    """Name of a knot; `place` 0 is at the lowest stoichiometry of the window."""
+def knot_name(side: str, what: str, place: int) -> str:
+    """Name of the parameter of a knot.  place : index in `PLACES`, 0 at the lowest stoichiometry of the window."""
     return f"{side}.{what}_at_{round(100 * PLACES[place])}_percent"
 
 
@@ -301,7 +305,7 @@ def _electrode(electrode: Electrode, side: str, values: Mapping[str, float]) -> 
 
 def _course(electrode: Electrode, side: str, what: str, values: Mapping[str, float]) -> LookupTable | None:
     """Factor over stoichiometry, its logarithm a cubic spline through the knots; constant beyond the window."""
-    logs = np.log([values.get(course(side, what, k), 1.0) for k in range(len(PLACES))])
+    logs = np.log([values.get(knot_name(side, what, k), 1.0) for k in range(len(PLACES))])
     if not logs.any():
         return None
     places = electrode.theta_min + (electrode.theta_max - electrode.theta_min) * np.array(PLACES)
@@ -311,7 +315,7 @@ def _course(electrode: Electrode, side: str, what: str, values: Mapping[str, flo
 
 
 def _times(factor: LookupTable | None, base: Relation) -> Relation:
-    """A relation times a course; a constant stays a short table."""
+    """A relation times the factor of `_course`; the product with a constant is a table too."""
     if factor is None:
         return base
     if isinstance(base, Constant):

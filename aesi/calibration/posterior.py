@@ -34,34 +34,38 @@ SPREAD = 0.5
 
 @dataclass(frozen=True, eq=False)
 class PosteriorSamples:
-    """samples : (n, parameters) working coordinates.  intervals : 95 %, from them.  off : name -> width over that of
-    the linear interval.  accepted : share of proposals.  autocorrelation : steps, nan where the chain is too short.
-    dated : were losses between dated records among what is taken to be linear?
+    """Samples of the posterior of the global parameters, and what they say of the linear intervals.
+
+    samples : (n, parameters) working coordinates.  intervals : 95 %, from them.  width_ratios : name -> width over that
+    of the linear interval.  accepted : share of proposals.  autocorrelation : steps, nan where the chain is too short.
+    linearised_losses : whether losses between dated records were among what is taken to be linear.
     """
 
     samples: Array
     intervals: dict[str, Interval]
-    off: dict[str, float]
+    width_ratios: dict[str, float]
     accepted: float
     autocorrelation: float
-    dated: bool = False
+    linearised_losses: bool = False
 
     @property
     def sentence(self) -> str:
-        """How far the linear intervals were off, for a reader."""
-        widths = np.array(list(self.off.values()))
-        worst = max(self.off, key=lambda name: abs(np.log(self.off[name])))
+        """How much wider or narrower the linear intervals should have been, for a reader."""
+        widths = np.array(list(self.width_ratios.values()))
+        worst = max(self.width_ratios, key=lambda name: abs(np.log(self.width_ratios[name])))
         chain = (
             "the chain is too short to say how far its samples repeat one another; draw more"
             if not np.isfinite(self.autocorrelation)
             else f"a sample repeats itself over {self.autocorrelation:.0f} steps"
         )
         losses = (
-            "; losses between dated records are taken to be linear, which they are not" if self.dated else ""
+            "; losses between dated records are taken to be linear, which they are not"
+            if self.linearised_losses
+            else ""
         )
         return (
             f"posterior of {len(self.samples)} samples: intervals {np.median(widths):.2f} times as wide as the linear "
-            f"ones in the median, most off {worst} ({self.off[worst]:.2f} times); {chain}{losses}."
+            f"ones in the median, most off {worst} ({self.width_ratios[worst]:.2f} times); {chain}{losses}."
         )
 
 
@@ -77,7 +81,7 @@ def check_posterior(steps: int) -> None:
         )
 
 
-def sampled(found: Calibration, steps: int, seed: int = 0) -> PosteriorSamples:
+def sample_posterior(found: Calibration, steps: int, seed: int = 0) -> PosteriorSamples:
     """Draw from the posterior of the global parameters, `steps` of each walker.
 
     Raises what `check_posterior` raises.
@@ -103,8 +107,8 @@ def sampled(found: Calibration, steps: int, seed: int = 0) -> PosteriorSamples:
 
 
 def _log_probability(found: Calibration) -> Callable[[Array], float]:
-    """Logarithm of the posterior over the global parameters, (n,). All others are integrated out, linearised at the
-    fit."""
+    """The logarithm of the posterior as a function of the global parameters, (n,), up to a constant; -inf out of their
+    bounds. All others are integrated out, linearised at the fit."""
     model, n = found.model, len(found.model.free)
     weights = information_weights(model, found.x)
     linear = weights[:, None] * model.jacobian(found.x)[:, n:]
@@ -125,11 +129,11 @@ def _log_probability(found: Calibration) -> Callable[[Array], float]:
 
 
 def _summary(found: Calibration, samples: Array, accepted: float, autocorrelation: float) -> PosteriorSamples:
-    out, off = {}, {}
+    out, width_ratios = {}, {}
     for j, free in enumerate(found.model.free):
         low, middle, high = np.quantile(samples[:, j], [0.025, 0.5, 0.975])
         out[free.name] = Interval(
             free.value(float(middle)), free.value(float(low)), free.value(float(high)), free.unit, free.source
         )
-        off[free.name] = float((high - low) / (2.0 * NINETY_FIVE * np.sqrt(found.covariance[j, j])))
-    return PosteriorSamples(samples, out, off, accepted, autocorrelation, found.model.ageing.dated)
+        width_ratios[free.name] = float((high - low) / (2.0 * NINETY_FIVE * np.sqrt(found.covariance[j, j])))
+    return PosteriorSamples(samples, out, width_ratios, accepted, autocorrelation, found.model.ageing.dated)

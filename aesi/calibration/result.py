@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aesi.calibration.model import Model
-from aesi.calibration.parameters import Free
+from aesi.calibration.parameters import FitParameter
 from aesi.constants import MV_PER_V
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
@@ -47,10 +47,10 @@ class Interval:
     source: str
 
 
-def told_of_ends(
+def ends_sentences(
     costs: Sequence[float], ends: Sequence[Mapping[str, Interval]], of_file: int
 ) -> tuple[str, ...]:
-    """A sentence on how far apart the fits from several starts end; none for a single one.
+    """A sentence on how far apart the fits from several starts end; empty for a single start.
 
     costs : of each end, nats, the end that is taken first.  ends : the parameters there, with the intervals of that
     end.  of_file : index of the end that was reached from the start file.
@@ -97,7 +97,7 @@ class RecordError:
 
 
 @dataclass(frozen=True)
-class Open:
+class Undetermined:
     """A combination of parameters that the data do not determine.
 
     weights : (parameter, weight) in units of prior standard deviations.  narrowed : posterior over prior standard
@@ -129,7 +129,7 @@ class Calibration:
     cell: Cell
     declared: Cell
     parameters: Mapping[str, Interval]
-    undetermined: tuple[Open, ...]
+    undetermined: tuple[Undetermined, ...]
     at_bounds: tuple[str, ...]
     errors: tuple[RecordError, ...]
     capacities: Mapping[str, float]
@@ -168,7 +168,7 @@ class Calibration:
                 for e in self.errors
                 if e.after_v <= NOTABLY * e.before_v < e.simulated_v
             ),
-            *_stand_ins(self.model, self.x),
+            *_far_parameter_sentences(self.model, self.x),
         )
 
     def __repr__(self) -> str:
@@ -197,8 +197,8 @@ class Calibration:
         return Figure(bars, {"barmode": "group", "yaxis": {"title": {"text": "error, mV RMSE"}}})
 
 
-def _stand_ins(model: Model, x: Array) -> tuple[str, ...]:
-    """A sentence on the parameters that ended more than `FAR_SD` from their priors, if there are any."""
+def _far_parameter_sentences(model: Model, x: Array) -> tuple[str, ...]:
+    """A sentence on the parameters that ended more than `FAR_SD` from a prior of the literature; empty without any."""
     far = [
         f"{free.name} = {free.value(float(z)):.3g} {free.unit} ({abs(z):.1f} standard deviations "
         f"{'above' if z > 0.0 else 'below'} {free.start:.3g})"
@@ -249,7 +249,7 @@ def intervals(model: Model, x: Array, covariance: Array) -> dict[str, Interval]:
     return out
 
 
-def undetermined(model: Model, jacobian: Array) -> tuple[Open, ...]:
+def undetermined(model: Model, jacobian: Array) -> tuple[Undetermined, ...]:
     """Combinations of global parameters about which the records have less information than the priors.
 
     They are eigenvectors of the records' information matrix for the global parameters, with all others marginalised, in
@@ -270,7 +270,7 @@ def undetermined(model: Model, jacobian: Array) -> tuple[Open, ...]:
             order[0]
         ]  # with many parameters all may be small
         weights = tuple((model.free[j].name, float(vector[j])) for j in heavy)
-        out.append(Open(weights, float(1.0 / np.sqrt(1.0 + max(value, 0.0)))))
+        out.append(Undetermined(weights, float(1.0 / np.sqrt(1.0 + max(value, 0.0)))))
     return tuple(out)
 
 
@@ -285,5 +285,5 @@ def at_bounds(model: Model, x: Array) -> tuple[str, ...]:
     )
 
 
-def _is_zero(free: Free, z: float) -> bool:
+def _is_zero(free: FitParameter, z: float) -> bool:
     return abs(free.value(z)) < ROUND_OFF * free.sd

@@ -42,20 +42,21 @@ LONG_CHARGE = 0.3
 branch of a hysteresis."""
 
 
-def sized(cell: Cell, measurements: Sequence[Measurement]) -> tuple[Cell, tuple[str, ...]]:
-    """The cell with its area scaled to the charge of a full discharge among the measurements, if there is one."""
+def scaled_to_discharge(cell: Cell, measurements: Sequence[Measurement]) -> tuple[Cell, tuple[str, ...]]:
+    """(cell with its area scaled to the largest full discharge among the measurements, a sentence on that); the cell as
+    it is where there is none."""
     known = max((q for q in _full_discharges_ah(cell, measurements) if q is not None), default=None)
     if known is None:
         return cell, (size_assumed(cell, measurements),)
     factor = known / cell.capacity_ah
-    return of_area(cell, factor, known), (
+    return with_area_factor(cell, factor, known), (
         f"a full discharge took {known:.3f} Ah, and the start file declares {cell.capacity_ah:.3f} Ah: the fit starts "
         f"from an electrode area scaled by {factor:.3f}; the fitted capacity is given with the state of health.",
     )
 
 
-def of_area(cell: Cell, factor: float, nominal_ah: float) -> Cell:
-    """The cell with its area multiplied by a factor, and its contact resistance divided by it.
+def with_area_factor(cell: Cell, factor: float, nominal_ah: float) -> Cell:
+    """The cell with its electrode area multiplied by a factor, and its contact resistance divided by it.
 
     nominal_ah : its new nominal capacity, Ah.
     """
@@ -67,14 +68,16 @@ def of_area(cell: Cell, factor: float, nominal_ah: float) -> Cell:
     )
 
 
-def tell_the_size(cell: Cell, measurements: Sequence[Measurement]) -> tuple[int, ...]:
-    """The numbers of the measurements with a full discharge of the size that `sized` takes, or nearly."""
+def full_discharge_numbers(cell: Cell, measurements: Sequence[Measurement]) -> tuple[int, ...]:
+    """Numbers of the measurements that hold a full discharge of at least `NEAR_THE_SIZE` times the largest one, by
+    which the size of the cell is known."""
     charges = _full_discharges_ah(cell, measurements)
     known = max((q for q in charges if q is not None), default=0.0)
     return tuple(i for i, q in enumerate(charges) if q is not None and q >= NEAR_THE_SIZE * known)
 
 
 def _full_discharges_ah(cell: Cell, measurements: Sequence[Measurement]) -> list[float | None]:
+    """Charge of the largest full discharge of each measurement, Ah; None for one without."""
     return [_full_discharge_ah(cell, m) for m in measurements]
 
 
@@ -122,7 +125,7 @@ def with_activation(cell: Cell) -> Cell:
     )
 
 
-def of_activation(
+def activation_sentences(
     declared: Cell, taken: Cell, fitted: Mapping[str, tuple[float, float]], given: Collection[str] = ()
 ) -> tuple[str, ...]:
     """Sentences on the activation energies that a fit has, or starts from, and that the cell's file does not declare.
@@ -154,8 +157,8 @@ def of_activation(
     return tuple(said)
 
 
-def one_branch(cell: Cell, data: Measurement) -> tuple[Measurement, tuple[str, ...]]:
-    """(record without long charges before or after its discharge, a sentence where something was cut).
+def discharge_branch(cell: Cell, data: Measurement) -> tuple[Measurement, tuple[str, ...]]:
+    """(piece of the record without long charges before or after its main discharge, a sentence if something was cut).
 
     A model without hysteresis has one open-circuit potential: that of the discharge, where the data show both.
     """
@@ -163,10 +166,10 @@ def one_branch(cell: Cell, data: Measurement) -> tuple[Measurement, tuple[str, .
     flows = flowing(data.current_a)
     before = np.maximum.accumulate(np.where(flows, np.arange(len(data)), 0))
     charges = (step_ah < 0.0)[before]  # a rest belongs to what came before it
-    runs = _numbered(charges)
+    runs = _run_numbers(charges)
     moved_ah = np.bincount(runs, weights=step_ah)
     long = moved_ah < -LONG_CHARGE * cell.capacity_ah
-    pieces = _numbered(long)
+    pieces = _run_numbers(long)
     discharged_ah = np.bincount(pieces, weights=np.where(long, 0.0, moved_ah))
     best = int(np.argmax(discharged_ah))
     if not long.any() or discharged_ah[best] < LONG_CHARGE * cell.capacity_ah:
@@ -187,8 +190,8 @@ def flowing(current_a: Array) -> BoolArray:
     return size > OPEN_SHARE * size.max()
 
 
-def _numbered(flags: BoolArray) -> Array:
-    """(n,) number of the run of equal flags of each element."""
+def _run_numbers(flags: BoolArray) -> Array:
+    """(n,) number, from 0, of the run of equal flags (n,) that each row is in."""
     return np.cumsum(np.diff(flags.astype(int), prepend=int(flags[0])) != 0)
 
 
@@ -199,7 +202,7 @@ def _full_discharge_ah(cell: Cell, data: Measurement) -> float | None:
     # A full cell of a flat potential falls by more at rest; where it is being charged, any state may be as high.
     charged = data.current_a < -OPEN_SHARE * np.abs(data.current_a).max()
     full |= ~charged & (data.voltage_v >= OpenCircuit(cell).lingers_from_v)
-    taken_ah = data.discharged_ah(hold_counted(data))
+    taken_ah = data.discharged_ah(charge_hold(data))
     most: float | None = None
     position = 0
     while full[position:].any():
@@ -238,10 +241,10 @@ def _emptied_ah(cell: Cell, data: Measurement, taken_ah: Array, start: int, stop
     if taken_ah[end] - taken_ah[start] < ALL_OF_IT * (taken_ah[start:stop].max() - taken_ah[start]):
         return None
     # One sum, not the last of running ones: where a descent ends moves by millivolts with the last digit of this.
-    return float(data.steps_as(hold_counted(data))[start:end].sum()) / SECONDS_PER_HOUR
+    return float(data.steps_as(charge_hold(data))[start:end].sum()) / SECONDS_PER_HOUR
 
 
-def hold_counted(data: Measurement) -> Hold:
+def charge_hold(data: Measurement) -> Hold:
     """The hold for the charge of a record and for its thinned rows: the declared one; else that of a logger, which
     makes no difference for dense rows."""
     return data.hold or "backward"

@@ -54,6 +54,7 @@ class DataSet:
 
 
 def _about_energy(name: str, path: str, sha256: str) -> Remote:
+    """A file of the repository of About:Energy, by its path there."""
     columns = ABOUT_ENERGY_COLUMNS if name.endswith(".csv") else None
     return Remote(name, ABOUT_ENERGY + path, sha256, columns, "charge-positive")
 
@@ -226,19 +227,19 @@ def get(name: str, out: Path | None = None) -> Path:
         return here if out is None else _copy(here, out)
     if not one.files:
         raise DataError(
-            f"{name} cannot be fetched by a program. {one.how} Source: {one.source}.{_named_in_vain(name)}"
+            f"{name} cannot be fetched by a program. {one.how} Source: {one.source}.{_own_folder_clause(name)}"
         )
     folder = _own_folder(name) if out is None else out
     try:
         for remote in one.files:
             fetch(remote, folder)
     except DataAway as error:
-        raise DataAway(f"{error}{_named_in_vain(name)}") from None
+        raise DataAway(f"{error}{_own_folder_clause(name)}") from None
     return folder
 
 
-def _named_in_vain(name: str) -> str:
-    """A sentence that the user's own folder lacks files of a set; '' where no such folder is named."""
+def _own_folder_clause(name: str) -> str:
+    """A sentence, with a blank before it, that the user's own folder lacks files of a set; '' where none is named."""
     own = os.environ.get(FOLDER_VARIABLE)
     if not own:
         return ""

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from aesi.data.channels.checks import Columns, Context, check_alive, check_finite, check_ranges, check_time
+from aesi.data.channels.checks import Columns, Context, check_constant, check_finite, check_ranges, check_time
 from aesi.data.channels.columns import QUANTITIES, REQUIRED, Mapped
-from aesi.data.channels.gaps import untold_charge, without_gaps
+from aesi.data.channels.gaps import ambiguous_charge_notes, without_gaps
 from aesi.data.channels.glitches import glitch_doubts, glitches
 from aesi.data.channels.implausible import check_scale, check_sign, check_signed
 from aesi.data.channels.load_columns import keep_rows, load_columns
 from aesi.data.channels.stamps import aligned, time_doubts
-from aesi.data.channels.stuck import check_dead, check_stuck, held_doubts
+from aesi.data.channels.stuck import check_stuck_current, check_stuck_voltage, held_doubts
 from aesi.data.channels.temperature import temperature_doubts
 from aesi.data.readers import open_table
 from aesi.data.readers.formats.format import Sign
@@ -143,9 +143,9 @@ def _examine(
     check_time(data["time_s"], context)
     check_ranges(data, context)
     data, context = without_gaps(data, context, notes)
-    check_alive(data, context)
+    check_constant(data, context)
     notes.extend(time_doubts(data))
-    notes.extend(untold_charge(data))
+    notes.extend(ambiguous_charge_notes(data))
     notes.extend(temperature_doubts(data, context))
     found = glitches(data)
     notes.extend(glitch_doubts(found, data, context))
@@ -161,11 +161,11 @@ def _examine(
 
 def _examine_course(data: Columns, context: Context, header: Sequence[str], sign_advice: str) -> None:
     """Check current, voltage and time against each other."""
-    check_dead(data, context)
+    check_stuck_current(data, context)
     check_scale(data, context)
     check_signed(data, context, header)
     check_sign(data, context, sign_advice)
-    check_stuck(data, context)
+    check_stuck_voltage(data, context)
 
 
 def _sign_advice(mapped: Mapped, reading: Reading) -> str:

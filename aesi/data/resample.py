@@ -123,7 +123,7 @@ def to_even(measurement: Measurement, dt_s: float, hold: Hold = "backward") -> M
     if is_even(time, dt_s):
         return measurement
     note = f"Resampled from {len(time):,} rows to {{rows:,}} rows every {dt_s:g} s: {{how}}."
-    return _onto(measurement, even_stamps(time, dt_s), note, hold)
+    return _resampled_to(measurement, even_stamps(time, dt_s), note, hold)
 
 
 def decimate(measurement: Measurement, max_rows: int) -> Measurement:
@@ -158,25 +158,26 @@ def in_runs(measurement: Measurement, run: int) -> Measurement:
     note += ", over which the current is constant from here on" if straight else ""
     note += f"; {last} left out." if left else "."
     stamps = measurement.time_s[::run]
-    few = _onto(measurement, stamps, note, "backward")
+    few = _resampled_to(measurement, stamps, note, "backward")
     if not straight:
         return few
     current = BetweenStamps(measurement.time_s, stamps).linear(measurement.current_a)
     return replace(few, current_a=current, hold="backward")
 
 
-def _onto(measurement: Measurement, stamps: Array, note: str, hold: Hold) -> Measurement:
+def _resampled_to(measurement: Measurement, stamps: Array, note: str, hold: Hold) -> Measurement:
+    """The measurement at other stamps (m,), s.  note : with places for `rows` and `how`.  hold : of its current."""
     intervals = BetweenStamps(measurement.time_s, stamps)
     along, voltage = intervals.as_voltage, AVERAGES if intervals.dense else AT_STAMPS
     charge, current = (intervals.held, AVERAGES) if hold == "backward" else (along, voltage)
     temperature = measurement.temperature_degc
     how = f"current and voltage {voltage}" if current == voltage else f"current {current}, voltage {voltage}"
-    told = f"{measurement.name}: {note.format(rows=len(stamps), how=how)}"
+    note = f"{measurement.name}: {note.format(rows=len(stamps), how=how)}"
     return replace(
         measurement,
         time_s=stamps,
         current_a=charge(measurement.current_a),
         voltage_v=along(measurement.voltage_v),
         temperature_degc=None if temperature is None else along(temperature),
-        notes=(*measurement.notes, told),
+        notes=(*measurement.notes, note),
     )

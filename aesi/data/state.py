@@ -22,10 +22,10 @@ REST_SHARE = 0.01
 larger current makes the word for rest doubtful, which a note says. A convention."""
 
 
-def signs(
+def directions(
     words: Sequence[str], current_a: Array, given: Mapping[str, Direction], file: str, column: str
 ) -> tuple[Array, str]:
-    """(n,) 1 on discharge, -1 on charge, 0 at rest, and a note on the meaning that each word was given.
+    """((n,) 1 on discharge, -1 on charge, 0 at rest; a note on the meaning that each word was given).
 
     words : (n,) cells of the column.  current_a : (n,) A, of any sign.  given : word -> direction, as the user states.
     Raises DataError for a word of unknown meaning in a row with a current.
@@ -50,15 +50,15 @@ def signs(
             )
         result[rows] = {"discharge": 1.0, "charge": -1.0}.get(meaning or "", 0.0)
         taken[meaning or "rest"].append(word or "(empty)")
-    told = "; ".join(f"{', '.join(names)} as {meaning}" for meaning, names in taken.items() if names)
-    return result, f"The sign of the current was taken from column {column!r}: {told}."
+    meanings = "; ".join(f"{', '.join(names)} as {meaning}" for meaning, names in taken.items() if names)
+    return result, f"The sign of the current was taken from column {column!r}: {meanings}."
 
 
-def turned(current_a: Array, way: Array, time_s: Array, signed: bool) -> tuple[Array, list[str]]:
-    """(n,) A, discharge positive: the magnitudes of a current with the directions of a column. Also notes on changes
-    beyond a sign.
+def with_directions(current_a: Array, way: Array, time_s: Array, signed: bool) -> tuple[Array, list[str]]:
+    """((n,) A, discharge positive: the magnitudes of a current with the directions of a column; notes on changes beyond
+    a sign).
 
-    current_a : (n,) A, magnitudes, or with its own sign where `signed`.  way : (n,) directions from `signs`.
+    current_a : (n,) A, magnitudes, or with its own sign where `signed`.  way : (n,) from `directions`.
     time_s : (n,) s.  A signed current keeps its value at rest, with its sign changed as elsewhere; magnitudes at rest
     become 0.
     """
@@ -72,19 +72,22 @@ def turned(current_a: Array, way: Array, time_s: Array, signed: bool) -> tuple[A
         against = own * result < 0
         if np.any(against):
             notes.append(
-                f"{_flow(against, current_a, time_s)} the column says another direction than the current's own sign; "
-                "the column was followed."
+                f"{_flow_clause(against, current_a, time_s)} the column says another direction than the current's own "
+                "sign; the column was followed."
             )
         if np.any(flows):
-            notes.append(f"{_flow(flows, current_a, time_s)} flows at rest; it was kept with its own sign.")
+            notes.append(
+                f"{_flow_clause(flows, current_a, time_s)} flows at rest; it was kept with its own sign."
+            )
     elif np.any(flows):
         notes.append(
-            f"{_flow(flows, current_a, time_s)} flows at rest, in no direction that is told; it was taken as 0 A."
+            f"{_flow_clause(flows, current_a, time_s)} flows at rest, in no direction that is told; it was taken as 0 "
+            "A."
         )
     return result, notes
 
 
-def _flow(rows: AnyArray, current_a: Array, time_s: Array) -> str:
+def _flow_clause(rows: AnyArray, current_a: Array, time_s: Array) -> str:
     """'In 1,200 rows up to 0.04 A (22.2 mAh in all)': current and charge of some rows, each since the row before it."""
     sizes = np.abs(current_a[rows])
     spans_s = np.maximum(np.diff(time_s, prepend=time_s[0]), 0.0)[rows]
@@ -93,7 +96,7 @@ def _flow(rows: AnyArray, current_a: Array, time_s: Array) -> str:
     return f"In {count} up to {np.max(sizes):.4g} A ({charge_mah:.3g} mAh in all)"
 
 
-def both_ways(words: Sequence[str], current_a: Array) -> bool:
+def has_both_directions(words: Sequence[str], current_a: Array) -> bool:
     """True where known words state charge in some rows with a current, and discharge in others.
 
     words : (n,) cells of a column.  current_a : (n,) A, of any sign.
@@ -105,6 +108,7 @@ def both_ways(words: Sequence[str], current_a: Array) -> bool:
 
 
 def _meaning(word: str) -> Direction | None:
+    """The direction that a word of a cycler states; None for an unknown word."""
     if DISCHARGE.search(word):
         return "discharge"
     if CHARGE.search(word):

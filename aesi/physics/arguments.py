@@ -21,7 +21,7 @@ def check_cell(cell: object) -> None:
     """Raises InputError where `cell` is not a Cell (but the path of its file, for example)."""
     if not isinstance(cell, Cell):
         raise InputError(
-            f"cell is {_a(cell)}, not a Cell; read one from its file with aesi.Cell.from_bpx(path)."
+            f"cell is {_described(cell)}, not a Cell; read one from its file with aesi.Cell.from_bpx(path)."
         )
 
 
@@ -29,13 +29,13 @@ def checked_effects(effects: object) -> tuple[ActiveEffect, ...]:
     """The effects as a tuple.  Raises InputError for a name, an effect without values, or no collection at all."""
     if isinstance(effects, str | Effect | ActiveEffect) or not isinstance(effects, Iterable):
         raise InputError(
-            f"effects is {_a(effects)}; give a list of them, as in effects=[{_activation(effects)}]."
+            f"effects is {_described(effects)}; give a list of them, as in effects=[{_activation_code(effects)}]."
         )
     given = tuple(effects)
     for effect in given:
         if not isinstance(effect, ActiveEffect):
             raise InputError(
-                f"effects holds {_a(effect)}, which has no values yet; give {_activation(effect)}, with "
+                f"effects holds {_described(effect)}, which has no values yet; give {_activation_code(effect)}, with "
                 "CATALOGUE from aesi.physics.effects."
             )
     return given
@@ -80,12 +80,14 @@ def check_temperature(temperature_degc: Any, name: str = "temperature_degc") -> 
         )
 
 
-def _activation(effect: object) -> str:
+def _activation_code(effect: object) -> str:
+    """What a user would write in a list of effects for `effect`."""
     if isinstance(effect, ActiveEffect):
         return "effect"
     name = effect.id if isinstance(effect, Effect) else effect if isinstance(effect, str) else "name"
     return f"CATALOGUE[{name!r}].activate()"
 
 
-def _a(value: object) -> str:
+def _described(value: object) -> str:
+    """A wrong argument in words: its text, or its type."""
     return f"the text {value!r}" if isinstance(value, str) else f"an object of type {type(value).__name__}"

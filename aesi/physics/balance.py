@@ -41,7 +41,9 @@ def without_lithium(cell: Cell, fraction: float) -> Cell:
     sizes = _sizes_ah(cell)
     q_n, q_p = sizes
     lithium = q_n * cell.negative.theta_max + q_p * cell.positive.theta_min - fraction * cell.capacity_ah
-    full, empty = (_at_rest(cell.balance, soc, sizes, lithium, cell.name) for soc in (1.0, 0.0))
+    full, empty = (
+        _stoichiometries_at_rest(cell.balance, soc, sizes, lithium, cell.name) for soc in (1.0, 0.0)
+    )
     return _with_windows(cell, full, empty)
 
 
@@ -61,8 +63,8 @@ def with_active_material(cell: Cell, negative: float, positive: float, lost_at_s
     lithium = q_n * x_n + q_p * x_p
     full = n.theta_max, p.theta_min
     if lost_at_soc != 1.0:
-        full = _at_rest(balance, 1.0, sizes, lithium, cell.name)
-    return _with_windows(aged, full, _at_rest(balance, 0.0, sizes, lithium, cell.name))
+        full = _stoichiometries_at_rest(balance, 1.0, sizes, lithium, cell.name)
+    return _with_windows(aged, full, _stoichiometries_at_rest(balance, 0.0, sizes, lithium, cell.name))
 
 
 def same_rest(declared: Cell, aged: Cell, soc: float) -> float:
@@ -75,18 +77,18 @@ def same_rest(declared: Cell, aged: Cell, soc: float) -> float:
     before, after = declared.balance, aged.balance
     if (before.window_n, before.window_p) == (after.window_n, after.window_p):
         return soc
-    return _same_rest(replace(after, window_n=before.window_n, window_p=before.window_p), after, soc)
+    return _soc_at_same_rest(replace(after, window_n=before.window_n, window_p=before.window_p), after, soc)
 
 
 @lru_cache(maxsize=REMEMBERED)
-def _same_rest(before: Balance, after: Balance, soc: float) -> float:
+def _soc_at_same_rest(before: Balance, after: Balance, soc: float) -> float:
     """State of charge of `after` where it rests as `before` does at `soc`."""
     voltage = before.rest_voltage_at(soc)
 
     def excess(z: float) -> float:
         return after.rest_voltage_at(z) - voltage
 
-    low, high = _range(after)
+    low, high = _aged_range(after)
     grid = np.linspace(low, high, GRID)
     above = after.rest_voltage_v(grid) >= voltage
     crossed = np.flatnonzero(above[1:] & ~above[:-1])  # a rest voltage rises with the charge
@@ -98,10 +100,10 @@ def _same_rest(before: Balance, after: Balance, soc: float) -> float:
 
 def aged_range(cell: Cell) -> tuple[float, float]:
     """States of charge at which both electrodes are within (0, 1), at most 5 % beyond the windows."""
-    return _range(cell.balance)
+    return _aged_range(cell.balance)
 
 
-def _range(balance: Balance) -> tuple[float, float]:
+def _aged_range(balance: Balance) -> tuple[float, float]:
     low, high = -SOC_BEYOND, 1.0 + SOC_BEYOND
     (empty_n, full_n), (empty_p, full_p) = balance.window_n, balance.window_p
     span_n, span_p = full_n - empty_n, empty_p - full_p
@@ -116,7 +118,7 @@ def _sizes_ah(cell: Cell) -> tuple[float, float]:
 
 
 @lru_cache(maxsize=REMEMBERED)
-def _at_rest(
+def _stoichiometries_at_rest(
     declared: Balance, soc: float, sizes_ah: tuple[float, float], lithium_ah: float, name: str
 ) -> tuple[float, float]:
     """Stoichiometries (negative, positive) of electrodes of these sizes (Ah) that hold `lithium_ah` together and have
@@ -138,11 +140,11 @@ def _at_rest(
 
     low = max(EDGE, (lithium_ah - q_p * (1.0 - EDGE)) / q_n)
     high = min(1.0 - EDGE, (lithium_ah - q_p * EDGE) / q_n)
-    theta_n = _root(excess, on_grid, low, high, name)
+    theta_n = _increasing_root(excess, on_grid, low, high, name)
     return theta_n, (lithium_ah - q_n * theta_n) / q_p
 
 
-def _root(
+def _increasing_root(
     excess: Callable[[float], float], on_grid: Callable[[Array], Array], low: float, high: float, name: str
 ) -> float:
     """Root of an increasing function, or the nearer end of the interval; a grid narrows the bracket in one evaluation.

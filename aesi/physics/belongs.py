@@ -152,11 +152,11 @@ def check_measured(cell: Cell, records: Sequence[Measurement], known: Collection
     another capacity, the file's potentials are wrong, which a fit corrects. All records are allowed the same deviation,
     except records without a temperature for which cold would explain it.
     """
-    slack = Slack()
+    slack = CapacitySlack()
     for number in known:
         record = records[number]
-        if not (record.temperature_degc is None and _of_the_cold(cell, record)):
-            slack = slack.with_what(cell, record)
+        if not (record.temperature_degc is None and _fits_if_cold(cell, record)):
+            slack = slack.widened_to(cell, record)
     for record in records:
         _check_window(cell, record)
         check_voltage(cell, record)
@@ -165,22 +165,22 @@ def check_measured(cell: Cell, records: Sequence[Measurement], known: Collection
 
 
 @dataclass(frozen=True)
-class Slack:
-    """Deviation of the capacity bounds from a known capacity, caused by wrong potentials in a file.
+class CapacitySlack:
+    """How far capacity bounds may be off a known capacity, because the potentials of the file are wrong.
 
-    more, less : allowed ratios to the known capacity, more >= 1 and less <= 1.
+    more, less : ratios to the known capacity that bounds may require, more >= 1 and less <= 1.
     """
 
     more: float = 1.0
     less: float = 1.0
 
-    def with_what(self, cell: Cell, record: Measurement) -> Slack:
-        """The slack, widened to the bounds of a record whose cell has a known capacity."""
+    def widened_to(self, cell: Cell, record: Measurement) -> CapacitySlack:
+        """The slack that also admits the bounds of this record, whose cell has a known capacity."""
         bounds, known = capacity_bounds(cell, record), _capacity_ah(cell)
-        return Slack(max(self.more, bounds.low_ah / known), min(self.less, bounds.high_ah / known))
+        return CapacitySlack(max(self.more, bounds.low_ah / known), min(self.less, bounds.high_ah / known))
 
 
-def unlike(cell: Cell, record: Measurement) -> str:
+def other_materials_sentence(cell: Cell, record: Measurement) -> str:
     """A sentence where a full discharge gave the cell its capacity, but the voltages require another one by the file's
     potentials; '' otherwise."""
     if not np.all(np.isfinite(record.voltage_v)) or _capacity_fault(cell, record) is None:
@@ -261,16 +261,16 @@ def _pair(rows: IntArray, entry: int) -> tuple[int, int]:
 def _check_window(cell: Cell, record: Measurement) -> None:
     """Raises DataError for a first voltage below empty, and for a voltage at rest or on discharge (where it is even
     lower) above that of a full cell."""
-    calm = np.abs(record.current_a) < SMALL_C_RATE * cell.nominal_capacity_ah
+    nearly_at_rest = np.abs(record.current_a) < SMALL_C_RATE * cell.nominal_capacity_ah
     full_v = max(float(cell.rest_voltage_v(np.array([1.0]))[0]), cell.upper_voltage_v)
     first_v = float(record.voltage_v[0])
-    if calm[0] and first_v < cell.lower_voltage_v - VOLTAGE_MARGIN_V:
+    if nearly_at_rest[0] and first_v < cell.lower_voltage_v - VOLTAGE_MARGIN_V:
         raise DataError(
             f"{record.name} starts at {first_v:.3f} V at {record.current_a[0]:.3g} A, but {cell.name} is empty at "
             f"{cell.lower_voltage_v:g} V: leave rows out that are no measurement of the cell (--from-s), or take the "
             "file of this cell."
         )
-    above = (calm | (record.current_a > 0.0)) & (record.voltage_v > full_v + ABOVE_FULL_V)
+    above = (nearly_at_rest | (record.current_a > 0.0)) & (record.voltage_v > full_v + ABOVE_FULL_V)
     if np.any(above):
         row = int(np.argmax(above))
         raise DataError(
@@ -280,17 +280,19 @@ def _check_window(cell: Cell, record: Measurement) -> None:
         )
 
 
-def _check_capacity(cell: Cell, record: Measurement, slack: Slack | None = None) -> None:
+def _check_capacity(cell: Cell, record: Measurement, slack: CapacitySlack | None = None) -> None:
+    """Raises DataError where the charge between two voltages requires another capacity than the cell has: on the
+    voltages, where they are of no such cell either, else on the capacity with what may explain it."""
     fault = _capacity_fault(cell, record, slack)
     if fault is None:
         return
     check_voltage(cell, record)
-    if record.temperature_degc is None and _of_the_cold(cell, record):
+    if record.temperature_degc is None and _fits_if_cold(cell, record):
         fault += (
             f". Or it was far colder than the {_declared_degc(cell):.4g} degC that the cell's file declares: give its "
             "temperature in a column temperature_degc, or declare another in that file (Initial temperature [K])"
         )
-    if _of_leads(cell, record):
+    if _fits_behind_leads(cell, record):
         fault += (
             ". Or its voltage holds the drop of leads, as on two wires (`aesi data convert` prints the resistance that "
             "the steps of its current show): a file that was calibrated with them has it"
@@ -301,42 +303,43 @@ def _check_capacity(cell: Cell, record: Measurement, slack: Slack | None = None)
     raise DataError(f"{fault}.")
 
 
-def _of_the_cold(cell: Cell, record: Measurement) -> bool:
-    """Whether a record that does not fit the cell's capacity would fit it if the cell was cold."""
+def _fits_if_cold(cell: Cell, record: Measurement) -> bool:
+    """Whether a record does not fit the cell's capacity, and would if the cell had been as cold as (1) knows."""
     coldest = replace(record, temperature_degc=np.full(len(record), COLD_DEGC - MOST_SPANS * COLD_SPAN_K))
     return _capacity_fault(cell, record) is not None and _capacity_fault(cell, coldest) is None
 
 
-def _of_leads(cell: Cell, record: Measurement) -> bool:
-    """Whether a record that the cell's capacity does not explain would be of it behind leads."""
+def _fits_behind_leads(cell: Cell, record: Measurement) -> bool:
+    """Whether a record does not fit the cell's capacity, and would if its voltage held the drop of leads as well."""
     leads_ohm = LEADS_V_PER_C / cell.nominal_capacity_ah
     wired = replace(cell, contact_resistance_ohm=cell.contact_resistance_ohm + leads_ohm)
     return _capacity_fault(cell, record) is not None and _capacity_fault(wired, record) is None
 
 
 def _capacity_ah(cell: Cell) -> float:
+    """The larger of the nominal capacity and that between the stoichiometry limits, Ah."""
     return max(cell.nominal_capacity_ah, cell.capacity_ah)
 
 
-def _capacity_fault(cell: Cell, record: Measurement, slack: Slack | None = None) -> str | None:
+def _capacity_fault(cell: Cell, record: Measurement, slack: CapacitySlack | None = None) -> str | None:
     """A clause on the charge between two voltages, the capacity that this requires and the likely cause; None where it
     fits the cell's capacity."""
-    bounds, allowed = capacity_bounds(cell, record), slack or Slack()
+    bounds, allowed = capacity_bounds(cell, record), slack or CapacitySlack()
     declared = _capacity_ah(cell)
     if bounds.low_rows is not None and bounds.low_ah > TOO_SMALL * allowed.more * declared:
         return (
-            f"{_moved(record, bounds.low_rows)}, as in a cell of {bounds.low_ah:.3g} Ah or more, but {cell.name} has "
-            f"{declared:.3g} Ah: {_cause(bounds.low_ah / declared, record)}"
+            f"{_charge_clause(record, bounds.low_rows)}, as in a cell of {bounds.low_ah:.3g} Ah or more, but "
+            f"{cell.name} has {declared:.3g} Ah: {_cause_clause(bounds.low_ah / declared, record)}"
         )
     if bounds.high_rows is not None and allowed.less * declared > TOO_LARGE * bounds.high_ah:
         return (
-            f"{_moved(record, bounds.high_rows)}, as in a cell of {bounds.high_ah:.3g} Ah or less, but {cell.name} has "
-            f"{declared:.3g} Ah: {_cause(bounds.high_ah / declared, record)}"
+            f"{_charge_clause(record, bounds.high_rows)}, as in a cell of {bounds.high_ah:.3g} Ah or less, but "
+            f"{cell.name} has {declared:.3g} Ah: {_cause_clause(bounds.high_ah / declared, record)}"
         )
     return None
 
 
-def _moved(record: Measurement, rows: tuple[int, int]) -> str:
+def _charge_clause(record: Measurement, rows: tuple[int, int]) -> str:
     """A clause on the charge between two rows, the fuller one first, and the voltages there."""
     first, last = sorted(rows)
     charge = record.discharged_ah("backward")
@@ -347,7 +350,7 @@ def _moved(record: Measurement, rows: tuple[int, int]) -> str:
     return f"{record.name}: {amount:.4g} Ah {way} the cell between {ends}"
 
 
-def _cause(ratio: float, record: Measurement) -> str:
+def _cause_clause(ratio: float, record: Measurement) -> str:
     """The likely cause of a ratio of capacities, a clause: units differ by larger factors than cells."""
     if ratio > 200.0:
         return (

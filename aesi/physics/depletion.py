@@ -25,37 +25,41 @@ RUN_ON = ', or let it run on: aesi simulate --run-on, in Python on_depletion="cl
 """How each of these sentences ends."""
 
 
-def sentence(
+def depletion_sentence(
     model: EspmModel, time_s: Array, current_a: Array, kelvin: float, rows: Array, at: int, what: int
 ) -> str:
-    """Why a simulation stopped, and what to check.
+    """Why a simulation stopped, and what to check: one sentence that ends with `RUN_ON`.
 
-    time_s, current_a : (n,) of the record.  kelvin : temperature at the fault.  rows : (7, n) as of `run_plain`.
-    at : the first faulty row.  what : 1 or 2, the surface of that electrode (`LAYERS`); `SALT`; or `NO_SOLUTION`.
+    time_s, current_a : (n,) s, A, of the record.  kelvin : temperature at the fault, K.  rows : (7, n) as of
+    `run_plain`.  at : the first faulty row.  what : 1 or 2, the surface of that electrode (`LAYERS`); `SALT`; or
+    `NO_SOLUTION`.
     """
     cell = model.cell
     way_there = current_a[max(at - 1, 0) : at + 1]
     asked_a = float(way_there[np.argmax(np.abs(way_there))])
-    head = f"{cell.name}: {_cut_off(model, time_s, rows[0], at, charging=asked_a < 0.0)}"
+    head = f"{cell.name}: {_cut_off_clause(model, time_s, rows[0], at, charging=asked_a < 0.0)}"
     where = f"at {stamp(time_s[at])} s"  # of a row the file may know nothing: models run on rows of their own
     amperes = abs(asked_a)
     driest = float(np.min(rows[3:5, at])) / cell.electrolyte.c0_mol_m3
     if what == SALT or (what == NO_SOLUTION and driest < DRY_SHARE):
-        told = _no_salt(model, kelvin, amperes, where)
+        cause = _salt_clause(model, kelvin, amperes, where)
     elif what == NO_SOLUTION:
-        told = (
+        cause = (
             f"no reaction was found that carries {amperes:.3g} A at {kelvin - ZERO_CELSIUS_K:.3g} degC, {where}; check "
             "the unit of the current"
         )
     else:
-        told = _surface_left(model, kelvin, amperes, rows, at, what, where)
-    return f"{head}{told}{RUN_ON}"
+        cause = _surface_clause(model, kelvin, amperes, rows, at, what, where)
+    return f"{head}{cause}{RUN_ON}"
 
 
-def _no_salt(model: EspmModel, kelvin: float, amperes: float, where: str) -> str:
-    """A clause: the electrolyte ran out of salt, by the cold where it would carry notably more when warm."""
+def _salt_clause(model: EspmModel, kelvin: float, amperes: float, where: str) -> str:
+    """A clause: the electrolyte ran out of salt, and whether that is for the cold.
+
+    kelvin : temperature at the fault, K.  amperes : magnitude of the current there.  where : its time, in words.
+    """
     reference_k = model.cell.reference_temperature_k
-    here, there = (carried_a(model, t) for t in (kelvin, reference_k))
+    here, there = (limiting_current_a(model, t) for t in (kelvin, reference_k))
     cause = (
         f"the electrolyte ran out of salt {where}: at {kelvin - ZERO_CELSIUS_K:.3g} degC it carries {here:.3g} A for "
         f"long, and the record asks for {amperes:.3g} A"
@@ -68,12 +72,12 @@ def _no_salt(model: EspmModel, kelvin: float, amperes: float, where: str) -> str
     return f"{cause}. Check the unit of the current and the electrolyte's diffusivity"
 
 
-def _surface_left(
+def _surface_clause(
     model: EspmModel, kelvin: float, amperes: float, rows: Array, at: int, what: int, where: str
 ) -> str:
     """A clause: a surface is empty or full, by the charge of the record or by a current too large for solid diffusion.
 
-    rows : as of `run_plain`.  at : the faulty row.  what : 1 or 2, the electrode.
+    rows : as of `run_plain`.  at : the faulty row.  what : 1 or 2, the electrode.  Others as `_salt_clause`.
     """
     cell, electrode, row = model.cell, (model.cell.negative, model.cell.positive)[what - 1], rows[:, at]
     every = (rows[5] - cell.negative.theta_min) / (cell.negative.theta_max - cell.negative.theta_min)
@@ -122,8 +126,9 @@ def ran_out(name: str, at_s: Mapping[str, float]) -> str:
     )
 
 
-def carried_a(model: EspmModel, kelvin: float) -> float:
-    """Steady current at which the salt in one electrode is depleted, A, with the diffusivity at rest."""
+def limiting_current_a(model: EspmModel, kelvin: float) -> float:
+    """Limiting current of the electrolyte, A: the steady current at which the mean salt in one electrode is zero, with
+    the diffusivity at the rest concentration."""
     cell, stack = model.cell, stack_of(model)
     e = cell.electrolyte
     faster = rate_factor(e.diffusivity_ea_j_mol, kelvin, cell.reference_temperature_k)
@@ -139,7 +144,7 @@ def carried_a(model: EspmModel, kelvin: float) -> float:
     return e.c0_mol_m3 / max(abs(m) for m in means)
 
 
-def _cut_off(model: EspmModel, time_s: Array, voltage_v: Array, at: int, charging: bool) -> str:
+def _cut_off_clause(model: EspmModel, time_s: Array, voltage_v: Array, at: int, charging: bool) -> str:
     """A clause on the time before the fault at which the cut-off voltage was passed, where a test would end; '' where
     it was not.
 

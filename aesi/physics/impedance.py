@@ -77,10 +77,10 @@ def impedance(
     check_soc(soc, "soc")
     frequency = _checked_frequency(frequency_hz)
     active = checked_effects(effects)
-    kelvin = _shifted(active, _checked_kelvin(temperature_degc))
+    kelvin = _true_kelvin(active, _checked_kelvin(temperature_degc))
     check_choice("model", model, ModelName)
     changed = model_with(cell, active)
-    rest = _at_rest(cell, changed, soc)
+    rest = _rest_stoichiometries(cell, changed, soc)
     if not ((rest > 0.0) & (rest < 1.0)).all():
         raise DataError(
             f"{cell.name} has no state of charge of {soc:g}: a stoichiometry leaves (0, 1) there."
@@ -136,19 +136,19 @@ def slowest_diffusion_hz(
     """
     active = checked_effects(effects)
     model = model_with(cell, active)
-    kelvin = _shifted(active, float(temperature_degc) + ZERO_CELSIUS_K)
-    rest, units = _at_rest(cell, model, soc), particle_units(model)
-    faster = [_faster(model, side, float(rest[side]), kelvin) for side in units.place[:, 0]]
+    kelvin = _true_kelvin(active, float(temperature_degc) + ZERO_CELSIUS_K)
+    rest, units = _rest_stoichiometries(cell, model, soc), particle_units(model)
+    faster = [_diffusion_factor(model, side, float(rest[side]), kelvin) for side in units.place[:, 0]]
     solid = float(np.min(np.array(faster)[:, None] * units.rates))
     return min(solid, float(np.min(_salt_rates(model, kelvin)[1:]))) / (2.0 * np.pi)
 
 
-def _at_rest(cell: Cell, model: EspmModel, soc: float) -> Array:
+def _rest_stoichiometries(cell: Cell, model: EspmModel, soc: float) -> Array:
     """(2,) rest stoichiometries of the cell with the effects applied, at the rest voltage of `cell`."""
     return np.array(model.cell.stoichiometries(same_rest(cell, model.cell, soc)))
 
 
-def _faster(model: EspmModel, side: int, at: float, kelvin: float) -> float:
+def _diffusion_factor(model: EspmModel, side: int, at: float, kelvin: float) -> float:
     """Factor of an electrode's rates of diffusion at a stoichiometry and a temperature."""
     cell = model.cell
     electrode = (cell.negative, cell.positive)[side]
@@ -181,12 +181,12 @@ class _Linear:
         n, regions = len(side_of), self.model.regions
         region = side_of * regions + within
         s: ComplexArray = np.asarray(1j * omega, dtype=np.complex128)
-        local = self._local(units, s)
-        salt = self._salt(s)
-        ohm = self._ohm()
-        belongs = (region[None, :] == np.arange(2 * regions)[:, None]).astype(float)
+        local = self._unit_impedance(units, s)
+        salt = self._salt_impedance(s)
+        ohm = self._ohmic_drops()
+        in_region = (region[None, :] == np.arange(2 * regions)[:, None]).astype(float)
         # Current of each region: its particles', and its double layer's, which is charged by the first one's potential.
-        into = np.broadcast_to(belongs.astype(complex), (len(s), 2 * regions, n)).copy()
+        into = np.broadcast_to(in_region.astype(complex), (len(s), 2 * regions, n)).copy()
         for r in range(2 * regions):
             first = int(np.flatnonzero(region == r)[0])
             capacity = interface_capacity(self.model, int(side_of[first]))
@@ -209,7 +209,7 @@ class _Linear:
         series = gap / cell.total_area_m2 + cell.contact_resistance_ohm
         return cast(ComplexArray, solved[:, n] - solved[:, n + 1] + series)
 
-    def _local(self, units: Units, s: ComplexArray) -> ComplexArray:
+    def _unit_impedance(self, units: Units, s: ComplexArray) -> ComplexArray:
         """(frequencies, units) ohm m2: kinetics, film, and open-circuit slope times what the surface loses."""
         cell = self.model.cell
         slopes = _slopes(cell, self.rest, self.kelvin)
@@ -220,7 +220,7 @@ class _Linear:
             slope = slopes[side]
             kinetic = rate_factor(electrode.rate_ea_j_mol, self.kelvin, cell.reference_temperature_k)
             thermal = GAS_CONSTANT_J_MOL_K * self.kelvin / FARADAY_C_MOL
-            faster = _faster(self.model, side, float(at), self.kelvin)
+            faster = _diffusion_factor(self.model, side, float(at), self.kelvin)
             factor = float(electrode.rate_factor(np.array([at]))[0])
             film = float(electrode.film_ohm_m2(np.array([at]))[0])
             film /= rate_factor(electrode.film_ea_j_mol, self.kelvin, cell.reference_temperature_k)
@@ -231,7 +231,7 @@ class _Linear:
                 out[:, u] = resistance + film / units.reactive[u] - slope * answer
         return out
 
-    def _salt(self, s: ComplexArray) -> ComplexArray:
+    def _salt_impedance(self, s: ComplexArray) -> ComplexArray:
         """(frequencies, 2 regions, 2 regions) ohm m2: potential of the salt in one region per current into another."""
         regions, e, stack = self.model.regions, self.model.cell.electrolyte, stack_of(self.model)
         rates = _salt_rates(self.model, self.kelvin)
@@ -243,7 +243,7 @@ class _Linear:
         modes = 1.0 / (s[:, None] + rates[None, 1:])
         return cast(ComplexArray, chi * np.einsum("rk,fk,vk->frv", seen, modes, enters))
 
-    def _ohm(self) -> Array:
+    def _ohmic_drops(self) -> Array:
         """(2 regions, 2 regions) ohm m2, ohmic drop of the electrolyte, as in the time domain."""
         regions = self.model.regions
         e = self.model.cell.electrolyte
@@ -273,7 +273,7 @@ def _slope(relation: Relation, at: float) -> float:
     return float((values[1] - values[0]) / (high - low))
 
 
-def _shifted(effects: tuple[ActiveEffect, ...], kelvin: float) -> float:
+def _true_kelvin(effects: tuple[ActiveEffect, ...], kelvin: float) -> float:
     """The true temperature of the cell, K: `kelvin` after the effects that change it."""
     record = as_cell_saw(Record(np.zeros(1), np.zeros(1), np.array([kelvin])), effects)
     return float(cast(Array, record.temperature_k)[0])

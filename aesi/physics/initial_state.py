@@ -35,7 +35,7 @@ from aesi.physics.effect import ActiveEffect, Record, as_cell_saw, instruments_f
 from aesi.physics.rest.open_circuit import CHARGED_V, GIVEN_SD, GOOD_READING_V, READING_V, OpenCircuit
 from aesi.physics.rest.voltage import first_rows_v, freed_of_instruments, freed_of_series
 from aesi.physics.simulation import ModelName, model_with
-from aesi.physics.start.charge import carried_from, told_by_charge
+from aesi.physics.start.charge import charge_admits, truncated_by_charge
 from aesi.physics.start.load import DROP_ERROR, FLOWED_S, LoadedStart
 from aesi.physics.start.relaxing import Rest, resting_rows, settled_voltage
 from aesi.physics.start.state import Basis, InitialState
@@ -103,30 +103,28 @@ def initial_state(
         if soc0 is None:
             raise DataError(f"{record.name} has no voltage to start from; give --soc0.")
         return _given(record, soc0, None)
-    seen = _as_cell_saw(record, active, hold)
+    seen = _record_as_cell_saw(record, active, hold)
     if unknown.any():
         seen = seen.take(slice(0, int(np.argmax(unknown))))
-    start = _Start(cell, seen, hold, active, model, potentials_v, float(record.current_a[0]))
-    if soc0 is not None:
-        try:
-            read = start.read()
-        except DataError:
-            return _given(record, soc0, None)
-        allowed = OTHER_STATE if read.basis in ("rest", "full charge") else OTHER_STATE_LOADED
-        if read.off(soc0) <= allowed:
-            doubt = abs(read.soc - soc0)
-            if doubt > OTHER_STATE and read.off(soc0) > DOUBTED_SDS * read.sd:
-                words = _given(record, soc0, read).sentence
-                return InitialState(soc0, GIVEN_SD, "given", words, doubt=doubt, doubted=True)
-            return replace(_given(record, soc0, None), doubt=doubt)
-        held, other = (carried_from(soc, seen, hold, cell.capacity_ah) for soc in (soc0, read.soc))
-        if shared and (other or not held):
-            return _read_instead(read, soc0)
-        return replace(_given(record, soc0, read), doubt=abs(read.soc - soc0))
-    return start.read()
+    start = _StartReading(cell, seen, hold, active, model, potentials_v, float(record.current_a[0]))
+    if soc0 is None:
+        return start.read()
+    try:
+        read = start.read()
+    except DataError:
+        return _given(record, soc0, None)
+    allowed = OTHER_STATE if read.basis in ("rest", "full charge") else OTHER_STATE_LOADED
+    if read.off(soc0) <= allowed:
+        return _given_beside_reading(record, soc0, read)
+    given_admitted, read_admitted = (
+        charge_admits(soc, seen, hold, cell.capacity_ah) for soc in (soc0, read.soc)
+    )
+    if shared and (read_admitted or not given_admitted):
+        return _read_instead(read, soc0)
+    return replace(_given(record, soc0, read), doubt=abs(read.soc - soc0))
 
 
-def _as_cell_saw(record: Measurement, effects: tuple[ActiveEffect, ...], hold: Hold) -> Measurement:
+def _record_as_cell_saw(record: Measurement, effects: tuple[ActiveEffect, ...], hold: Hold) -> Measurement:
     """The record with the current, time and temperature that the cell saw; itself where no effect acts on it."""
     if all(active.effect.on_record is None for active in effects):
         return record
@@ -143,6 +141,15 @@ def _as_cell_saw(record: Measurement, effects: tuple[ActiveEffect, ...], hold: H
     )
 
 
+def _given_beside_reading(record: Measurement, soc0: float, read: InitialState) -> InitialState:
+    """The given state of charge, which the reading does not contradict; `doubted` where it is notably off."""
+    doubt = abs(read.soc - soc0)
+    if doubt > OTHER_STATE and read.off(soc0) > DOUBTED_SDS * read.sd:
+        words = _given(record, soc0, read).sentence
+        return InitialState(soc0, GIVEN_SD, "given", words, doubt=doubt, doubted=True)
+    return replace(_given(record, soc0, None), doubt=doubt)
+
+
 def _read_instead(read: InitialState, soc0: float) -> InitialState:
     """The reading, with a sentence that says why what was given for several records is not believed for this one."""
     words = f"{read.sentence[:-1]}; not the {soc0:.4g} that was given, which its voltage contradicts."
@@ -150,14 +157,18 @@ def _read_instead(read: InitialState, soc0: float) -> InitialState:
 
 
 def _given(record: Measurement, soc0: float, other: InitialState | None) -> InitialState:
+    """The given state of charge.  other : what the voltage says instead, where it contradicts it."""
     words = f"{record.name} starts at a state of charge of {soc0:.4g}, as given"
     if other is not None:
         words += f"; its first voltage ({record.voltage_v[0]:.3f} V) rather says {other.soc:.3f} +/- {other.sd:.3f}"
     return InitialState(soc0, GIVEN_SD, "given", words + ".", other is not None)
 
 
-class _Start:
-    """The start of one record, as the cell saw it, against one cell."""
+class _StartReading:
+    """Reads the state of charge at the first row of one record, with the model of one cell and its effects.
+
+    record : as the cell saw it.  written_a : the first current as the file has it, A.
+    """
 
     def __init__(
         self,
@@ -179,24 +190,25 @@ class _Start:
 
     def read(self) -> InitialState:
         """The state read from the voltage and, under load, also from the charge that the record moves."""
-        read = self._at_rest() if self._rests() else self._under_load()
+        read = self._read_rest() if self._begins_at_rest() else self._read_load()
         # The reading of a rest is its likeliest state, not a mean that what is cut off would move.
         return (
             read
             if read.basis != "load"
-            else told_by_charge(read, self.record, self.hold, self.declared.capacity_ah)
+            else truncated_by_charge(read, self.record, self.hold, self.declared.capacity_ah)
         )
 
-    def _rests(self) -> bool:
+    def _begins_at_rest(self) -> bool:
         return abs(self.current_a) <= REST_C_RATE * self.cell.capacity_ah
 
-    def _at_rest(self) -> InitialState:
+    def _read_rest(self) -> InitialState:
+        """From the voltage that the first rows relax to, or from the load that ends them where that tells more."""
         capacity_ah = self.cell.capacity_ah
         rest = resting_rows(self.record, REST_C_RATE * capacity_ah, ONE_STATE * capacity_ah, self.hold)
         begins_v = first_rows_v(rest.rows.voltage_v)
         terminal_v = freed_of_instruments(self.model, self.effects, begins_v)
         if self.open_circuit.charged(terminal_v):
-            return self._full(terminal_v, f"rests at {begins_v:.3f} V", begins_v)
+            return self._full_charge(terminal_v, f"rests at {begins_v:.3f} V", begins_v)
         settled_v, settled_sd_v = settled_voltage(self.open_circuit, rest.rows, self.model_name)
         ocv_v = self._freed_of_series(freed_of_instruments(self.model, self.effects, settled_v))
         # Before what these rows move, the cell was as much fuller and higher.
@@ -211,24 +223,25 @@ class _Start:
         if ended_by_load and settled_sd_v > self.open_circuit.potentials_v:
             # How far it is from settled is the greater doubt: the load may tell more.
             _, first_v = self._first_voltages()
-            by_minutes = self._by_first_minutes(
+            by_minutes = self._read_first_minutes(
                 first_v, f"rests at {begins_v:.3f} V, too briefly to read the state from that alone"
             )
             if by_minutes.sd < sd:
                 return by_minutes
         low, high = self.open_circuit.ends(ocv_v, spread_v)
         return InitialState(
-            self._declared(soc + moved),
+            self._in_declared_windows(soc + moved),
             sd,
             "rest",
             self._rest_words(begins_v, settled_v, settled_sd_v, soc + moved, sd),
             rest_voltage_v=settled_v + ocv_rise_before_v,
-            ends=(self._declared(low + moved), self._declared(high + moved)),
+            ends=(self._in_declared_windows(low + moved), self._in_declared_windows(high + moved)),
         )
 
     def _rest_words(
         self, begins_v: float, settled_v: float, settled_sd_v: float, soc: float, sd: float
     ) -> str:
+        """The sentence on a rest: its voltages, V, and the state of charge with its standard deviation."""
         words = f"{self.record.name} rests at {begins_v:.3f} V"
         if max(abs(settled_v - begins_v), settled_sd_v) > GOOD_READING_V:
             words += f", relaxing to {settled_v:.3f} +/- {settled_sd_v:.3f} V"
@@ -256,20 +269,21 @@ class _Start:
         terminal = freed_of_instruments(self.model, self.effects, float(self.record.voltage_v[0]))
         return terminal, self._freed_of_series(terminal, self.current_a)
 
-    def _under_load(self) -> InitialState:
+    def _read_load(self) -> InitialState:
+        """From the first voltage where a charge ended before this load, else from the first minutes."""
         terminal, first = self._first_voltages()
         drop_v = self.load.drop(first, self.current_a, 0.0)
         begun = terminal + drop_v
         written = "" if self.written_a == self.current_a else f" ({self.written_a:.3g} A as written)"
         said = f"starts under {self.current_a:.3g} A{written} at {self.record.voltage_v[0]:.3f} V"
-        if self._ended_full(begun, drop_v):
+        if self._charge_ended_before(begun, drop_v):
             words = (
                 f"{said}, and with the {1e3 * drop_v:.0f} mV that the model drops at once at {begun:.3f} V"
             )
-            return self._full(begun, words, None, drop_v)
-        return self._by_first_minutes(first, said)
+            return self._full_charge(begun, words, None, drop_v)
+        return self._read_first_minutes(first, said)
 
-    def _by_first_minutes(self, first_v: float, said: str) -> InitialState:
+    def _read_first_minutes(self, first_v: float, said: str) -> InitialState:
         """From the minutes that the model follows from there, whatever flowed before.
 
         first_v : V, the first voltage, without what effects add in series and instruments do.
@@ -280,9 +294,9 @@ class _Start:
             f"{self.record.name} {said}, {likelier}: "
             f"state of charge {soc:.3f} +/- {sd:.3f}; give --soc0 if it is known."
         )
-        return InitialState(self._declared(soc), sd, "load", words)
+        return InitialState(self._in_declared_windows(soc), sd, "load", words)
 
-    def _ended_full(self, begun_v: float, drop_v: float) -> bool:
+    def _charge_ended_before(self, begun_v: float, drop_v: float) -> bool:
         """Has a charge ended before this load, also where the model drops by two of its deviations too much?
 
         One that still flows has not. 1.2 V of drop in the cold made a full charge of 3.06 V and a charge of 0.64.
@@ -294,8 +308,14 @@ class _Start:
     def _freed_of_series(self, terminal_v: float, current_a: float = 0.0) -> float:
         return freed_of_series(self.open_circuit, self.model, self.effects, terminal_v, current_a)
 
-    def _full(self, true_v: float, how: str, rest_v: float | None, drop_v: float = 0.0) -> InitialState:
-        """true_v : at the terminals.  drop_v : of it, what the model adds to the voltage as it was read."""
+    def _full_charge(
+        self, true_v: float, how: str, rest_v: float | None, drop_v: float = 0.0
+    ) -> InitialState:
+        """State of charge 1.
+
+        true_v : at the terminals, V.  how : clause on the first row.  rest_v : the rest voltage, V, where it rests.
+        drop_v : part of true_v that the model adds to the voltage as it was read, V.
+        """
         ocv_v = self._freed_of_series(true_v)
         inside = self.open_circuit.soc_at(ocv_v)
         sd = self.open_circuit.full_sd(ocv_v, DROP_ERROR * drop_v)
@@ -314,14 +334,14 @@ class _Start:
             f"(by the open-circuit voltage {inside:.4f}){doubt}."
         )
         return InitialState(
-            self._declared(1.0),
+            self._in_declared_windows(1.0),
             sd,
             "full charge",
             words,
             rest_voltage_v=rest_v,
-            by_voltage=self._declared(inside),
+            by_voltage=self._in_declared_windows(inside),
         )
 
-    def _declared(self, soc: float) -> float:
-        """In the windows of the cell file, where effects moved them."""
+    def _in_declared_windows(self, soc: float) -> float:
+        """A state of charge of the cell with its effects, in the windows of the cell file."""
         return same_rest(self.cell, self.declared, soc)

@@ -21,10 +21,10 @@ from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError, SimulationError
 from aesi.numerics.typing import Array, Numbers
 from aesi.over_time import stamp
-from aesi.physics import depletion
 from aesi.physics.arguments import check_cell, check_choice, check_soc, check_temperature, checked_effects
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
+from aesi.physics.depletion import depletion_sentence
 from aesi.physics.effect import (
     ActiveEffect,
     Record,
@@ -53,7 +53,7 @@ Solution = tuple[Array, dict[str, Array], int, int]
 """The result of a solver: (rows, further, fault_at, fault).
 
 rows : (7, n), as those of `plain.run_plain`.  further : other states by name, (n,) each.  fault_at : first row at
-which lithium or salt has run out, -1 for none.  fault : which one, as `depletion.sentence` takes it.
+which lithium or salt has run out, -1 for none.  fault : which one, as `depletion_sentence` takes it.
 """
 
 
@@ -106,8 +106,8 @@ def simulate(
         check_soc(soc0)
     time, current = _checked_record(time_s, current_a)
     active = instruments_first(checked_effects(effects))
-    across: dict[str, Array] | None = {} if profiles else None
-    solve = solver(model, across)
+    profile_arrays: dict[str, Array] | None = {} if profiles else None
+    solve = solver(model, profile_arrays)
     changed = model_with(cell, active)
     record = as_cell_saw(Record(time, current, _kelvin(temperature_degc, time)), active)
     if soc0 is None:
@@ -115,31 +115,39 @@ def simulate(
     else:
         soc0 = same_rest(cell, changed.cell, soc0)
     backward = hold == "backward"
-    solved, read = (record, None) if record.read_s is None else record.with_readings(backward)
-    heated = of_record(changed, record.temperature_k is not None)
+    # A clock or lag effect reads the voltage between the rows of the current, at rows of their own.
+    solved, reading_rows = (record, None) if record.read_s is None else record.with_readings(backward)
+    model_of_record = of_record(changed, record.temperature_k is not None)
     if profiles or len(solved.time_s) > MOST_ROWS:
-        rows, further, fault_at, fault = _solved(solve, heated, solved, soc0, hold)
+        rows, further, fault_at, fault = _solved(solve, model_of_record, solved, soc0, hold)
     else:
-        known = _remembered(model, heated, _KeyedRecord.of(solved), soc0, hold)
-        rows, further, fault_at, fault = _copied(known)
+        cached = _cached_solution(model, model_of_record, _KeyedRecord.of(solved), soc0, hold)
+        rows, further, fault_at, fault = _copied(cached)
     series = _series(changed.cell, rows) | further
-    written_at = fault_at if read is None or fault_at < 0 else int(np.searchsorted(read, fault_at))
+    written_at = (
+        fault_at if reading_rows is None or fault_at < 0 else int(np.searchsorted(reading_rows, fault_at))
+    )
     if fault_at >= 0 and on_depletion == "raise":
         kelvin = float(further["temperature_k"][fault_at])
-        own = slice(None) if read is None else read
+        own = slice(None) if reading_rows is None else reading_rows
         raise SimulationError(
-            depletion.sentence(changed, time, solved.current_a[own], kelvin, rows[:, own], written_at, fault)
+            depletion_sentence(changed, time, solved.current_a[own], kelvin, rows[:, own], written_at, fault)
         )
     if on_depletion == "clip":
         series["depleted"] = _depleted(fault_at, len(solved.time_s))
     voltage = _with_effects_in_series(changed, active, solved, rows[0], series, backward)
-    if read is not None:
-        voltage, series = voltage[read], {name: values[read] for name, values in series.items()}
-        across = across and {name: of[read] if of.ndim == 2 else of for name, of in across.items()}
+    if reading_rows is not None:
+        voltage = voltage[reading_rows]
+        series = {name: values[reading_rows] for name, values in series.items()}
+        if profile_arrays:  # those of one dimension are positions
+            profile_arrays = {
+                name: values[reading_rows] if values.ndim == 2 else values
+                for name, values in profile_arrays.items()
+            }
     voltage = _as_read(changed, active, record.beside_voltage(backward), voltage, series, backward)
     if fault_at >= 0:
         _check_solved(time, voltage, written_at)
-    return Run(time, current, voltage, series, across or {})
+    return Run(time, current, voltage, series, profile_arrays or {})
 
 
 def model_with(cell: Cell, effects: Iterable[ActiveEffect]) -> EspmModel:
@@ -152,12 +160,12 @@ def _model_with(cell: Cell, effects: tuple[ActiveEffect, ...]) -> EspmModel:
     model = EspmModel(cell)
     for active in effects:
         if active.effect.on_model is not None:
-            model = _changed(model, active)
+            model = _with_effect(model, active)
     return model
 
 
 @lru_cache(maxsize=256)
-def _changed(model: EspmModel, active: ActiveEffect) -> EspmModel:
+def _with_effect(model: EspmModel, active: ActiveEffect) -> EspmModel:
     """The model with one effect applied. Cached: the records of a case share all effects but the last."""
     assert active.effect.on_model is not None
     return active.act(active.effect.on_model, model)
@@ -195,11 +203,11 @@ def _solved(solve: Solver, model: EspmModel, record: Record, soc0: float, hold: 
         model = model.with_cell(initial_temperature_k=float(temperature[0]))
         if model.heat is None:
             temperature = None
-    warm = None if temperature is None else _own(temperature)
-    return solve(model, _own(record.time_s), _own(record.current_a), warm, soc0, hold)
+    warm = None if temperature is None else _writable(temperature)
+    return solve(model, _writable(record.time_s), _writable(record.current_a), warm, soc0, hold)
 
 
-def _own(row: Array) -> Array:
+def _writable(row: Array) -> Array:
     """A contiguous, writable copy of a row, as the kernels need it; the arrays that effects return are read-only."""
     return np.require(row, float, ["C", "W"])
 
@@ -220,7 +228,7 @@ class _KeyedRecord:
 
 
 @lru_cache(maxsize=128)
-def _remembered(
+def _cached_solution(
     model_name: ModelName, model: EspmModel, keyed: _KeyedRecord, soc0: float, hold: Hold
 ) -> Solution:
     """One solution, from a cache: effects on the voltage and on readings do not change the states of the cell, so that
@@ -230,7 +238,7 @@ def _remembered(
 
 def forget_solutions() -> None:
     """Empty the cache of solutions, for benchmarks."""
-    _remembered.cache_clear()
+    _cached_solution.cache_clear()
 
 
 def _copied(solution: Solution) -> Solution:
@@ -304,7 +312,7 @@ def _as_read(
         if active.effect.on_reading is not None:
             trace = Trace(model, record.time_s, record.current_a, voltage, series, backward)
             voltage = active.act(active.effect.on_reading, trace)
-    return _own(voltage)
+    return _writable(voltage)
 
 
 def _checked_record(time_s: object, current_a: object) -> tuple[Array, Array]:

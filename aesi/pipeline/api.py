@@ -22,7 +22,13 @@ from aesi.over_time import stamp
 from aesi.physics import ModelName
 from aesi.physics.arguments import check_choice, check_soc
 from aesi.physics.cell import Soh
-from aesi.pipeline.calibrate import check_records, effects_left, of_body, scaled_to, start_cell
+from aesi.pipeline.calibrate import (
+    body_sentences,
+    check_records,
+    omitted_effect_sentences,
+    start_at_size,
+    start_cell,
+)
 from aesi.pipeline.discovery.budget import within_budget
 from aesi.pipeline.discovery.cold import with_cold_admitted
 from aesi.pipeline.discovery.discover import Case, run_case
@@ -158,8 +164,8 @@ def calibrate(
     declared = start_cell(given.cell, cut_offs_v, body_mm, mass_g)
     measurements = _read_all(_listed(data), hold)
     check_records(measurements, temperatures_degc)
-    scaled = scaled_to(declared, measurements, temperatures_degc)  # refused before anything is fitted
-    body = of_body(given.cell, scaled)
+    scaled = start_at_size(declared, measurements, temperatures_degc)  # refused before anything is fitted
+    body = body_sentences(given.cell, scaled)
     conditions = Conditions(
         soc0,
         temperatures_degc or {},
@@ -172,7 +178,7 @@ def calibrate(
     check_distinct_spectra(conditions.spectra, ())
     check_spectra(scaled, conditions.spectra)
     found = fit_cell(declared, measurements, conditions, starts=starts, seed=seed)
-    return replace(found, notes=(*effects_left(given), *body, *found.notes))
+    return replace(found, notes=(*omitted_effect_sentences(given), *body, *found.notes))
 
 
 def _read_spectra(given: Spectra) -> tuple[Spectrum, ...]:

@@ -14,12 +14,12 @@ from aesi.calibration import Calibration, Conditions, calibrate
 from aesi.calibration.fit import OnStep
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.parameters import check_names
-from aesi.calibration.posterior import PosteriorSamples, check_posterior, sampled
+from aesi.calibration.posterior import PosteriorSamples, check_posterior, sample_posterior
 from aesi.calibration.records.prepared import with_temperatures
 from aesi.calibration.records.spectra import BAND_HZ, check_spectra
 from aesi.calibration.result import RecordError
-from aesi.calibration.rewind import start_soc
-from aesi.calibration.start import sized, tell_the_size
+from aesi.calibration.start import full_discharge_numbers, scaled_to_discharge
+from aesi.calibration.written_cell import start_soc
 from aesi.constants import CM_PER_M, MV_PER_V, ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError
 from aesi.numerics.files.whole import write_whole
@@ -30,7 +30,7 @@ from aesi.physics.cell import Cell
 from aesi.physics.cell.bpx_values import check_values
 from aesi.physics.simulation import MODEL_WORDS
 from aesi.pipeline.distinct import check_distinct, check_distinct_spectra
-from aesi.pipeline.impedance import SpectrumError, held_against
+from aesi.pipeline.impedance import SpectrumError, compared_spectra
 from aesi.pipeline.notes import together
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
@@ -93,7 +93,7 @@ def start_cell(
     return placed.with_body(body_mm, mass_g)
 
 
-def of_body(cell: Cell, start: Cell) -> tuple[str, ...]:
+def body_sentences(cell: Cell, start: Cell) -> tuple[str, ...]:
     """A sentence on the body that was given for the cell of a file; empty where none was.
 
     start : the cell that the calibration starts from, at its size.  Raises CellError where the body holds no such cell.
@@ -101,7 +101,7 @@ def of_body(cell: Cell, start: Cell) -> tuple[str, ...]:
     if (start.volume_m3, start.density_kg_m3) == (cell.volume_m3, cell.density_kg_m3):
         return ()
     check_values(start, f"{start.name} in the body that was given")
-    told = [
+    values = [
         f"{value * to_unit:.4g} {unit}"
         for value, to_unit, unit in (
             (start.volume_m3, CM_PER_M**3, "cm3"),
@@ -110,7 +110,7 @@ def of_body(cell: Cell, start: Cell) -> tuple[str, ...]:
         )
         if value is not None
     ]
-    return (f"the body of the cell as given: {', '.join(told)}.",)
+    return (f"the body of the cell as given: {', '.join(values)}.",)
 
 
 def calibrate_files(
@@ -134,19 +134,23 @@ def calibrate_files(
     given = declared_model(cell)
     declared = start_cell(given.cell, asked.cut_offs_v, asked.body_mm, asked.mass_g)
     model = conditions.model or given.model
-    start = scaled_to(declared, measurements, conditions.temperatures_degc)
-    body = of_body(given.cell, start)
+    start = start_at_size(declared, measurements, conditions.temperatures_degc)
+    body = body_sentences(given.cell, start)
     check_spectra(start, (*conditions.spectra, *asked.impedance))
     conditions = replace(conditions, model=model)
     found = calibrate(
         declared, measurements, conditions, starts=asked.starts, seed=asked.seed, on_step=on_step
     )
     name = declared.name if asked.title is None else asked.title
-    found = replace(found, cell=replace(found.cell, name=name, description=_made_from(found)))
-    posterior = sampled(found, asked.posterior, asked.seed) if asked.posterior else None
-    spectra, told = held_against(found.cell, asked.impedance, model=model, fitted=conditions.spectra)
+    found = replace(found, cell=replace(found.cell, name=name, description=_provenance(found)))
+    posterior = sample_posterior(found, asked.posterior, asked.seed) if asked.posterior else None
+    spectra, spectrum_notes = compared_spectra(
+        found.cell, asked.impedance, model=model, fitted=conditions.spectra
+    )
     read = [note for m in measurements for note in m.notes]
-    content = calibration_content(found, [*effects_left(given), *body, *read, *told], posterior, spectra)
+    content = calibration_content(
+        found, [*omitted_effect_sentences(given), *body, *read, *spectrum_notes], posterior, spectra
+    )
     cell_file, data, text, page = calibration_files(out)
     write_whole(cell_file, json.dumps(found.cell.to_bpx(), indent=1, allow_nan=False) + "\n")
     write_whole(data, json.dumps(content, indent=1, allow_nan=False) + "\n")
@@ -191,7 +195,7 @@ def fit_traces(found: Calibration) -> tuple[DiscoveryTrace, ...]:
     return tuple(out)
 
 
-def effects_left(given: HybridModel) -> tuple[str, ...]:
+def omitted_effect_sentences(given: HybridModel) -> tuple[str, ...]:
     """Sentences on what a fit leaves out of a cell or a saved model: what its file declares and no simulation takes,
     and the model's effects."""
     if not given.effects:
@@ -228,21 +232,22 @@ def check_records(measurements: Sequence[Measurement], temperatures_degc: Mappin
             )
 
 
-def scaled_to(
+def start_at_size(
     declared: Cell, measurements: Sequence[Measurement], temperatures_degc: Mapping[str, float] | None
 ) -> Cell:
-    """The cell at the size that the records tell, which need not be the start file's.
+    """The start cell at the size that the records indicate, which need not be that of its file.
 
     temperatures_degc : of records without a column, by name.  Raises DataError for a record that cannot be of it, at
     its temperature.
     """
-    start = sized(declared, measurements)[0]
+    start = scaled_to_discharge(declared, measurements)[0]
     placed = with_temperatures(start, measurements, temperatures_degc or {})[0]
-    check_measured(start, placed, tell_the_size(declared, measurements))
+    check_measured(start, placed, full_discharge_numbers(declared, measurements))
     return start
 
 
-def _made_from(found: Calibration) -> str:
+def _provenance(found: Calibration) -> str:
+    """The description of a calibrated file: what it was fitted to, and with which model."""
     records = ", ".join(e.name for e in found.errors)
     with_model = MODEL_WORDS[found.model.model_name]
     return f"Fitted by aesi calibrate with {with_model} to {records}, from {found.declared.name}."
@@ -304,7 +309,7 @@ def _parameter_rows(found: Calibration, posterior: PosteriorSamples | None) -> d
             "unit": p.unit,
             "prior_from": p.source,
             "of_prior": left.get(name),
-            **_of_posterior(posterior, name),
+            **_posterior_bounds(posterior, name),
         }
         for name, p in found.parameters.items()
     }
@@ -315,7 +320,7 @@ def _spectrum_row(held: SpectrumError) -> dict[str, Any]:
         "name": held.measured.name,
         "soc": held.soc,
         "temperature_degc": held.measured.temperature_degc,
-        "rms_pct": None if held.off is None else 100.0 * held.off,
+        "rms_pct": None if held.ratio_error is None else 100.0 * held.ratio_error,
         "band_hz": list(BAND_HZ),
         "fitted": held.fitted,
     }
@@ -332,7 +337,7 @@ def _health_rows(found: Calibration) -> dict[str, dict[str, float | None]]:
     return rows
 
 
-def _of_posterior(posterior: PosteriorSamples | None, name: str) -> dict[str, float]:
+def _posterior_bounds(posterior: PosteriorSamples | None, name: str) -> dict[str, float]:
     if posterior is None:
         return {}
     interval = posterior.intervals[name]

@@ -24,7 +24,7 @@ from aesi.numerics.typing import Array, IntArray, Numbers
 from aesi.over_time import extent, over_time
 from aesi.physics import Cell, ModelName, simulate
 from aesi.physics.arguments import check_choice
-from aesi.pipeline.export import as_others_read, own_to_us, pybamm_contacts
+from aesi.pipeline.export import own_fields_of, pybamm_contacts, without_own_fields
 from aesi.records.checked import numbers
 
 if TYPE_CHECKING:
@@ -110,14 +110,14 @@ def cross_check(
     """
     check_choice("model", model, PybammModel)
     time, current = numbers(time_s, "time_s"), numbers(current_a, "current_a")
-    compared = as_others_read(cell)
+    compared = without_own_fields(cell)
     ours = simulate(compared, time, current, soc0=soc0, model=OURS[model]).voltage_v
     if len(time) < 2:
         raise DataError("two models are compared over time; give at least two rows.")
     bends = _bends(time, current)
     content = compared.to_bpx()
     run = pybamm_run(content, compared, time[bends], current[bends], time, soc0, FINE_MESH, model)
-    return CrossCheck(time, ours, run.voltage_v, run.solution, own_to_us(cell))
+    return CrossCheck(time, ours, run.voltage_v, run.solution, own_fields_of(cell))
 
 
 def pybamm_run(

@@ -64,44 +64,46 @@ def check_distinct(
             (one, test, RECORDS.between)
             for one in fitted
             for test in tests
-            if not (led and _begins(test, one))
+            if not (led and _is_continuation(test, one))
         ),
         *((*pair, RECORDS.judging) for pair in combinations(tests, 2)),
     ]
     for one, other, where in pairs:
         found = overlap(rows[id(one)], rows[id(other)])
         if found is not None:
-            raise _of_one_test(one.name, other.name, found, where)
+            raise _overlap_error(one.name, other.name, found, where)
 
 
-def _begins(test: Measurement, known: Measurement) -> bool:
+def _is_continuation(test: Measurement, known: Measurement) -> bool:
+    """Whether a test begins with the rows of a known record, and goes on after them."""
     found = led_by(test, [known])
     return found is not None and found[1] is test
 
 
 def _check_once(fitted: _Listed, judging: _Listed, words: _Words) -> None:
+    """Raises DataError for two records, or spectra, of the same digest."""
     seen: dict[str, str] = {}
     for one in fitted:
         if one.digest in seen:
-            raise _twice(seen[one.digest], one.name, words.fitted)
+            raise _repeated_error(seen[one.digest], one.name, words.fitted)
         seen[one.digest] = one.name
     judges: dict[str, str] = {}
     for one in judging:
         if one.digest in seen:
-            raise _twice(seen[one.digest], one.name, words.between)
+            raise _repeated_error(seen[one.digest], one.name, words.between)
         if one.digest in judges:
-            raise _twice(judges[one.digest], one.name, words.judging)
+            raise _repeated_error(judges[one.digest], one.name, words.judging)
         judges[one.digest] = one.name
 
 
-def _twice(one: str, other: str, where: str) -> DataError:
-    """One sentence about two of the same content."""
+def _repeated_error(one: str, other: str, where: str) -> DataError:
+    """The error on two of the same content.  where : of `_Words`."""
     both = f"{one} is there twice" if one == other else f"{one} and {other} hold the same rows and are both"
     return DataError(f"{both} {where}.")
 
 
-def _of_one_test(one: str, other: str, found: Overlap, where: str) -> DataError:
-    """One sentence about two records that share rows."""
+def _overlap_error(one: str, other: str, found: Overlap, where: str) -> DataError:
+    """The error on two records that share rows.  where : of `_Words`."""
     way = "later" if found.ahead_s > 0 else "earlier"
     clock = f", {stamp(abs(found.ahead_s))} s {way} than in {one}" if found.ahead_s else ""
     same = "one test on other times" if found.resampled else "the same rows of one test"

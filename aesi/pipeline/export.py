@@ -66,7 +66,10 @@ def export(model: Path, out: Path, to: Target = "bpx") -> Exported:
     *script, bpx = files_written(out, to)
     declared = declared_model(model)
     found = folded(declared.cell, declared.effects)
-    held = [*declared.cell.unread, *(f"{_said(effect)}: written into the cell." for effect in found.held)]
+    held = [
+        *declared.cell.unread,
+        *(f"{_effect_words(effect)}: written into the cell." for effect in found.held),
+    ]
     left = (
         []
         if declared.correction is None
@@ -75,7 +78,7 @@ def export(model: Path, out: Path, to: Target = "bpx") -> Exported:
     if not found.same_window(declared.cell):
         held.append("State of charge 0 and 1 are now those of the changed electrodes.")
     if to == "bpx":
-        left += _unheld(found.left, declared.beside, "BPX has no field for")
+        left += _unheld_sentences(found.left, declared.beside, "BPX has no field for")
         left += _beyond_bpx(found.cell)
         if found.cell.contact_resistance_ohm:
             left.append(
@@ -85,22 +88,26 @@ def export(model: Path, out: Path, to: Target = "bpx") -> Exported:
         return Exported((_write(bpx, _bpx(found.cell)),), tuple(held), tuple(left))
     left += _beyond_bpx(found.cell)
     more, unknown = _for_pybamm(found.cell, found.left)
-    held += [f"{_said(effect)}: as an option of the model." for effect in found.left if effect not in unknown]
-    left += _unheld(unknown, declared.beside, "PyBaMM's model from BPX has no counterpart of")
+    held += [
+        f"{_effect_words(effect)}: as an option of the model."
+        for effect in found.left
+        if effect not in unknown
+    ]
+    left += _unheld_sentences(unknown, declared.beside, "PyBaMM's model from BPX has no counterpart of")
     text = _bpx(found.cell)
-    _keep_unnamed(out, bpx, text)
+    _check_not_replaced(out, bpx, text)
     scripts = [_write(path, _script(bpx.name, more)) for path in script]
     return Exported((*scripts, _write(bpx, text)), tuple(held), tuple(left))
 
 
-def _unheld(effects: Sequence[ActiveEffect], beside: Sequence[str], why: str) -> list[str]:
+def _unheld_sentences(effects: Sequence[ActiveEffect], beside: Sequence[str], why: str) -> list[str]:
     """A sentence for each effect that the target does not hold, and one for all that were fitted beside a finding."""
-    said = [f"{_said(effect)}: {why} it." for effect in effects if effect.id not in beside]
+    said = [f"{_effect_words(effect)}: {why} it." for effect in effects if effect.id not in beside]
     names = [effect.id for effect in effects if effect.id in beside]
     return [*said, *([f"{', '.join(names)}, fitted beside what was found: {why} that."] if names else [])]
 
 
-def _keep_unnamed(script: Path, bpx: Path, text: str) -> None:
+def _check_not_replaced(script: Path, bpx: Path, text: str) -> None:
     """Raises InputError where a file of that name is there which no earlier export left and nobody asked to replace."""
     if bpx.exists() and not script.exists() and bpx.read_bytes() != text.encode():
         raise InputError(
@@ -111,11 +118,11 @@ def _keep_unnamed(script: Path, bpx: Path, text: str) -> None:
 
 def _beyond_bpx(cell: Cell) -> list[str]:
     """Sentences on what a calibrated cell holds in its section User-defined that neither target takes over."""
-    return [f"{name}: in the section User-defined, which they do not read." for name in own_to_us(cell)]
+    return [f"{name}: in the section User-defined, which they do not read." for name in own_fields_of(cell)]
 
 
-def own_to_us(cell: Cell) -> tuple[str, ...]:
-    """Which of `OWN_FIELDS` the cell has."""
+def own_fields_of(cell: Cell) -> tuple[str, ...]:
+    """Names of those `OWN_FIELDS` that the cell has values for, which no other tool reads."""
     both = (cell.negative, cell.positive)
     return tuple(
         name
@@ -124,8 +131,8 @@ def own_to_us(cell: Cell) -> tuple[str, ...]:
     )
 
 
-def as_others_read(cell: Cell) -> Cell:
-    """The cell without `OWN_FIELDS`."""
+def without_own_fields(cell: Cell) -> Cell:
+    """The cell as another tool reads its file: `OWN_FIELDS` at what they are where a file has none."""
     none = {field: value for fields in OWN_FIELDS.values() for field, value in fields.items()}
     return cell.with_negative(**none).with_positive(**none)
 
@@ -178,7 +185,8 @@ def _bpx(cell: Cell) -> str:
     return json.dumps(cell.to_bpx(), indent=1, allow_nan=False) + "\n"
 
 
-def _said(effect: ActiveEffect) -> str:
+def _effect_words(effect: ActiveEffect) -> str:
+    """An effect with its values and their units, 'series_resistance (resistance_ohm 0.01 ohm)'."""
     values = ", ".join(
         f"{name} {value:.4g} {effect.effect.parameters[name].unit}" for name, value in effect.values
     )

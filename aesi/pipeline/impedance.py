@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aesi.calibration.records.spectra import BAND_HZ, degc_of, in_band, state_of, usable
+from aesi.calibration.records.spectra import BAND_HZ, comparable_spectra, degc_of, in_band, state_of
 from aesi.data.channels.spectrum_columns import find_frequency
 from aesi.data.readers import open_table
 from aesi.data.readers.table import names_listed
@@ -20,7 +20,7 @@ from aesi.physics.cell import Soh
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.impedance import slowest_diffusion_hz
 from aesi.physics.simulation import model_with
-from aesi.pipeline.notes import of_another_model, of_day, on_temperatures
+from aesi.pipeline.notes import other_model_sentences, soh_day_sentences, temperature_range_sentences
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.simulation import SayNotes, write_table
 from aesi.records import Spectrum
@@ -66,36 +66,45 @@ def impedance_file(
     z = impedance(declared.cell, hz, soc, temperature_degc, active, model=model or declared.model)
     write_table(out, {"frequency_hz": hz, "z_real_ohm": z.real, "z_imag_ohm": z.imag})
     if say_notes is not None:
-        cold = on_temperatures(declared.cell, [temperature_degc])
-        told = (*of_another_model(declared, model), *of_day(given.cell, soh), *cold, *_left_out(active))
-        say_notes([*declared.cell.unread, *told])
+        cold = temperature_range_sentences(declared.cell, [temperature_degc])
+        say_notes(
+            [
+                *declared.cell.unread,
+                *other_model_sentences(declared, model),
+                *soh_day_sentences(given.cell, soh),
+                *cold,
+                *_missing_effect_sentences(active),
+            ]
+        )
         if hz.max() > INSTANT_HZ and not _has_double_layer(declared.cell, active):
             say_notes([NO_DOUBLE_LAYER])
-        say_notes(_out_of_reach(hz, slowest_diffusion_hz(declared.cell, soc, temperature_degc, active)))
+        say_notes(
+            _frequency_sentences(hz, slowest_diffusion_hz(declared.cell, soc, temperature_degc, active))
+        )
     return z
 
 
-def _out_of_reach(hz: Array, slowest_hz: float) -> list[str]:
+def _frequency_sentences(hz: Array, slowest_hz: float) -> list[str]:
     """Sentences on frequencies that are too low or too high for the model.  slowest_hz : of its diffusion."""
     below, above, said = int(np.sum(hz < slowest_hz)), int(np.sum(hz > BAND_HZ[1])), []
     if below:
         said.append(
-            f"{_of_them(below)} below {slowest_hz:.2g} Hz, where the slowest diffusion in the model "
+            f"{_count_clause(below)} below {slowest_hz:.2g} Hz, where the slowest diffusion in the model "
             "keeps up: Z tends to the slope of the open-circuit voltage alone, and |Z| to 1/f without end."
         )
     if above:
         said.append(
-            f"{_of_them(above)} above {BAND_HZ[1]:g} Hz, where a measured spectrum is of leads and "
+            f"{_count_clause(above)} above {BAND_HZ[1]:g} Hz, where a measured spectrum is of leads and "
             "windings, too: the model has no inductance."
         )
     return said
 
 
-def _of_them(count: int) -> str:
+def _count_clause(count: int) -> str:
     return f"{count:,} of the frequencies {'lies' if count == 1 else 'lie'}"
 
 
-def _left_out(effects: Sequence[ActiveEffect]) -> list[str]:
+def _missing_effect_sentences(effects: Sequence[ActiveEffect]) -> list[str]:
     """Sentences on the effects that an impedance lacks, in whole or in part: those that act on a record, a reading
     or a given temperature alone, and those on the voltage, which may go on to answer after the current is there, as
     `ohmic` ones do not."""
@@ -155,18 +164,18 @@ def read_frequencies(text: str) -> Array:
 class SpectrumError:
     """A measured spectrum beside the model's.
 
-    soc : at which the model was taken.  z_ohm : (n,) the model's.  off : root mean square of |Z_model|/|Z| - 1 within
-    `BAND_HZ`, None where no frequency lies in it.  fitted : whether the cell was fitted to it.
+    soc : at which the model was taken.  z_ohm : (n,) the model's.  ratio_error : root mean square of |Z_model|/|Z| - 1
+    within `BAND_HZ`, None where no frequency lies in it.  fitted : whether the cell was fitted to it.
     """
 
     measured: Spectrum
     soc: float
     z_ohm: ComplexArray
-    off: float | None
+    ratio_error: float | None
     fitted: bool = False
 
 
-def held_against(
+def compared_spectra(
     cell: Cell,
     spectra: Sequence[Spectrum],
     effects: Sequence[ActiveEffect] = (),
@@ -178,12 +187,12 @@ def held_against(
 
     fitted : those that the cell was fitted to, which come first.
     """
-    kept, told = usable(cell, [*fitted, *spectra])
+    kept, sentences = comparable_spectra(cell, [*fitted, *spectra])
     out = []
     for spectrum in kept:
         soc, seen = state_of(cell, spectrum), in_band(spectrum)
         z = impedance(cell, spectrum.frequency_hz, soc, degc_of(spectrum), effects, model=model)
         ratio = np.abs(z[seen]) / np.abs(spectrum.z_ohm[seen]) - 1.0
-        off = rms(ratio) if seen.any() else None
-        out.append(SpectrumError(spectrum, soc, z, off, any(spectrum is one for one in fitted)))
-    return tuple(out), told
+        ratio_error = rms(ratio) if seen.any() else None
+        out.append(SpectrumError(spectrum, soc, z, ratio_error, any(spectrum is one for one in fitted)))
+    return tuple(out), sentences

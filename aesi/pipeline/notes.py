@@ -74,7 +74,9 @@ def _on_case(cell: Cell, effects: Sequence[ActiveEffect]) -> HeatBalance | None:
     return of_record(model_with(cell, effects), measured=True).heat
 
 
-def without_energies(cell: Cell, temperatures_degc: Iterable[Array | float | None]) -> tuple[str, ...]:
+def missing_energy_sentences(
+    cell: Cell, temperatures_degc: Iterable[Array | float | None]
+) -> tuple[str, ...]:
     """A sentence where properties of the cell do not answer to the temperatures that it is taken at.
 
     temperatures_degc : of each record, None where it holds none and is taken as the cell declares.
@@ -90,10 +92,10 @@ def without_energies(cell: Cell, temperatures_degc: Iterable[Array | float | Non
     )
 
 
-def beyond_fitted(cell: Cell, temperatures_degc: Iterable[Array | float | None]) -> tuple[str, ...]:
+def beyond_fitted_sentences(cell: Cell, temperatures_degc: Iterable[Array | float | None]) -> tuple[str, ...]:
     """A sentence where records are colder or warmer in the mean than any that the cell's file was fitted to.
 
-    Arguments as of `without_energies`.
+    Arguments as of `missing_energy_sentences`.
     """
     if not cell.fitted_at_k:
         return ()
@@ -114,19 +116,21 @@ def beyond_fitted(cell: Cell, temperatures_degc: Iterable[Array | float | None])
     return tuple(out)
 
 
-def on_temperatures(
+def temperature_range_sentences(
     cell: Cell, temperatures_degc: Iterable[Array | float | None], effects: Iterable[ActiveEffect] = ()
 ) -> tuple[str, ...]:
-    """Sentences on the temperatures that a cell is taken at: `without_energies` and `beyond_fitted`.
+    """Sentences on the temperatures that a cell is taken at: `missing_energy_sentences` and `beyond_fitted_sentences`.
 
     temperatures_degc : of each record, None where it holds none and is taken as the cell's file declares, or as
     `effects` change that.
     """
     given, acting = list(temperatures_degc), model_with(cell, effects).cell
-    return (*without_energies(acting, given), *beyond_fitted(acting, given))
+    return (*missing_energy_sentences(acting, given), *beyond_fitted_sentences(acting, given))
 
 
-def of_contradiction(model: HybridModel, record: Measurement, soc0: float, hold: Hold) -> tuple[str, ...]:
+def contradiction_sentences(
+    model: HybridModel, record: Measurement, soc0: float, hold: Hold
+) -> tuple[str, ...]:
     """A sentence where the voltage of a record contradicts the temperature that it is simulated at, told on the rows
     that a fit would see of it.
 
@@ -141,8 +145,8 @@ def of_contradiction(model: HybridModel, record: Measurement, soc0: float, hold:
     return () if found is None else (found.sentence(record.name),)
 
 
-def of_day(cell: Cell, soh: Soh | None) -> tuple[str, ...]:
-    """A sentence on what a state of health that is a day stands for; none for a share.
+def soh_day_sentences(cell: Cell, soh: Soh | None) -> tuple[str, ...]:
+    """A sentence on the share of capacity that a state of health stands for which is a day; empty for a share.
 
     cell : of the file, before it is taken at that state.
     """
@@ -153,7 +157,7 @@ def of_day(cell: Cell, soh: Soh | None) -> tuple[str, ...]:
     )
 
 
-def of_fitted(
+def fitted_record_sentences(
     cell: Cell, record: Measurement, soh: Soh | None, effects: Iterable[ActiveEffect] = ()
 ) -> tuple[str, ...]:
     """Sentences where the cell's file was fitted to a record of this name: the share of its capacity that the cell had
@@ -182,8 +186,8 @@ def of_fitted(
     return tuple(said)
 
 
-def of_dry_collector(name: str, run: Run | Prediction, model: ModelName) -> tuple[str, ...]:
-    """A sentence that a single particle model depleted the salt at a collector, with the time; () where it did not."""
+def dry_collector_sentences(name: str, run: Run | Prediction, model: ModelName) -> tuple[str, ...]:
+    """A sentence where a single particle model depleted the salt at a collector, with the time; empty for others."""
     salt_mol_m3 = run.collector_mol_m3
     dry = np.zeros(len(run), dtype=bool) if salt_mol_m3 is None else salt_mol_m3 < 0.0
     if model != "espm" or not dry.any():
@@ -195,7 +199,7 @@ def of_dry_collector(name: str, run: Run | Prediction, model: ModelName) -> tupl
     )
 
 
-def of_another_model(declared: HybridModel, asked: ModelName | None) -> tuple[str, ...]:
+def other_model_sentences(declared: HybridModel, asked: ModelName | None) -> tuple[str, ...]:
     """A sentence where a simulation takes another physics model than what is simulated was found or fitted with."""
     cell, found = declared.cell, bool(declared.effects or declared.correction)
     if asked is None or asked == declared.model or not (found or cell.fitted_with):
@@ -208,6 +212,7 @@ def of_another_model(declared: HybridModel, asked: ModelName | None) -> tuple[st
 
 
 def _without_energy(cell: Cell) -> list[str]:
+    """Names of the properties that the cell declares no activation energy for."""
     energies = {
         "negative diffusivity": cell.negative.diffusivity_ea_j_mol,
         "negative reaction rate": cell.negative.rate_ea_j_mol,

@@ -28,12 +28,12 @@ from aesi.physics.model import case_k
 from aesi.physics.rest.open_circuit import GIVEN_SD
 from aesi.physics.simulation import model_with
 from aesi.pipeline.notes import (
-    of_another_model,
-    of_contradiction,
-    of_day,
-    of_dry_collector,
-    of_fitted,
-    on_temperatures,
+    contradiction_sentences,
+    dry_collector_sentences,
+    fitted_record_sentences,
+    other_model_sentences,
+    soh_day_sentences,
+    temperature_range_sentences,
     temperature_sentence,
 )
 from aesi.pipeline.product.declared import declared_model
@@ -105,7 +105,7 @@ def simulate_file(
     if declared.correction is not None:
         say(["the saved model's learnt correction is no part of a simulation; `aesi predict` has it."])
         declared = replace(declared, finding="")  # it is of the model with its correction
-    say([*of_another_model(declared, model), *of_day(given.cell, asked.soh)])
+    say([*other_model_sentences(declared, model), *soh_day_sentences(given.cell, asked.soh)])
     saved, lone = cell.is_dir(), profile.voltage_v is None
     assumed = declared.hold if saved else "linear" if lone else assumed_hold(profile.time_s)
     used = replace(
@@ -114,14 +114,14 @@ def simulate_file(
         hold=asked.hold or assumed,
         model=model or declared.model,
     )
-    placed = _placed(used, profile, current, asked, say, saved=saved)
-    used = placed.model
-    with _doubting(placed.start, say):
+    profiled = _profiled_model(used, profile, current, asked, say, saved=saved)
+    used = profiled.model
+    with _with_start_doubt(profiled.start, say):
         run = simulate(
             used.cell,
             profile.time_s,
             profile.current_a,
-            placed.start.soc,
+            profiled.start.soc,
             used.effects,
             profile.temperature_degc,
             used.hold,
@@ -130,12 +130,12 @@ def simulate_file(
         )
     degc, of_case = _case_degc(used, run, profile.temperature_degc, declared.cell)
     _write_run(out, run, degc)
-    say([f"{placed.record.name}: {words}" for words in of_case])
-    say(reached(used.cell, placed.record, run.voltage_v, run.series["soc"]))
-    say(of_dry_collector(placed.record.name, run, used.model))
+    say([f"{profiled.record.name}: {words}" for words in of_case])
+    say(simulated_record_sentences(used.cell, profiled.record, run.voltage_v, run.series["soc"]))
+    say(dry_collector_sentences(profiled.record.name, run, used.model))
     if asked.run_on and np.any(run.series["depleted"]):
         at = int(np.argmax(run.series["depleted"]))
-        say([ran_out(placed.record.name, {"this model": float(run.time_s[at])})])
+        say([ran_out(profiled.record.name, {"this model": float(run.time_s[at])})])
     return run
 
 
@@ -194,37 +194,40 @@ def predict_file(
         raise DataError(f"{current.name} has no voltage_v; leave out --measured for a free run.")
     given = HybridModel.load(model)
     saved = given.with_soh(asked.soh)
-    say(of_day(given.cell, asked.soh))
+    say(soh_day_sentences(given.cell, asked.soh))
     used = replace(saved, hold=asked.hold or saved.hold)
-    placed = _placed(used, profile, current, asked, say, saved=True)
-    hybrid, record = placed.model, placed.record
-    start, soc0_sd = placed.start, placed.start.read_sd if asked.soc0_sd is None else asked.soc0_sd
-    with _doubting(start, say):
+    profiled = _profiled_model(used, profile, current, asked, say, saved=True)
+    hybrid, record = profiled.model, profiled.record
+    start, soc0_sd = profiled.start, profiled.start.read_sd if asked.soc0_sd is None else asked.soc0_sd
+    with _with_start_doubt(start, say):
         prediction = hybrid.predict_record(record, start.soc, one_step=measured, soc0_sd=soc0_sd)
     frame = prediction.to_frame()
     frame.insert(1, "current_a", profile.current_a)
     _write(out, frame)
     # One step ahead knows the voltage before each row, which the physics does not: its errors are no peers of these.
     alone_v = None if hybrid.correction is None or measured else prediction.physics_v
-    say(reached(hybrid.cell, record, prediction.voltage_v, prediction.soc, alone_v))
-    say(of_dry_collector(record.name, prediction, hybrid.model))
-    say(_of_first(record, prediction, hybrid, measured))
+    say(simulated_record_sentences(hybrid.cell, record, prediction.voltage_v, prediction.soc, alone_v))
+    say(dry_collector_sentences(record.name, prediction, hybrid.model))
+    say(_first_error_sentences(record, prediction, hybrid, measured))
     if hybrid.bands is not None and not measured and start.basis == "given" and asked.soc0_sd is None:
-        say([_of_exact(record, prediction, hybrid, start.soc)])
-    say(_of_band(record, prediction, hybrid, measured))
+        say([_exact_start_sentence(record, prediction, hybrid, start.soc)])
+    say(_band_sentences(record, prediction, hybrid, measured))
     return len(frame)
 
 
 @dataclass(frozen=True, eq=False)
-class _Placed:
-    """A model on a profile.  record : the profile, NaN for a voltage that is not there.  start : at its first row."""
+class _ProfiledModel:
+    """A model with the profile that it is to simulate.
+
+    record : the profile, NaN for a voltage that is not there.  start : state of charge at its first row.
+    """
 
     model: HybridModel
     record: Measurement
     start: InitialState
 
 
-def _placed(
+def _profiled_model(
     model: HybridModel,
     profile: CurrentProfile,
     file: Path,
@@ -232,14 +235,15 @@ def _placed(
     say: SayNotes,
     *,
     saved: bool,
-) -> _Placed:
-    """The model asked for, on a profile that can be of its cell; says what is assumed.
+) -> _ProfiledModel:
+    """The model as it is asked for, with the profile and its initial state; says what is assumed.
 
-    saved : it is one of a folder, whose hold it has where none is asked for.
+    saved : the model is one of a folder, whose hold it has where none is asked for.
+    Raises DataError for a profile that cannot be of its cell.
     """
     cooling: tuple[str, ...] = ()
     if asked.self_heating:
-        heated = warmed(model.cell, model.effects)
+        heated = with_self_heating(model.cell, model.effects)
         if heated != model.effects and profile.temperature_degc is None:
             cooling = assumed(model.cell)
         model = replace(model, effects=heated)
@@ -249,21 +253,21 @@ def _placed(
     say(
         [
             *model.cell.unread,
-            *of_fitted(model.cell, record, asked.soh, model.effects),
+            *fitted_record_sentences(model.cell, record, asked.soh, model.effects),
             start.sentence,
             hold_sentence(record.name, model.hold, asked.hold is not None, saved=saved),
             temperature_sentence(model.cell, record, model.effects),
-            *on_temperatures(model.cell, [record.temperature_degc], model.effects),
-            *of_contradiction(model, record, start.soc, model.hold),
-            *_with_effects(record, model),
+            *temperature_range_sentences(model.cell, [record.temperature_degc], model.effects),
+            *contradiction_sentences(model, record, start.soc, model.hold),
+            *_effect_sentences(record, model),
             *cooling,
             *([f"when this model was made: {model.finding}"] if model.finding else []),
         ]
     )
-    return _Placed(model, record, start)
+    return _ProfiledModel(model, record, start)
 
 
-def _with_effects(record: Measurement, model: HybridModel) -> list[str]:
+def _effect_sentences(record: Measurement, model: HybridModel) -> list[str]:
     """A sentence on the effects that act, or that the cell holds, with their values, which may be defaults; of those
     that were fitted beside what was found the names alone."""
     acting = {
@@ -282,7 +286,7 @@ def _with_effects(record: Measurement, model: HybridModel) -> list[str]:
     return [f"{record.name}: {'; '.join(said)}."] if said else []
 
 
-def reached(
+def simulated_record_sentences(
     cell: Cell, record: Measurement, voltage_v: Array, soc: Array, alone_v: Array | None = None
 ) -> list[str]:
     """Sentences on a simulated record: where it ended, its error, and how much lies outside what the file declares.
@@ -296,7 +300,7 @@ def reached(
         said.append(
             f"{record.name}: against the measured voltage {rms(error):.2f} mV RMSE, "
             f"{np.mean(error):+.2f} mV in the mean (measured minus model), at most {np.max(np.abs(error)):.1f} mV"
-            f"{_beside_physics(record, rms(error), alone_v)}."
+            f"{_physics_error_clause(record, rms(error), alone_v)}."
         )
     beyond = (soc < -GIVEN_SD) | (soc > 1.0 + GIVEN_SD)  # as closely as any is known
     low, high = voltage_v < cell.lower_voltage_v, voltage_v > cell.upper_voltage_v
@@ -311,7 +315,7 @@ def reached(
         if np.any(rows)
     ]
     for rows, words in (
-        (beyond, f"a state of charge outside 0 to 1{_too_much(soc)}"),
+        (beyond, f"a state of charge outside 0 to 1{_beyond_limits_clause(soc)}"),
         (low | high, f"a voltage outside {limits}: {'; '.join(left)}"),
     ):
         if np.any(rows):
@@ -319,7 +323,7 @@ def reached(
     return said
 
 
-def _beside_physics(record: Measurement, corrected_mv: float, alone_v: Array | None) -> str:
+def _physics_error_clause(record: Measurement, corrected_mv: float, alone_v: Array | None) -> str:
     """Clause, from '; ' on, on the error of the physics without its correction, and on that being the smaller one."""
     if alone_v is None:
         return ""
@@ -330,7 +334,7 @@ def _beside_physics(record: Measurement, corrected_mv: float, alone_v: Array | N
     return f"; the physics alone {alone} mV RMSE{better}"
 
 
-def _too_much(soc: Array) -> str:
+def _beyond_limits_clause(soc: Array) -> str:
     """A clause, beginning with ': ', on how far a record discharges or charges a cell beyond its limits.  soc : (n,)
     simulated."""
     said = []
@@ -357,7 +361,9 @@ def _range_v(voltage_v: Array) -> str:
     return f"{np.min(voltage_v):.3f} to {np.max(voltage_v):.3f} V"
 
 
-def _of_first(record: Measurement, prediction: Prediction, model: HybridModel, measured: bool) -> list[str]:
+def _first_error_sentences(
+    record: Measurement, prediction: Prediction, model: HybridModel, measured: bool
+) -> list[str]:
     """A sentence on the error that a free run of a corrected model begins with."""
     if measured or model.correction is None:
         return []
@@ -372,7 +378,9 @@ def _of_first(record: Measurement, prediction: Prediction, model: HybridModel, m
     return [f"{record.name}: {words}; the band is that of a whole drive from its first row on."]
 
 
-def _of_exact(record: Measurement, prediction: Prediction, model: HybridModel, soc0: float) -> str:
+def _exact_start_sentence(
+    record: Measurement, prediction: Prediction, model: HybridModel, soc0: float
+) -> str:
     """A sentence that a band around a given start does not include an error of the start."""
     worth_v = model.start_worth_v(record, soc0, TOLD_SD, prediction.physics_v)
     return (
@@ -382,7 +390,9 @@ def _of_exact(record: Measurement, prediction: Prediction, model: HybridModel, s
     )
 
 
-def _of_band(record: Measurement, prediction: Prediction, model: HybridModel, measured: bool) -> list[str]:
+def _band_sentences(
+    record: Measurement, prediction: Prediction, model: HybridModel, measured: bool
+) -> list[str]:
     """Sentences on where the correction is applied, and on the share of rows within its band."""
     if model.correction is None:
         empty = ", and lower_v and upper_v are empty" if prediction.nominal is None else ""
@@ -407,12 +417,15 @@ def _of_band(record: Measurement, prediction: Prediction, model: HybridModel, me
             f"measured voltage; it is {MV_PER_V * float(np.mean(high - low)):.1f} mV wide in the mean."
         )
         if measured:
-            said += _of_observed(record, model, ~_within(prediction.voltage_v[banded], low, high))
+            said += _one_step_band_sentences(record, model, ~_within(prediction.voltage_v[banded], low, high))
     return said
 
 
-def _of_observed(record: Measurement, model: HybridModel, apart: BoolArray) -> list[str]:
-    """Sentences on what a band one step ahead is of.  apart : of the rows with a band, those predicted outside it."""
+def _one_step_band_sentences(record: Measurement, model: HybridModel, apart: BoolArray) -> list[str]:
+    """Sentences on predictions outside a band one step ahead, and on rows further apart than its step.
+
+    apart : True for those of the rows with a band that are predicted outside it.
+    """
     said = []
     if np.any(apart):
         said.append(
@@ -428,15 +441,17 @@ def _of_observed(record: Measurement, model: HybridModel, apart: BoolArray) -> l
 
 
 def _within(voltage_v: Array, lower_v: Array, upper_v: Array) -> BoolArray:
+    """(n,) True where a voltage lies in its band."""
     return (voltage_v >= lower_v) & (voltage_v <= upper_v)
 
 
 def _percent(rows: BoolArray) -> str:
+    """The share of True rows, '3.2 %'."""
     share = 100.0 * float(np.mean(rows))
     return f"{share:.2g} %" if share < 99.5 else "100 %"
 
 
-def warmed(cell: Cell, effects: tuple[ActiveEffect, ...]) -> tuple[ActiveEffect, ...]:
+def with_self_heating(cell: Cell, effects: tuple[ActiveEffect, ...]) -> tuple[ActiveEffect, ...]:
     """The effects with self-heating by the cell file's thermal data, where it is not among them already."""
     return effects if any(e.id == "self_heating" for e in effects) else (*effects, of_file(cell))
 
@@ -473,7 +488,7 @@ def _start(model: HybridModel, record: Measurement, soc0: float | None) -> Initi
 
 
 @contextmanager
-def _doubting(start: InitialState, say: SayNotes) -> Iterator[None]:
+def _with_start_doubt(start: InitialState, say: SayNotes) -> Iterator[None]:
     """Where a simulation fails that began at a state of charge read from a voltage, the error says to check that
     first."""
     try:

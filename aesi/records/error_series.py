@@ -26,15 +26,16 @@ class ErrorSeries:
     soc : (n,).  model_v : (n,) V, the physics model's voltage (so V_measured = model_v + error_v).
     physics : name -> (n,) V, what other physics models say of the same record, for comparison.
     temperature_degc : (n,) of the cell, as measured, else as the physics had it; None where neither is known.
-    slopes_v : (n, k) V, by how much a deviation of each parameter moves the physics model's voltage, where known.
-    start_v : (n,) V, >= 0, what a standard deviation of the state of charge that it starts from is worth, where that
-    was read from a voltage; None elsewhere.
-    missed_v : V, the error of the physics model that a recalibration allowed for, where one was made; it tells how much
-    rows leave open of the parameters, of the declared cell's too.
-    ran_out_s : s, from when on the physics model, or another one of `physics`, is held where it ran empty or full; an
-    error says no more than that from there on. None where none of them ran out, or that is not known.
-    own : the error over the record's own rows, in their number and at their times, where these are not the stamps
-    (between them or denser); None where they are. What is at a stamp then is filled in, or an average.
+    slopes_v : (n, k) V, change of the physics model's voltage by one prior standard deviation of each of k parameters;
+    None where not computed.
+    start_v : (n,) V, >= 0, change of it by one standard deviation of the initial state of charge, where that was read
+    from a voltage; None elsewhere.
+    missed_v : V, error of the physics model that a recalibration allowed for; it scales what the rows leave open of the
+    parameters. None without a recalibration.
+    ran_out_s : s, time from which the physics model, or another one of `physics`, is held at the limit of depletion, so
+    that the error means nothing. None where none of them ran out, or where that is not known.
+    own : the error over the record's own rows, at their times, where these are not the stamps but between them or
+    denser; the values at a stamp are interpolated or averages then. None where the rows are the stamps.
     The sparse model maps (error_v[k], inputs[k]) to error_v[k + 1]; records are never joined across a gap.
     """
 
@@ -77,7 +78,7 @@ class ErrorSeries:
         return np.full(len(self), np.nan) if self.temperature_degc is None else self.temperature_degc
 
     def steps(self, horizon_s: float) -> int:
-        """Samples that a prediction so far ahead goes over.  Raises InputError for a horizon that the step does not
+        """Number of steps in a horizon (s).  Raises InputError for a horizon that the step does not
         divide."""
         return steps_ahead(horizon_s, self.dt_s)
 
@@ -87,8 +88,8 @@ class ErrorSeries:
         return digest(self.error_v, self.inputs)
 
     @property
-    def runs(self) -> BoolArray:
-        """(n,) True for the rows before a physics model ran out."""
+    def before_depletion(self) -> BoolArray:
+        """(n,) True for the rows before `ran_out_s`, all where no physics model ran out."""
         return self.time_s < (np.inf if self.ran_out_s is None else self.ran_out_s)
 
     def take(self, rows: slice, name: str | None = None) -> ErrorSeries:
@@ -109,7 +110,8 @@ class ErrorSeries:
         )
 
     def _own_of(self, rows: slice) -> ErrorSeries | None:
-        """The own rows in the steps of a piece, and the last one until its first stamp where that has none."""
+        """`own` of a piece: the own rows in its steps, and the last one before its first stamp where none is in that
+        step."""
         start, stop, _ = rows.indices(len(self))
         if self.own is None or stop <= start:
             return None
@@ -119,14 +121,15 @@ class ErrorSeries:
         return self.own.take(slice(min(int(until[start]), int(until[start + 1]) - 1), int(until[stop])))
 
     @property
-    def as_known(self) -> ErrorSeries:
-        """The record with the error that rows until each stamp tell (`known_by`), and nothing of those behind it."""
+    def with_known_error(self) -> ErrorSeries:
+        """The record with the error at each stamp that is known from the own rows until there (`known_by`): what a
+        prediction that starts there may use. Itself where the rows are the stamps."""
         if self.own is None:
             return self
         return replace(self, error_v=known_by(self.own.time_s, self.own.error_v, self.time_s))
 
     def left_by(self, name: str) -> Array:
-        """(n,) V: measured minus what the named physics model says; of the model itself where nothing else is known."""
+        """(n,) V, error of the named physics model, measured minus simulated; `error_v` itself for an unknown name."""
         other = self.physics.get(name)
         return self.error_v if other is None else self.error_v + self.model_v - other
 

@@ -34,12 +34,13 @@ def overlap(one: Rows, other: Rows) -> Overlap | None:
 
 
 def agreement(one: Rows, other: Rows) -> Overlap | None:
-    """How two records agree at the times on which most of the rows agree that both have once; None without enough."""
+    """How two records agree, with the clock offset on which most of their common unique rows agree; None where too few
+    do."""
     if other.step_s < one.step_s:  # each row of the sparser is sought in the denser, not the other way round
         found = agreement(other, one)
-        return None if found is None else found.of_the_other()
+        return None if found is None else found.reversed()
     of_time, *digits = map(min, one.decimals, other.decimals)
-    (our_keys, our_rows), (their_keys, their_rows) = one.once(*digits), other.once(*digits)
+    (our_keys, our_rows), (their_keys, their_rows) = one.unique_rows(*digits), other.unique_rows(*digits)
     _, ours, theirs = np.intersect1d(our_keys, their_keys, assume_unique=True, return_indices=True)
     if len(ours) < FEWEST_ROWS:
         return None
@@ -50,11 +51,16 @@ def agreement(one: Rows, other: Rows) -> Overlap | None:
     if most < FEWEST_ROWS:
         return None
     ahead_s = round(float(np.median(ahead[first : first + most])), CLOCK_DECIMALS)
-    return _at(one, other, ahead_s, close_s, digits)
+    return _agreement_at(one, other, ahead_s, close_s, digits)
 
 
-def _at(one: Rows, other: Rows, ahead_s: float, close_s: float, digits: list[int]) -> Overlap | None:
-    """How the rows of two records agree, one clock being so much ahead of the other."""
+def _agreement_at(
+    one: Rows, other: Rows, ahead_s: float, close_s: float, digits: list[int]
+) -> Overlap | None:
+    """How the rows of two records agree for a clock offset of `ahead_s`; None where too few of those that move do.
+
+    close_s : largest difference of two times that count as one.  digits : decimals of current and voltage.
+    """
     time = other.time_s - ahead_s
     after = np.clip(np.searchsorted(one.time_s, time), 1, len(one.time_s) - 1)
     row = after - (time - one.time_s[after - 1] < one.time_s[after] - time)

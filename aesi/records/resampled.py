@@ -42,15 +42,15 @@ def resampled(one: Rows, other: Rows) -> Overlap | None:
     digits = [min(pair) for pair in zip(one.decimals[1:], other.decimals[1:], strict=True)]
     if digits[1] < FINEST_V_DECIMALS or min(len(one.time_s), len(other.time_s)) < FEWEST_ROWS:
         return None
-    found = _in_the_other(one, other, digits)
+    found = _sought_between(one, other, digits)
     if found is None:
-        found = _in_the_other(other, one, digits)
-        return None if found is None else found.of_the_other()
+        found = _sought_between(other, one, digits)
+        return None if found is None else found.reversed()
     return found
 
 
-def _in_the_other(one: Rows, other: Rows, digits: list[int]) -> Overlap | None:
-    """The rows of `other` sought between those of `one`."""
+def _sought_between(one: Rows, other: Rows, digits: list[int]) -> Overlap | None:
+    """The rows of `other` sought between those of `one`; None where too few agree."""
     telling = _telling(other, digits)
     for ahead_s in sorted({0.0, float(other.time_s[0] - one.time_s[0])}):
         time = other.time_s - ahead_s

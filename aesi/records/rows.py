@@ -1,4 +1,4 @@
-"""Records as two of them are compared: their rows, in the decimals in which they are written, and what they share."""
+"""Two records compared: their rows to the decimals in which they are written, and what they share."""
 
 from __future__ import annotations
 
@@ -25,8 +25,9 @@ WHOLE = 1e-3
 class Overlap:
     """What the second of two records shares with the first.
 
-    rows, share : of the sparser's rows at common times, those that agree.  from_s, to_s : the second's times between
-    which they lie.  ahead_s : by how much its clock is ahead.  resampled : between the rows of the other, not on them.
+    rows, share : number of rows that agree, and their share of the sparser record's rows at common times.
+    from_s, to_s : first and last time of them in the second record, s.  ahead_s : how far the clock of the second is
+    ahead of the first's, s.  resampled : True where they lie between the rows of the other record, not on them.
     """
 
     rows: int
@@ -36,8 +37,8 @@ class Overlap:
     ahead_s: float
     resampled: bool = False
 
-    def of_the_other(self) -> Overlap:
-        """What the first shares with the second, where this is what the second does with the first."""
+    def reversed(self) -> Overlap:
+        """The same overlap with the two records exchanged."""
         times = self.from_s - self.ahead_s, self.to_s - self.ahead_s
         return Overlap(self.rows, self.share, *times, -self.ahead_s, self.resampled)
 
@@ -49,24 +50,30 @@ class Rows:
         self.time_s, self.current_a, self.voltage_v = record.time_s, record.current_a, record.voltage_v
         self.decimals = tuple(map(_decimals, (self.time_s, self.current_a, self.voltage_v)))
         self.step_s = float(np.median(np.diff(self.time_s))) if len(self.time_s) > 1 else np.inf
-        self._once: dict[tuple[int, int], tuple[IntArray, IntArray]] = {}
+        self._unique: dict[tuple[int, int], tuple[IntArray, IntArray]] = {}
 
-    def once(self, of_current: int, of_voltage: int) -> tuple[IntArray, IntArray]:
-        """The rows, in so many decimals, that are there once, whichever way their current flows: their keys in order,
-        and where they are."""
+    def unique_rows(self, of_current: int, of_voltage: int) -> tuple[IntArray, IntArray]:
+        """(keys in ascending order, numbers) of the rows whose magnitude of the current and voltage occur once.
+
+        of_current, of_voltage : decimals to which these are rounded. A key encodes both.
+        """
         at = of_current, of_voltage
-        if at not in self._once:
+        if at not in self._unique:
             known = np.flatnonzero(np.isfinite(self.voltage_v))
             current = np.round(np.abs(self.current_a[known]) * 10.0**of_current).astype(np.int64)
             voltage = np.round(self.voltage_v[known] * 10.0**of_voltage).astype(np.int64)
             keys, first, counts = np.unique(
                 current * 10 ** (MOST_DECIMALS + 2) + voltage, return_index=True, return_counts=True
             )
-            self._once[at] = keys[counts == 1], known[first[counts == 1]]
-        return self._once[at]
+            self._unique[at] = keys[counts == 1], known[first[counts == 1]]
+        return self._unique[at]
 
     def moving(self, of_current: int, of_voltage: int) -> BoolArray:
-        """(n,) True where current or voltage are others than in the row before, in so many decimals."""
+        """(n,) True where current or voltage differ from those of the row before by more than `MOVES` of the last
+        decimal.
+
+        of_current, of_voltage : number of decimals.
+        """
         moves = np.zeros(len(self.time_s), dtype=bool)
         for column, digits in ((self.current_a, of_current), (self.voltage_v, of_voltage)):
             moves[1:] |= np.abs(np.diff(column)) > MOVES * 10.0**-digits
@@ -82,7 +89,7 @@ class Rows:
 
 
 def _decimals(column: Array) -> int:
-    """Digits behind the point in which a column (n,) is written, at most MOST_DECIMALS."""
+    """Number of decimals in which a column (n,) is written, at most MOST_DECIMALS."""
     known = column[np.isfinite(column)]
     for digits in range(MOST_DECIMALS):
         scaled = known * 10.0**digits

@@ -1,7 +1,7 @@
-"""Rows of a record as they were measured, told off to the steps of an even grid.
+"""Assignment of the measured rows of a record to the steps of an even grid.
 
-Step k ends at stamp k and begins behind the stamp before it; a row at a stamp, but for its last digits, is in the step
-that ends there. The grid begins at the first row, and rows behind its last stamp are told off to that.
+Step k ends at stamp k and begins after the stamp before it; a row at a stamp, within `TOLERANCE`, is in the step that
+ends there. The grid begins at the first row, and rows after its last stamp are assigned to that one.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ def after_gap(time_s: Array, dt_s: float) -> BoolArray:
 
 
 def known_by(time_s: Array, values: Array, stamps_s: Array) -> Array:
-    """(m,) what rows until each stamp tell of a slow quantity: their average since the stamp before, and where there
-    are none the last row's. No value depends on a later row.
+    """(m,) a slow quantity as it is known at each stamp: the average over the rows since the stamp before, and the last
+    row's value where there are none. No value depends on a later row.
 
     time_s, values : (n,) of the rows.  stamps_s : (m,) even, the first at the first row or later.
     """
@@ -34,16 +34,16 @@ def known_by(time_s: Array, values: Array, stamps_s: Array) -> Array:
 
 
 def next_stamp(time_s: Array, stamps_s: Array) -> IntArray:
-    """(n,) which of the even stamps (m,) is the first at or after each row; the last one for rows behind it."""
+    """(n,) number of the first of the even stamps (m,) at or after each row; the last stamp for rows after it."""
     found = np.searchsorted(stamps_s + _slack_s(stamps_s), time_s)
     return np.minimum(found, len(stamps_s) - 1)
 
 
 def rows_until(time_s: Array, stamps_s: Array) -> IntArray:
-    """(m,) how many of the rows (n,) are at each of the even stamps or before."""
+    """(m,) number of the rows (n,) at or before each of the even stamps."""
     return np.searchsorted(time_s, stamps_s + _slack_s(stamps_s), side="right")
 
 
 def _slack_s(stamps_s: Array) -> float:
-    """s by which a row may miss a stamp and be at it."""
+    """Largest distance of a row from a stamp, s, within which it is at the stamp."""
     return TOLERANCE * float(stamps_s[1] - stamps_s[0]) if len(stamps_s) > 1 else 0.0

@@ -49,11 +49,11 @@ def test_a_piece_of_a_record_has_the_own_rows_of_its_steps_and_knows_the_one_bef
         model_v=np.full(4, 3.7),
     )
     whole = replace(SERIES, own=own)  # stamps 0, 0.5, 1, 1.5 and 2
-    np.testing.assert_array_equal(whole.as_known.error_v, [1.0, 1.0, 2.0, 3.0, 4.0])
+    np.testing.assert_array_equal(whole.with_known_error.error_v, [1.0, 1.0, 2.0, 3.0, 4.0])
     assert whole.take(slice(0, 5)).own is own
     for start in range(4):
         piece = whole.take(slice(start, 5))
-        np.testing.assert_array_equal(piece.as_known.error_v, whole.as_known.error_v[start:])
+        np.testing.assert_array_equal(piece.with_known_error.error_v, whole.with_known_error.error_v[start:])
     np.testing.assert_array_equal(whole.take(slice(2, 4)).own.time_s, [0.7, 1.4])
     np.testing.assert_array_equal(whole.take(slice(1, 2)).own.time_s, [0.0])  # none in its step
-    assert SERIES.as_known is SERIES
+    assert SERIES.with_known_error is SERIES

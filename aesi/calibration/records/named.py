@@ -11,16 +11,16 @@ from aesi.errors import DataError
 from aesi.records import Measurement
 
 
-def named_apart(
-    records: Sequence[Measurement], said: Mapping[str, Mapping[str, object]]
+def uniquely_named(
+    records: Sequence[Measurement], given: Mapping[str, Mapping[str, object]]
 ) -> tuple[Measurement, ...]:
     """The records; those that share a name are numbered: `us06 (1)`, `us06 (2)`.
 
-    said : what is given of single records, by what it is in a word ("temperature") and by record name.
+    given : what it is, in a word ("temperature") -> record name -> what the user gave for that record.
     Raises DataError where something is given under a name that several records share.
     """
     counts = Counter(record.name for record in records)
-    for what, by_name in said.items():
+    for what, by_name in given.items():
         for name in by_name:
             if counts[name] > 1:
                 raise DataError(

@@ -111,7 +111,7 @@ def _prepared(
     )
 
 
-def hold_told(record: Prepared) -> str:
+def fitted_rows_sentence(record: Prepared) -> str:
     """A sentence on the rows that are fitted and how the current runs between them."""
     declared = record.data.hold
     if record.rows is record.data:

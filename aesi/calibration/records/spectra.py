@@ -52,22 +52,24 @@ def in_band(spectrum: Spectrum) -> BoolArray:
     return (spectrum.frequency_hz >= BAND_HZ[0]) & (spectrum.frequency_hz <= BAND_HZ[1])
 
 
-def usable(cell: Cell, spectra: Sequence[Spectrum]) -> tuple[tuple[Spectrum, ...], tuple[str, ...]]:
+def comparable_spectra(
+    cell: Cell, spectra: Sequence[Spectrum]
+) -> tuple[tuple[Spectrum, ...], tuple[str, ...]]:
     """(spectra that a model of this cell can be compared with, sentences on those left out and on those of unknown
     temperature)."""
-    kept, told = [], []
+    kept, sentences = [], []
     for spectrum in spectra:
         soc = state_of(cell, spectrum)
         if not 0.0 <= soc <= 1.0:
-            told.append(
+            sentences.append(
                 f"{spectrum.name}: left out, since its state of charge of {soc:.4g} is not between 0 and 1 (50 % is "
                 "0.5)."
             )
             continue
         if spectrum.temperature_degc is None:
-            told.append(f"{spectrum.name}: no temperature; the model is taken at {ASSUMED_DEGC:g} degC.")
+            sentences.append(f"{spectrum.name}: no temperature; the model is taken at {ASSUMED_DEGC:g} degC.")
         kept.append(spectrum)
-    return tuple(kept), tuple(told)
+    return tuple(kept), tuple(sentences)
 
 
 def check_spectra(cell: Cell, spectra: Sequence[Spectrum]) -> None:
@@ -105,13 +107,13 @@ def check_spectra(cell: Cell, spectra: Sequence[Spectrum]) -> None:
         )
 
 
-def fitted_ones(cell: Cell, spectra: Sequence[Spectrum]) -> tuple[tuple[Spectrum, ...], tuple[str, ...]]:
-    """(spectra that a fit from this cell uses, sentences as from `usable` and on those outside the band).
+def fitted_spectra(cell: Cell, spectra: Sequence[Spectrum]) -> tuple[tuple[Spectrum, ...], tuple[str, ...]]:
+    """(spectra that a fit from this cell uses, sentences as from `comparable_spectra` and on those outside the band).
 
     Raises DataError where spectra were given and none can be fitted.
     """
     check_spectra(cell, spectra)
-    kept, told = usable(cell, spectra)
+    kept, sentences = comparable_spectra(cell, spectra)
     seen = tuple(spectrum for spectrum in kept if in_band(spectrum).any())
     if spectra and not seen:
         raise DataError(
@@ -123,7 +125,7 @@ def fitted_ones(cell: Cell, spectra: Sequence[Spectrum]) -> tuple[tuple[Spectrum
         for spectrum in kept
         if not in_band(spectrum).any()
     )
-    return seen, (*told, *outside)
+    return seen, (*sentences, *outside)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aesi.calibration.start import hold_counted
+from aesi.calibration.start import charge_hold
 from aesi.data.thinning import Spacing, averaged_over, condensed, current_steps
 from aesi.numerics.typing import BoolArray
 from aesi.records import Hold, Measurement
@@ -39,7 +39,7 @@ class Thinned:
 def thinned(data: Measurement, capacity_ah: float) -> Thinned:
     """The rows that a fit uses.  capacity_ah : converts the C-rate of a step of the current to A."""
     span_s = float(data.time_s[-1] - data.time_s[0])
-    steady = condensed(data, capacity_ah, span_s / STEADY_ROWS, SPACING, hold_counted(data))
+    steady = condensed(data, capacity_ah, span_s / STEADY_ROWS, SPACING, charge_hold(data))
     if steady is None:
         rows = averaged_over(data, max(WINDOW_S, span_s / MOST_ROWS))
         return Thinned(rows, np.ones(len(rows), dtype=bool), "linear")
@@ -47,4 +47,4 @@ def thinned(data: Measurement, capacity_ah: float) -> Thinned:
     gaps = np.diff(rows.time_s)
     followed = np.append(gaps[1:], np.inf) < SOON_S
     trusted = np.concatenate([[True], ~(current_steps(rows, capacity_ah) & followed)])
-    return Thinned(rows, trusted, hold_counted(data))
+    return Thinned(rows, trusted, charge_hold(data))

@@ -69,7 +69,7 @@ class Zero:
         """The working coordinate at which currents stay as they were measured."""
         return -self.mean_a / self.sd_a
 
-    def taken_out(self, record: Measurement, nominal_ah: float) -> Measurement:
+    def subtracted_from(self, record: Measurement, nominal_ah: float) -> Measurement:
         """A slow record with the mean subtracted from its current; other records unchanged."""
         if not is_slow(record, nominal_ah):
             return record
@@ -96,13 +96,13 @@ def zero_of(cell: Cell, records: Sequence[Measurement]) -> Zero:
     for record in records:
         if not is_slow(record, cell.nominal_capacity_ah) or not _is_cycle(cell, record):
             continue
-        told = _of_cycle(cell, record)
-        if isinstance(told, str):
+        offset = _cycle_offset(cell, record)
+        if isinstance(offset, str):
             sentences.append(
-                f"{record.name}: its charge balance does not determine the offset of its current: {told}."
+                f"{record.name}: its charge balance does not determine the offset of its current: {offset}."
             )
             continue
-        mean, sd = told
+        mean, sd = offset
         means.append(mean)
         sds.append(sd)
         sentences.append(
@@ -129,7 +129,7 @@ def _moved_ah(data: Measurement) -> Array:
     return np.diff(data.time_s, prepend=data.time_s[0]) * data.current_a / SECONDS_PER_HOUR
 
 
-def _of_cycle(cell: Cell, data: Measurement) -> tuple[float, float] | str:
+def _cycle_offset(cell: Cell, data: Measurement) -> tuple[float, float] | str:
     """((1), its standard deviation), A, of a cycle; for one that does not go from full to full with a rest there, a
     clause with the reason."""
     flows = steadily_flowing(data)

@@ -9,7 +9,7 @@ import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.blind.case import RecordKind
-from aesi.data.profiles.profile import Bench, Profile
+from aesi.data.profiles.profile import Profile, ProfileBuilder
 from aesi.numerics.typing import Array
 
 SCHEDULES = ("udds", "hwfet", "us06", "wltc_3b", "artemis_urban", "sc03", "nedc")
@@ -29,7 +29,7 @@ LEAST_SOC = 0.1
 
 
 @dataclass(frozen=True)
-class Asked:
+class DutyConditions:
     """Conditions of a test.
 
     capacity_ah : of the cell.  rate : factor on the currents.  soc0 : at the first row.  dt_s : interval of rows, s.
@@ -41,71 +41,71 @@ class Asked:
     dt_s: float = 1.0
 
     @property
-    def bench(self) -> Bench:
-        """The converter of pieces to currents."""
-        return Bench(self.capacity_ah, dt_s=self.dt_s, scale=self.rate)
+    def builder(self) -> ProfileBuilder:
+        """The builder of profiles for this cell, with the factor on the currents."""
+        return ProfileBuilder(self.capacity_ah, dt_s=self.dt_s, scale=self.rate)
 
 
-def drive(asked: Asked, rng: np.random.Generator) -> Profile:
+def drive(conditions: DutyConditions, rng: np.random.Generator) -> Profile:
     """Schedules in random order until 1,500 s are full; each followed by rest, charge pulse of 20 to 60 s, rest."""
-    bench = asked.bench
-    pieces: list[Array] = [bench.rest(FIRST_REST_S)]
-    while _seconds(pieces, asked) < SHORTEST_S:
-        room = LONGEST_S - _seconds(pieces, asked)
+    builder = conditions.builder
+    pieces: list[Array] = [builder.rest(FIRST_REST_S)]
+    while _seconds(pieces, conditions) < SHORTEST_S:
+        room = LONGEST_S - _seconds(pieces, conditions)
         piece = [
-            bench.drive(str(rng.choice(SCHEDULES))),
-            bench.rest(float(rng.integers(60, 240))),
-            bench.pulse(-PULSE_C * asked.rate, float(rng.integers(20, 60))),
-            bench.rest(float(rng.integers(60, 300))),
+            builder.drive(str(rng.choice(SCHEDULES))),
+            builder.rest(float(rng.integers(60, 240))),
+            builder.pulse(-PULSE_C * conditions.rate, float(rng.integers(20, 60))),
+            builder.rest(float(rng.integers(60, 300))),
         ]
-        if _seconds(piece, asked) <= room:
+        if _seconds(piece, conditions) <= room:
             pieces += piece
-    return bench.profile("drive", pieces, asked.soc0)
+    return builder.profile("drive", pieces, conditions.soc0)
 
 
-def fast_charge(asked: Asked, rng: np.random.Generator) -> Profile:
+def fast_charge(conditions: DutyConditions, rng: np.random.Generator) -> Profile:
     """Drive pieces with long 3C charges at a high state of charge, at which lithium plates."""
-    bench = asked.bench
-    pieces: list[Array] = [bench.rest(FIRST_REST_S)]
-    while _seconds(pieces, asked) < SHORTEST_S:
+    builder = conditions.builder
+    pieces: list[Array] = [builder.rest(FIRST_REST_S)]
+    while _seconds(pieces, conditions) < SHORTEST_S:
         pieces += [
-            bench.drive(str(rng.choice(("us06", "sc03", "artemis_urban")))),
-            bench.rest(float(rng.integers(60, 180))),
-            bench.pulse(-3.0 * asked.rate, float(rng.integers(60, 120))),
-            bench.rest(float(rng.integers(200, 400))),
+            builder.drive(str(rng.choice(("us06", "sc03", "artemis_urban")))),
+            builder.rest(float(rng.integers(60, 180))),
+            builder.pulse(-3.0 * conditions.rate, float(rng.integers(60, 120))),
+            builder.rest(float(rng.integers(200, 400))),
         ]
-    return bench.profile("fast_charge", pieces, asked.soc0)
+    return builder.profile("fast_charge", pieces, conditions.soc0)
 
 
-def pulses(asked: Asked, rng: np.random.Generator) -> Profile:
+def pulses(conditions: DutyConditions, rng: np.random.Generator) -> Profile:
     """Discharge and charge pulses of 10 s with rests, 8 % of the charge taken out at 1C between them."""
-    bench = asked.bench
-    pieces: list[Array] = [bench.rest(FIRST_REST_S)]
-    while _seconds(pieces, asked) < SHORTEST_S:
-        strength = asked.rate * float(rng.uniform(1.0, 2.0))
+    builder = conditions.builder
+    pieces: list[Array] = [builder.rest(FIRST_REST_S)]
+    while _seconds(pieces, conditions) < SHORTEST_S:
+        strength = conditions.rate * float(rng.uniform(1.0, 2.0))
         pieces += [
-            bench.pulse(strength, 10.0),
-            bench.rest(60.0),
-            bench.pulse(-0.75 * strength, 10.0),
-            bench.rest(60.0),
-            bench.pulse(asked.rate, 0.08 * SECONDS_PER_HOUR / asked.rate),
-            bench.rest(float(rng.integers(120, 300))),
+            builder.pulse(strength, 10.0),
+            builder.rest(60.0),
+            builder.pulse(-0.75 * strength, 10.0),
+            builder.rest(60.0),
+            builder.pulse(conditions.rate, 0.08 * SECONDS_PER_HOUR / conditions.rate),
+            builder.rest(float(rng.integers(120, 300))),
         ]
-    return bench.profile("pulses", pieces, asked.soc0)
+    return builder.profile("pulses", pieces, conditions.soc0)
 
 
-def slow(asked: Asked, rng: np.random.Generator) -> Profile:
+def slow(conditions: DutyConditions, rng: np.random.Generator) -> Profile:
     """A discharge at C/5 down to a tenth of the charge, a row every 10 s, with rests before and after."""
-    bench = Bench(asked.capacity_ah, dt_s=SLOW_DT_S)
+    builder = ProfileBuilder(conditions.capacity_ah, dt_s=SLOW_DT_S)
     pieces = [
-        bench.rest(FIRST_REST_S),
-        bench.pulse(SLOW_C, (asked.soc0 - LEAST_SOC) / SLOW_C * SECONDS_PER_HOUR),
-        bench.rest(1200.0),
+        builder.rest(FIRST_REST_S),
+        builder.pulse(SLOW_C, (conditions.soc0 - LEAST_SOC) / SLOW_C * SECONDS_PER_HOUR),
+        builder.rest(1200.0),
     ]
-    return bench.profile("slow", pieces, asked.soc0)
+    return builder.profile("slow", pieces, conditions.soc0)
 
 
-TESTS: Mapping[RecordKind, Callable[[Asked, np.random.Generator], Profile]] = {
+TESTS: Mapping[RecordKind, Callable[[DutyConditions, np.random.Generator], Profile]] = {
     "drive": drive,
     "pulses": pulses,
     "slow": slow,
@@ -113,5 +113,5 @@ TESTS: Mapping[RecordKind, Callable[[Asked, np.random.Generator], Profile]] = {
 }
 
 
-def _seconds(pieces: list[Array], asked: Asked) -> float:
-    return sum(map(len, pieces)) * asked.dt_s
+def _seconds(pieces: list[Array], conditions: DutyConditions) -> float:
+    return sum(map(len, pieces)) * conditions.dt_s

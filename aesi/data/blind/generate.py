@@ -11,7 +11,7 @@ import numpy as np
 from aesi.constants import MV_PER_V
 from aesi.data.blind.case import BlindCase, CaseSpec
 from aesi.data.blind.cells import CELLS
-from aesi.data.blind.duty import TESTS, Asked
+from aesi.data.blind.duty import TESTS, DutyConditions
 from aesi.data.blind.recipes import RECIPES, Recipe, Written
 from aesi.data.blind.spread import parametrisation
 from aesi.data.blind.strangers import STRANGERS
@@ -44,8 +44,11 @@ REDUCTION = "reaction_nonuniformity"
 
 
 @dataclass(frozen=True, eq=False)
-class _Bench:
-    """The common part of all runs of a case. own : changes that are no effects (parameters, chamber temperature)."""
+class _CaseBase:
+    """What all runs of a case have in common: the declared cell file, the tests, and the true cell without effects.
+
+    own : changes that are no effects (parameters, chamber temperature).
+    """
 
     declared: Path
     spec: CaseSpec
@@ -78,8 +81,8 @@ class _Bench:
             else Profile("believed", profile.time_s, one.current_a, profile.soc0)
             for one, profile in zip(written, self.profiles, strict=True)
         ]
-        base = self.run((), model, radial_points, believed)
-        return np.concatenate([w.voltage_v - b.voltage_v for w, b in zip(written, base, strict=True)])
+        base_runs = self.run((), model, radial_points, believed)
+        return np.concatenate([w.voltage_v - b.voltage_v for w, b in zip(written, base_runs, strict=True)])
 
 
 def generate(spec: CaseSpec, cells: Mapping[str, Path]) -> BlindCase:
@@ -88,55 +91,55 @@ def generate(spec: CaseSpec, cells: Mapping[str, Path]) -> BlindCase:
     cells : name -> declared BPX file.
     Raises DataError for an unknown cell or recipe; SimulationError where the cell cannot be simulated.
     """
-    bench, sizes, rng = _shown(spec, cells)
-    spec, known = bench.spec, list(sizes)
+    base, sizes, rng = _base_showing_all(spec, cells)
+    spec, known = base.spec, list(sizes)
     strange = [name for name in spec.recipes if name in STRANGERS]
-    truth = {f"own.{a.change}.{k}": v for a in bench.own for k, v in a.values.items()}
+    truth = {f"own.{a.change}.{k}": v for a in base.own for k, v in a.values.items()}
     for name, values in sizes.items():
-        as_named = RECIPES[name].as_named(values, bench.declared)
+        as_named = RECIPES[name].as_named(values, base.declared)
         truth.update({f"{RECIPES[name].label}.{key}": value for key, value in as_named.items()})
     between = max((RECIPES[name].between for name in known), default=1)
-    traces = _changed(bench, sizes, between)
+    traces = _records_with_effects(base, sizes, between)
     for name in strange:
-        traces = _with_stranger(name, traces, bench, truth, int(rng.integers(2**31)))
+        traces = _with_stranger(name, traces, base, truth, int(rng.integers(2**31)))
     written = [Written(t.time_s, t.current_a, t.voltage_v) for t in traces]
     for name in known:
         written = [RECIPES[name].instrument(one, sizes[name]) for one in written]
     written = [Written(w.time_s[::between], w.current_a[::between], w.voltage_v[::between]) for w in written]
-    truth["rms_mv"] = MV_PER_V * _rms(bench.unexplained(written))
+    truth["rms_mv"] = MV_PER_V * _rms(base.unexplained(written))
     label, also = _label(known, strange)
     neutral = (REDUCTION,) if spec.model == "DFN" else ()
     measurements = tuple(
-        _measured(spec, one, t, rng, between) for one, t in zip(written, traces, strict=True)
+        _as_measured(spec, one, t, rng, between) for one, t in zip(written, traces, strict=True)
     )
     soc0 = spec.soc0 if spec.soc0_given else None
-    return BlindCase(spec, measurements, label, also, neutral, soc0, bench.declared, truth)
+    return BlindCase(spec, measurements, label, also, neutral, soc0, base.declared, truth)
 
 
-def _shown(
+def _base_showing_all(
     spec: CaseSpec, cells: Mapping[str, Path]
-) -> tuple[_Bench, dict[str, dict[str, float]], np.random.Generator]:
+) -> tuple[_CaseBase, dict[str, dict[str, float]], np.random.Generator]:
     """(bench, values of each recipe, generator in its present state) for the first cell that shows all effects.
 
     The cells are tried from that of the specification on: a particle of 50 nm does not show its diffusivity. Where none
     shows them all, it is the specification's own.
     """
-    _check(spec, cells)
+    _check_names(spec, cells)
     after = [*CELLS][[*CELLS].index(spec.cell) + 1 :] + [*CELLS][: [*CELLS].index(spec.cell)]
     allowed = [n for n in after if all(n in RECIPES[r].cells for r in spec.recipes if r in RECIPES)]
     tried = []
     for name in (spec.cell, *allowed):
-        there = spec if name == spec.cell else _moved(spec, name)
+        there = spec if name == spec.cell else _on_another_cell(spec, name)
         rng = np.random.default_rng(there.seed)
-        bench = _prepare(there, cells, rng)
-        sizes = {n: _scaled(RECIPES[n], bench) for n in there.recipes if n in RECIPES}
-        tried.append((bench, {n: values for n, (values, _) in sizes.items()}, rng))
+        base = _prepare(there, cells, rng)
+        sizes = {n: _scaled_values(RECIPES[n], base) for n in there.recipes if n in RECIPES}
+        tried.append((base, {n: values for n, (values, _) in sizes.items()}, rng))
         if all(moved >= SHOWN * spec.target_mv / MV_PER_V for _, moved in sizes.values()):
             return tried[-1]
     return tried[0]
 
 
-def _moved(spec: CaseSpec, cell: str) -> CaseSpec:
+def _on_another_cell(spec: CaseSpec, cell: str) -> CaseSpec:
     """The same case on another cell, at the same relative position in its ranges of charge and of rates."""
     old, new = CELLS[spec.cell], CELLS[cell]
     share = (spec.soc0 - old.soc0[0]) / (old.soc0[1] - old.soc0[0])
@@ -144,7 +147,8 @@ def _moved(spec: CaseSpec, cell: str) -> CaseSpec:
     return replace(spec, cell=cell, soc0=soc0, rate=round(spec.rate / old.rate * new.rate, 4))
 
 
-def _check(spec: CaseSpec, cells: Mapping[str, Path]) -> None:
+def _check_names(spec: CaseSpec, cells: Mapping[str, Path]) -> None:
+    """Raises DataError for an unknown cell or recipe."""
     if spec.cell not in cells:
         raise DataError(f"{spec.name}: there is no cell {spec.cell!r}; given are {', '.join(cells)}.")
     for name in spec.recipes:
@@ -153,18 +157,19 @@ def _check(spec: CaseSpec, cells: Mapping[str, Path]) -> None:
             raise DataError(f"{spec.name}: there is no recipe {name!r}{known}")
 
 
-def _prepare(spec: CaseSpec, cells: Mapping[str, Path], rng: np.random.Generator) -> _Bench:
+def _prepare(spec: CaseSpec, cells: Mapping[str, Path], rng: np.random.Generator) -> _CaseBase:
     declared = cells[spec.cell]
     capacity = nominal_capacity_ah(declared)
     profiles = []
     for number, kind in enumerate(spec.records):
         other = 0.0 if spec.soc0_given or number == 0 else float(rng.uniform(*OTHER_SOC))
-        profiles.append(TESTS[kind](Asked(capacity, spec.rate, spec.soc0 + other, spec.dt_s), rng))
+        profiles.append(TESTS[kind](DutyConditions(capacity, spec.rate, spec.soc0 + other, spec.dt_s), rng))
     own = parametrisation(rng) if spec.spread else ()
-    return _Bench(declared, spec, tuple(profiles), capacity, (*own, *_warmth(spec, rng)))
+    return _CaseBase(declared, spec, tuple(profiles), capacity, (*own, *_temperature_changes(spec, rng)))
 
 
-def _warmth(spec: CaseSpec, rng: np.random.Generator) -> tuple[Applied, ...]:
+def _temperature_changes(spec: CaseSpec, rng: np.random.Generator) -> tuple[Applied, ...]:
+    """The difference of the chamber from the declared temperature, and the rise in it, drawn for the case."""
     if spec.warmth == "none":
         return ()
     shift = {"shift_k": float(rng.uniform(-CHAMBER_K, CHAMBER_K))}
@@ -174,18 +179,18 @@ def _warmth(spec: CaseSpec, rng: np.random.Generator) -> tuple[Applied, ...]:
     return (Applied("temperature_course", shift | rise),)
 
 
-def _scaled(recipe: Recipe, bench: _Bench) -> tuple[dict[str, float], float]:
+def _scaled_values(recipe: Recipe, base: _CaseBase) -> tuple[dict[str, float], float]:
     """(values at which the recipe alone changes the voltage by about the target, or its least or most; that change,
     V RMS)."""
-    target = bench.spec.target_mv / MV_PER_V
+    target = base.spec.target_mv / MV_PER_V
 
     def values_at(magnitude: float) -> dict[str, float]:
-        return recipe.values(magnitude, bench.capacity_ah, bench.spec.soc0)
+        return recipe.values(magnitude, base.capacity_ah, base.spec.soc0)
 
     magnitude = max(1.0, recipe.least)
     moved = 0.0
     for _ in range(MOST_TRIES):
-        moved = _rms(_effect_alone(recipe, values_at(magnitude), bench))
+        moved = _rms(_effect_alone(recipe, values_at(magnitude), base))
         wanted = magnitude * target / max(moved, 1e-6)
         another = float(np.clip(wanted, recipe.least, recipe.most))
         if abs(moved / target - 1) < CLOSE_ENOUGH or another == magnitude:
@@ -194,56 +199,60 @@ def _scaled(recipe: Recipe, bench: _Bench) -> tuple[dict[str, float], float]:
     return values_at(magnitude), moved
 
 
-def _effect_alone(recipe: Recipe, values: Mapping[str, float], bench: _Bench) -> Array:
+def _effect_alone(recipe: Recipe, values: Mapping[str, float], base: _CaseBase) -> Array:
     """(rows,) V: change of the voltage by the recipe alone, from a coarse single particle."""
     if recipe.reference:
-        return np.concatenate(_difference(recipe, values, bench))
+        return np.concatenate(_difference(recipe, values, base))
     applied = (Applied(recipe.change, dict(values)),) if recipe.change else ()
     written = [
         recipe.instrument(Written(t.time_s, t.current_a, t.voltage_v), values)
-        for t in bench.run(applied, "SPMe", COARSE_POINTS)
+        for t in base.run(applied, "SPMe", COARSE_POINTS)
     ]
-    return bench.unexplained(written, "SPMe", COARSE_POINTS)
+    return base.unexplained(written, "SPMe", COARSE_POINTS)
 
 
-def _difference(recipe: Recipe, values: Mapping[str, float], bench: _Bench, between: int = 1) -> list[Array]:
+def _difference(
+    recipe: Recipe, values: Mapping[str, float], base: _CaseBase, between: int = 1
+) -> list[Array]:
     """Change of the voltage, V, by an option of the single particle over the same option without effect, by record."""
     assert recipe.change is not None
     assert recipe.reference is not None
     points = recipe.radial_points
-    changed = bench.run((Applied(recipe.change, dict(values)),), "SPMe", points, between=between)
-    without = bench.run((recipe.reference(),), "SPMe", points, between=between)
+    changed = base.run((Applied(recipe.change, dict(values)),), "SPMe", points, between=between)
+    without = base.run((recipe.reference(),), "SPMe", points, between=between)
     return [c.voltage_v - w.voltage_v for c, w in zip(changed, without, strict=True)]
 
 
-def _changed(bench: _Bench, sizes: Mapping[str, dict[str, float]], between: int) -> list[TrueRun]:
+def _records_with_effects(
+    base: _CaseBase, sizes: Mapping[str, dict[str, float]], between: int
+) -> list[TrueRun]:
     """The noise-free records of the cell with all its effects, with `between` rows for each row of a test."""
     together = [
         Applied(str(RECIPES[n].change), v)
         for n, v in sizes.items()
         if RECIPES[n].change and not RECIPES[n].reference
     ]
-    traces = bench.run(tuple(together), between=between)
+    traces = base.run(tuple(together), between=between)
     for name, values in sizes.items():
         if RECIPES[name].reference:
-            added = _difference(RECIPES[name], values, bench, between)
-            traces = [_shifted(t, a) for t, a in zip(traces, added, strict=True)]
+            added = _difference(RECIPES[name], values, base, between)
+            traces = [_with_added_voltage(t, a) for t, a in zip(traces, added, strict=True)]
     return traces
 
 
 def _with_stranger(
-    name: str, traces: list[TrueRun], bench: _Bench, truth: dict[str, float], seed: int
+    name: str, traces: list[TrueRun], base: _CaseBase, truth: dict[str, float], seed: int
 ) -> list[TrueRun]:
     """The records with a stranger of the target size, with the same constants in each record."""
-    shifts = [
-        STRANGERS[name].shift(trace, bench.capacity_ah, np.random.default_rng(seed)) for trace in traces
-    ]
-    magnitude = bench.spec.target_mv / MV_PER_V / _rms(np.concatenate(shifts))
+    shifts = [STRANGERS[name].shift(trace, base.capacity_ah, np.random.default_rng(seed)) for trace in traces]
+    magnitude = base.spec.target_mv / MV_PER_V / _rms(np.concatenate(shifts))
     truth[f"{name}.magnitude"] = magnitude
-    return [_shifted(trace, magnitude * shift) for trace, shift in zip(traces, shifts, strict=True)]
+    return [
+        _with_added_voltage(trace, magnitude * shift) for trace, shift in zip(traces, shifts, strict=True)
+    ]
 
 
-def _shifted(trace: TrueRun, added_v: Array) -> TrueRun:
+def _with_added_voltage(trace: TrueRun, added_v: Array) -> TrueRun:
     return TrueRun(
         trace.time_s, trace.current_a, trace.voltage_v + added_v, trace.temperature_degc, trace.soc
     )
@@ -266,7 +275,7 @@ def _label(known: list[str], strange: list[str]) -> tuple[str, tuple[str, ...]]:
     return "+".join(dict.fromkeys(RECIPES[name].label for name in known)), also
 
 
-def _measured(
+def _as_measured(
     spec: CaseSpec, written: Written, trace: TrueRun, rng: np.random.Generator, between: int
 ) -> Measurement:
     instrument = Instrument(spec.voltage_noise_v, spec.current_noise_a)

@@ -98,7 +98,8 @@ def check_time(time_s: Array, context: Context) -> None:
             "keep one row of each, or choose: --duplicates first, or last."
         )
     raise DataError(
-        f"{context.at('time_s', row)}: time runs back from {before:.10g} s to {here:.10g} s{_disorder(time_s, step)}"
+        f"{context.at('time_s', row)}: time runs back from {before:.10g} s to {here:.10g} s"
+        f"{_disorder_clause(time_s, step)}"
     )
 
 
@@ -120,7 +121,7 @@ def check_resolution(columns: Columns, context: Context) -> None:
     )
 
 
-def _disorder(time_s: Array, step: Array) -> str:
+def _disorder_clause(time_s: Array, step: Array) -> str:
     """The end of a message, with its leading punctuation: why the time runs back, and what to do about it.
 
     step : (n - 1,) s, intervals of `time_s` (n,) s.
@@ -173,13 +174,13 @@ def check_ranges(columns: Columns, context: Context) -> None:
         raise DataError(
             f"{context.at('voltage_v', row)}: {voltage[row]:.6g} V is not the voltage of one cell (above 0 "
             f"and at most {HIGHEST_VOLTAGE_V:g} V; rows like it: {int(np.sum(bad))}): check the column and its unit"
-            f"{_without_an_end(columns['time_s'], bad)}."
+            f"{_leave_out_clause(columns['time_s'], bad)}."
         )
     if typical < LOWEST_TYPICAL_V:
         taken = context.unit.get("voltage_v", "V")
-        told = "" if taken == "V" else f", taken in {taken} as declared or as its header says"
+        unit = "" if taken == "V" else f", taken in {taken} as declared or as its header says"
         raise DataError(
-            f"{context.at('voltage_v', 0)}: the voltage is {typical:.4g} V in the median{told}, which is that of no "
+            f"{context.at('voltage_v', 0)}: the voltage is {typical:.4g} V in the median{unit}, which is that of no "
             "cell: check its unit, and whether a sign between thousands was read as a decimal one."
         )
     large = np.abs(current) > HIGHEST_CURRENT_A
@@ -205,7 +206,7 @@ def check_ranges(columns: Columns, context: Context) -> None:
             )
 
 
-def _without_an_end(time_s: Array, bad: BoolArray) -> str:
+def _leave_out_clause(time_s: Array, bad: BoolArray) -> str:
     """The end of a message, from ', ' on: options that leave out bad rows at the beginning or end, where the cell was
     not connected; '' where bad rows are elsewhere too."""
     good = np.flatnonzero(~bad)
@@ -217,7 +218,7 @@ def _without_an_end(time_s: Array, bad: BoolArray) -> str:
     return f", or leave out where the cell was not connected: {' '.join(ends)}"
 
 
-def check_alive(columns: Columns, context: Context) -> None:
+def check_constant(columns: Columns, context: Context) -> None:
     """Refuse a current of 0 A under a moving voltage, and a constant voltage under a moving current."""
     voltage, current = columns["voltage_v"], columns["current_a"]
     if not current.any() and np.ptp(voltage) > MOST_RELAXED_V:

@@ -86,8 +86,8 @@ def map_columns(
     Raises DataError for an unknown quantity, a name that is missing or exists twice, a unit that is not SI and is
     neither declared nor a maker's, and a declared unit that contradicts one in the name that is not SI.
     """
-    told = {q: units.declared(q, u) for q, u in (declared or {}).items()}
-    finder = _Finder(table, dict(columns or {}), told, required)
+    declared_units = {q: units.declared(q, u) for q, u in (declared or {}).items()}
+    finder = _Finder(table, dict(columns or {}), declared_units, required)
     missing = [q for q in QUANTITIES if not finder.take(q) and q in required]
     if missing:
         raise finder.missing(missing)
@@ -96,7 +96,7 @@ def map_columns(
             if not finder.take(selector):
                 raise finder.missing([selector])
         elif selector == "state":
-            finder.of_maker(selector)
+            finder.find_by_maker(selector)
     finder.check()
     return finder.mapped()
 
@@ -122,7 +122,7 @@ class _Finder:
         self.unit: dict[str, str] = {}
         self.notes: list[str] = []
         self.bdf_current = False
-        self._of_export: list[str] = []
+        self._export_notes: list[str] = []
         self._stated_degc: float | None = None
 
     def take(self, quantity: str) -> bool:
@@ -135,21 +135,21 @@ class _Finder:
                 self.notes.append(f"{quantity} was left out as asked.")
                 return True
             if quantity == "temperature_degc" and NUMBER.fullmatch(name) and name not in self._table.header:
-                self._state(float(name), name)
+                self._store_stated(float(name), name)
                 return True
-            self.position[quantity] = self._named(name, quantity)
+            self.position[quantity] = self._find_by_given_name(name, quantity)
             if name != quantity:
                 self.notes.append(f"{quantity} was taken from column {name!r} as asked.")
             self._set_unit(quantity, "")
             return True
-        found = self._own(quantity)
+        found = self._find_by_own_name(quantity)
         if found is not None:
             self.position[quantity] = found
             self._set_unit(quantity, "")
             return True
-        return self.of_maker(quantity) or self._of_bdf(quantity)
+        return self.find_by_maker(quantity) or self._find_by_bdf(quantity)
 
-    def _state(self, temperature: float, name: str) -> None:
+    def _store_stated(self, temperature: float, name: str) -> None:
         """Store a temperature for all rows, given in the declared unit."""
         si = units.SI["temperature_degc"]
         unit = self.unit["temperature_degc"] = self._declared.get("temperature_degc", si)
@@ -216,8 +216,8 @@ class _Finder:
         """The columns found so far."""
         form = self._table.format
         names = {quantity: self._table.header[place] for quantity, place in self.position.items()}
-        if form is not None and self._of_export:
-            self.notes.insert(0, f"Recognised as an export of {form.name}: {', '.join(self._of_export)}.")
+        if form is not None and self._export_notes:
+            self.notes.insert(0, f"Recognised as an export of {form.name}: {', '.join(self._export_notes)}.")
         return Mapped(
             self.position,
             names,
@@ -229,7 +229,8 @@ class _Finder:
             self._stated_degc,
         )
 
-    def _named(self, name: str, quantity: str) -> int:
+    def _find_by_given_name(self, name: str, quantity: str) -> int:
+        """Position of the column that the user names.  Raises DataError, with the nearest, where there is none."""
         header = self._table.header
         found = self._only([i for i, there in enumerate(header) if there == name.strip()])
         if found is None:
@@ -240,18 +241,25 @@ class _Finder:
             )
         return found
 
-    def _own(self, quantity: str) -> int | None:
+    def _find_by_own_name(self, quantity: str) -> int | None:
+        """Position of the column under this project's name of the quantity."""
         return self._only([i for i, name in enumerate(self._table.header) if name.lower() == quantity])
 
-    def of_maker(self, quantity: str) -> bool:
+    def find_by_maker(self, quantity: str) -> bool:
         """Find and store the quantity under its name in a known export; False where it has none."""
         form = self._table.format
         found = form.find(quantity, self._table.header) if form else None
         if found is None:
             return False
         name = self._table.header[found[0]]
-        self._only([i for i, there in enumerate(self._table.header) if _plain(there) == _plain(name)])
-        other = form.to_subtract(quantity, found[0], self._table.header) if form else None
+        self._only(
+            [
+                i
+                for i, there in enumerate(self._table.header)
+                if _without_blanks(there) == _without_blanks(name)
+            ]
+        )
+        other = form.reference_column(quantity, found[0], self._table.header) if form else None
         if other is not None:
             raise DataError(
                 f"{self._file}: {name!r} and {other!r} are potentials against a reference, and {quantity} of the cell "
@@ -261,14 +269,19 @@ class _Finder:
         self.position[quantity], unit = found
         self._set_unit(quantity, unit)
         if quantity in QUANTITIES:
-            told = self.unit[quantity]
-            converted = "" if told == units.SI[quantity] else f" (converted from {told})"
-            self._of_export.append(f"{quantity} from {self._table.header[found[0]]!r}{converted}")
+            taken = self.unit[quantity]
+            converted = "" if taken == units.SI[quantity] else f" (converted from {taken})"
+            self._export_notes.append(f"{quantity} from {self._table.header[found[0]]!r}{converted}")
         return True
 
-    def _of_bdf(self, quantity: str) -> bool:
+    def _find_by_bdf(self, quantity: str) -> bool:
+        """Find and store the quantity under a name of the battery data format; False where it has none."""
         for label in BDF.get(quantity, ()):
-            places = [i for i, name in enumerate(self._table.header) if _plain(name) == _plain(label)]
+            places = [
+                i
+                for i, name in enumerate(self._table.header)
+                if _without_blanks(name) == _without_blanks(label)
+            ]
             found = self._only(places)
             if found is not None:
                 self.position[quantity] = found
@@ -279,15 +292,15 @@ class _Finder:
                     )
                 self.bdf_current |= quantity == "current_a"
                 return True
-        return self._of_bdf_in_other_units(quantity)
+        return self._find_by_bdf_in_other_unit(quantity)
 
-    def _of_bdf_in_other_units(self, quantity: str) -> bool:
-        """As `_of_bdf`, under BDF's names with another unit of the quantity: 'Test Time / h', 'Current / mA'."""
-        stems = {_plain(label.rpartition("/")[0]) for label in BDF.get(quantity, ()) if "/" in label}
+    def _find_by_bdf_in_other_unit(self, quantity: str) -> bool:
+        """As `_find_by_bdf`, under BDF's names with another unit of the quantity: 'Test Time / h', 'Current / mA'."""
+        stems = {_without_blanks(label.rpartition("/")[0]) for label in BDF.get(quantity, ()) if "/" in label}
         places = [
             i
             for i, name in enumerate(self._table.header)
-            if _plain(name.rpartition("/")[0]) in stems and headers.unit_of(quantity, name)
+            if _without_blanks(name.rpartition("/")[0]) in stems and headers.unit_of(quantity, name)
         ]
         found = self._only(places)
         if found is None:
@@ -310,7 +323,7 @@ class _Finder:
         below = self._table.units[self.position[quantity]] if self._table.units else ""
         if quantity in self._declared:
             unit = self._declared[quantity]
-            self._take_declared(
+            self._check_declared(
                 quantity, units.spelt(quantity, below) or headers.unit_of(quantity, name), known
             )
         elif units.spelt(quantity, below):
@@ -324,12 +337,12 @@ class _Finder:
             self._refuse_other_unit(quantity, name)
         self.unit[quantity] = unit
 
-    def _take_declared(self, quantity: str, said: str | None, known: str) -> None:
-        """Set a unit that the user declares; refuse one that contradicts the header.
+    def _check_declared(self, quantity: str, said: str | None, known: str) -> None:
+        """Note that a declared unit holds; refuse one that contradicts the header.
 
-        said : unit in the header. Where that is SI, which exports and this project's own names state by default and
-        checks of the values may find wrong, the declaration holds and a note says so; likewise against a maker's
-        `known` unit. Clock times and dates are recognised by their cells.
+        said : unit in the header, None for none. Where that is SI, which exports and this project's own names state by
+        default and checks of the values may find wrong, the declaration holds and a note says so; likewise against a
+        maker's `known` unit. Clock times and dates are recognised by their cells.
         """
         name, unit = self._table.header[self.position[quantity]], self._declared[quantity]
         numbers, though = units.FACTORS[quantity], ""
@@ -345,6 +358,7 @@ class _Finder:
         self.notes.append(f"{quantity} was converted from {unit} as declared{though}.")
 
     def _refuse_other_unit(self, quantity: str, name: str) -> None:
+        """Raises DataError for a column that is not in SI by its name, where no unit was declared."""
         said = headers.unit_of(quantity, name)
         if said is not None and said != units.SI[quantity]:
             raise DataError(
@@ -363,6 +377,7 @@ class _Finder:
             )
 
     def _only(self, places: list[int]) -> int | None:
+        """The only one of the positions of a name, None for none.  Raises DataError for several columns of one name."""
         if len(places) > 1:
             raise DataError(
                 f"{self._file} has {len(places)} columns named {self._table.header[places[0]]!r} (numbers "
@@ -371,5 +386,6 @@ class _Finder:
         return places[0] if places else None
 
 
-def _plain(name: str) -> str:
+def _without_blanks(name: str) -> str:
+    """A column's name in lower case without any blanks, as names of the battery data format are compared."""
     return re.sub(r"\s+", "", name).lower()

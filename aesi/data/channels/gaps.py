@@ -62,11 +62,11 @@ def without_gaps(data: Columns, context: Context, notes: list[str]) -> tuple[Col
             kept = kept[:-1]
         else:
             raise gap_error(data, k, context)
-    notes += _rests_told(rests)
+    notes += _rest_notes(rests)
     return (data, context) if len(kept) == n else keep_rows(data, context, kept)
 
 
-def _rests_told(rests: Sequence[tuple[float, float]]) -> list[str]:
+def _rest_notes(rests: Sequence[tuple[float, float]]) -> list[str]:
     """A note on each of up to FEW_RESTS sparsely logged rests (start s, length s), or one note on more of them."""
     if len(rests) <= FEW_RESTS:
         return [
@@ -101,7 +101,7 @@ def _longest_usual(neighbours: Array) -> float:
     return float(ordered[np.argmax(leaps)] if np.any(leaps) else ordered[-1])
 
 
-def untold_charge(columns: Columns) -> list[str]:
+def ambiguous_charge_notes(columns: Columns) -> list[str]:
     """A note where the charge moved depends on how the current runs between the rows, with that which is taken unless
     another is declared; none for a record of so few rows that its first and last currents alone make that
     difference."""

@@ -108,23 +108,23 @@ def check_scale(columns: Columns, context: Context) -> None:
     if resistance is not None and resistance < LOWEST_RESISTANCE_OHM:
         raise DataError(
             f"{context.at('current_a', row)}: {current[row]:.6g} A would show {resistance * 1e6:.3g} microohm at its "
-            f"steps: {in_another_unit(context, 'it is plainly in mA', current_a='mA')}."
+            f"steps: {unit_clause(context, 'it is plainly in mA', current_a='mA')}."
         )
     if moved > HIGHEST_CHARGE_AH:
         if resistance is not None and moved * resistance > HIGHEST_CHARGE_RESISTANCE_OHM_AH:
             raise DataError(
                 f"{context.at('time_s', len(time) - 1)}: {moved:.4g} Ah would have moved, which "
                 f"a cell that shows {resistance * 1e3:.3g} mohm at the steps of its current does not hold: "
-                f"{in_another_unit(context, 'the time is in ms', time_s='ms')}."
+                f"{unit_clause(context, 'the time is in ms', time_s='ms')}."
             )
         if resistance is not None:
             raise DataError(
                 f"{context.at('current_a', row)}: at {current[row]:.6g} A {moved:.4g} Ah would have moved: "
-                f"{in_another_unit(context, 'it is plainly in mA', current_a='mA')}."
+                f"{unit_clause(context, 'it is plainly in mA', current_a='mA')}."
             )
         raise DataError(
             f"{context.at('current_a', row)}: at {current[row]:.6g} A {moved:.4g} Ah would have moved: "
-            f"{in_another_unit(context, 'it is plainly in mA, or the time in ms', current_a='mA', time_s='ms')}."
+            f"{unit_clause(context, 'it is plainly in mA, or the time in ms', current_a='mA', time_s='ms')}."
         )
     if resistance is not None:
         _check_slide(columns, context, moved, resistance)
@@ -154,14 +154,14 @@ def _check_slide(columns: Columns, context: Context, moved_ah: float, resistance
         raise DataError(
             f"{context.at('time_s', last)}: the voltage slides by {slide:.2f} V while {1e3 * moved_ah:.3g} mAh move in "
             f"{columns['time_s'][last] - columns['time_s'][0]:.3g} s, of a cell that shows {slower * 1e3:.3g} "
-            f"mohm at the steps of its current: {_longer_unit(columns, context)}."
+            f"mohm at the steps of its current: {_longer_unit_clause(columns, context)}."
         )
     slide = _slide_v(columns, resistance_ohm)
     if moved_ah * resistance_ohm > MOST_CHARGE_RESISTANCE_AH_A * max(slide, FLAT_V):
         raise DataError(
             f"{context.at('time_s', last)}: {moved_ah:.4g} Ah would have moved while the voltage slides by {slide:.2f} "
             f"V, of a cell that shows {resistance_ohm * 1e3:.3g} mohm at the steps of its current: "
-            f"{in_another_unit(context, 'the time is in ms', time_s='ms')}."
+            f"{unit_clause(context, 'the time is in ms', time_s='ms')}."
         )
 
 
@@ -171,7 +171,7 @@ def _slide_v(columns: Columns, resistance_ohm: float) -> float:
     return float(high - low)
 
 
-def in_another_unit(context: Context, claim: str, **units_of: str) -> str:
+def unit_clause(context: Context, claim: str, **units_of: str) -> str:
     """The end of a message on implausible numbers: `claim` and the options that declare the unit; where a column was
     not read as SI, its declared unit in place of the claim.
 
@@ -188,13 +188,14 @@ def in_another_unit(context: Context, claim: str, **units_of: str) -> str:
     return f"{claim}; give {wanted}, or declare it: {options}"
 
 
-def _longer_unit(columns: Columns, context: Context) -> str:
-    return in_another_unit(context, "the time is in another unit", time_s=longer_unit(columns["time_s"]))
+def _longer_unit_clause(columns: Columns, context: Context) -> str:
+    """The end of a message on times that are too close for seconds."""
+    return unit_clause(context, "the time is in another unit", time_s=longer_unit(columns["time_s"]))
 
 
 def step_resistance_ohm(columns: Columns) -> float | None:
     """Resistance at the steps of the current, ohm, > 0; None where their correlation with the voltage is not clear."""
-    found = answer_to_steps(columns)
+    found = step_response(columns)
     return -found[0] if found is not None and found[1] < -CLEAR_CORRELATION else None
 
 
@@ -205,7 +206,7 @@ def check_signed(columns: Columns, context: Context, header: Sequence[str]) -> N
     largest = float(np.max(np.abs(current)))
     if largest == 0 or (np.min(current) < -SMALL_SHARE * largest and np.max(current) > SMALL_SHARE * largest):
         return
-    evidence = _contradicting_steps(columns) or _rise(columns, context)
+    evidence = _contradicting_steps_clause(columns) or _wrong_way_clause(columns, context)
     if not evidence:
         return
     state = nearest("state", header)
@@ -224,9 +225,9 @@ def check_sign(columns: Columns, context: Context, advice: str) -> None:
 
     advice : end of the message, from '; ' on, on what the user can do.
     """
-    found = clearest_answer(columns) if _follows_steps(columns) else None
-    right, other = _explained(columns, -1.0), _explained(columns, 1.0)
-    if found is not None and _tells(found, right, other):
+    found = clearest_step_response(columns) if _follows_steps(columns) else None
+    right, other = _explained_share(columns, -1.0), _explained_share(columns, 1.0)
+    if found is not None and _response_is_clear(found, right, other):
         contradicts, evidence = found[1] > 0, "at its steps"
     elif _moved_ah(columns) < LEAST_CHARGE_AH:
         return
@@ -235,7 +236,7 @@ def check_sign(columns: Columns, context: Context, advice: str) -> None:
         contradicts, evidence = trend > CLEAR_CORRELATION, "along the test"
         if abs(trend) <= CLEAR_CORRELATION:
             contradicts = other > EXPLAINED_SHARE and right < UNEXPLAINED_SHARE
-        contradicts = contradicts and other >= _relaxing(columns)
+        contradicts = contradicts and other >= _relaxation_share(columns)
     if contradicts:
         row = int(np.argmax(np.abs(np.diff(columns["current_a"])))) + 1
         raise DataError(
@@ -244,30 +245,31 @@ def check_sign(columns: Columns, context: Context, advice: str) -> None:
         )
 
 
-def _tells(answer: tuple[float, float], right: float, other: float) -> bool:
+def _response_is_clear(answer: tuple[float, float], right: float, other: float) -> bool:
     """True where the response to steps of the current determines its sign: it is clear, and agrees with what resistance
     and capacity together explain. (At constant voltage the current falls in steps, though charge moved the voltage.)
 
-    right, other : `_explained` for the declared and for the opposite sign; 0 where there are too few rows.
+    right, other : `_explained_share` for the declared and for the opposite sign; 0 where there are too few rows.
     """
     clear = abs(answer[1]) > CLEAR_CORRELATION
     return clear and (right == other or (answer[1] > 0) == (other > right))
 
 
 def _check_pace(columns: Columns, context: Context) -> None:
+    """Refuse a voltage of a short record that moves faster under a constant current than that of any cell."""
     time, voltage = columns["time_s"], columns["voltage_v"]
     if time[-1] - time[0] > SHORT_RECORD_S:
         return
-    for rows in _held(columns):
+    for rows in _constant_stretches(columns):
         slide, seconds = float(np.ptp(voltage[rows])), float(np.ptp(time[rows]))
         if slide > SLIDE_V and seconds < FASTEST_SLIDE_S:
             raise DataError(
                 f"{context.at('time_s', rows.start)}: the voltage moves by {slide:.2f} V in {seconds:.3g} s of one "
-                f"held current, faster than any cell's: {_longer_unit(columns, context)}."
+                f"held current, faster than any cell's: {_longer_unit_clause(columns, context)}."
             )
 
 
-def _contradicting_steps(columns: Columns) -> str:
+def _contradicting_steps_clause(columns: Columns) -> str:
     """Text on steps where the voltage moves against the current, by their weight; '' where their share is small."""
     size = np.abs(columns["current_a"])
     rise, answer = np.diff(size), np.diff(columns["voltage_v"])
@@ -287,11 +289,11 @@ def _contradicting_steps(columns: Columns) -> str:
     return f"{int(np.sum(wrong)):,} of its {int(np.sum(clear)):,} steps move the voltage the other way"
 
 
-def _rise(columns: Columns, context: Context) -> str:
+def _wrong_way_clause(columns: Columns, context: Context) -> str:
     """Text on a constant current under which the voltage moves the wrong way by more than RISE_V; '' without one."""
     voltage = columns["voltage_v"] * np.sign(np.sum(columns["current_a"]) or 1.0)
     right, wrong, last = 0.0, 0.0, 0
-    for rows in _held(columns):
+    for rows in _constant_stretches(columns):
         piece: Array = voltage[rows]
         right = max(right, float(np.max(np.maximum.accumulate(piece) - piece)))
         time = columns["time_s"][rows]
@@ -306,7 +308,7 @@ def _rise(columns: Columns, context: Context) -> str:
     )
 
 
-def _held(columns: Columns) -> list[slice]:
+def _constant_stretches(columns: Columns) -> list[slice]:
     """Stretches of more than ENOUGH_ROWS rows, without gaps, of a constant current that is not small: within STEP_SHARE
     of the largest current from that of their first row, which excludes a slowly falling current."""
     size = np.abs(columns["current_a"])
@@ -329,7 +331,7 @@ def _cuts(size: Array, first: int, last: int, band: float) -> list[int]:
     return [*cuts, last]
 
 
-def answer_to_steps(columns: Columns) -> tuple[float, float] | None:
+def step_response(columns: Columns) -> tuple[float, float] | None:
     """(slope dV/dI in ohm, correlation) over the clear steps of the current; None for fewer than ENOUGH_STEPS."""
     rise = np.diff(columns["current_a"])
     answer = np.diff(columns["voltage_v"])
@@ -341,10 +343,10 @@ def answer_to_steps(columns: Columns) -> tuple[float, float] | None:
     return slope, float(np.sum(x * y) / np.sqrt(np.sum(x * x) * np.sum(y * y)))
 
 
-def clearest_answer(columns: Columns) -> tuple[float, float] | None:
-    """`answer_to_steps` for the one of STRIDES with the strongest correlation: loggers may write current and voltage
+def clearest_step_response(columns: Columns) -> tuple[float, float] | None:
+    """`step_response` for the one of STRIDES with the strongest correlation: loggers may write current and voltage
     some rows apart."""
-    found = [answer for answer in map(answer_to_steps, _strides(columns)) if answer is not None]
+    found = [answer for answer in map(step_response, _strides(columns)) if answer is not None]
     return max(found, key=lambda answer: abs(answer[1]), default=None)
 
 
@@ -376,7 +378,7 @@ def _following(columns: Columns, rows: slice) -> float:
     return along / float(np.sum(np.abs(moved)))
 
 
-def _explained(columns: Columns, sign: float) -> float:
+def _explained_share(columns: Columns, sign: float) -> float:
     """Share of the change of voltage between means of strides that a resistance and a capacity >= 0 explain, with the
     current in this sign (-1 as declared).
 
@@ -390,7 +392,7 @@ def _explained(columns: Columns, sign: float) -> float:
     return share if _beyond_chance(share, 2, len(moved[2]) / 2) else 0.0
 
 
-def _relaxing(columns: Columns) -> float:
+def _relaxation_share(columns: Columns) -> float:
     """Share of the change of voltage between means of strides that a relaxation explains which goes on throughout the
     record, whatever its current; 0 where the voltage moves by more than a relaxation does."""
     since_s, voltage = columns["time_s"] - columns["time_s"][0], columns["voltage_v"]

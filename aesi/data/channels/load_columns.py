@@ -14,7 +14,7 @@ from aesi.data.channels.checks import Columns, Context, check_resolution
 from aesi.data.channels.columns import QUANTITIES, Mapped, map_columns
 from aesi.data.readers.table import TableFile
 from aesi.data.reading import Duplicates, Reading, bounds
-from aesi.data.state import both_ways, signs, turned
+from aesi.data.state import directions, has_both_directions, with_directions
 from aesi.errors import DataError
 from aesi.numerics.typing import AnyArray, Array
 
@@ -37,7 +37,7 @@ def load_columns(
     notes = [*table.notes, *mapped.notes]
     _orient(table, data, mapped, reading, notes)
     for name in reading.selectors:
-        data, context = _of_number(data, context, name, getattr(reading, name), notes)
+        data, context = _with_number(data, context, name, getattr(reading, name), notes)
     data = {quantity: column for quantity, column in data.items() if quantity in QUANTITIES}
     data, context = _window(data, context, reading, notes)
     duplicates: Duplicates = reading.duplicates or ("first" if mapped.maker else "refuse")
@@ -88,16 +88,16 @@ def _orient(table: TableFile, data: Columns, mapped: Mapped, reading: Reading, n
             f"{table.path.name}: --state-word says what words of a column mean, and no column is known to say which "
             f'way the current flows; name it: --state "NAME". There are: {", ".join(map(repr, table.header))}.'
         )
-    if _turned_by_words(table, data, mapped, reading, notes):
+    if _orient_by_words(table, data, mapped, reading, notes):
         return
     if reading.state_words:
         notes.append(
             "Words of a state were declared, and the sign of the current comes from itself; name their column: --state."
         )
-    _turn_by_declaration(data, mapped, reading, notes)
+    _orient_by_declaration(data, mapped, reading, notes)
 
 
-def _turned_by_words(
+def _orient_by_words(
     table: TableFile, data: Columns, mapped: Mapped, reading: Reading, notes: list[str]
 ) -> bool:
     """Take the direction of the current from a column of words such as `charge`, where the user named one or the
@@ -112,15 +112,15 @@ def _turned_by_words(
     if signed and not asked:
         return False
     (words,) = table.read_text((mapped.position["state"],))
-    way, note = signs(words, current, reading.state_words, table.path.name, mapped.header["state"])
+    way, note = directions(words, current, reading.state_words, table.path.name, mapped.header["state"])
     if not asked and not np.any(way != 0):
         return False
-    data["current_a"], changes = turned(current, way, data["time_s"], bool(signed))
+    data["current_a"], changes = with_directions(current, way, data["time_s"], bool(signed))
     notes += [note, *changes]
     return True
 
 
-def _turn_by_declaration(data: Columns, mapped: Mapped, reading: Reading, notes: list[str]) -> None:
+def _orient_by_declaration(data: Columns, mapped: Mapped, reading: Reading, notes: list[str]) -> None:
     """Make the current discharge-positive by the sign that the user declares, else by that of the format or maker."""
     if mapped.bdf_current and reading.sign == "discharge-positive":
         notes.append("The current was declared positive on discharge, which BDF's is not; its sign was left.")
@@ -139,7 +139,7 @@ def _turn_by_declaration(data: Columns, mapped: Mapped, reading: Reading, notes:
 def _check_words(table: TableFile, current: Array, mapped: Mapped, reading: Reading) -> None:
     """Refuse magnitudes where a column of words states both directions and the user neither named nor left it out."""
     name = None if "state" in reading.columns else headers.nearest("state", table.header)
-    if name is None or not both_ways(table.read_text((table.header.index(name),))[0], current):
+    if name is None or not has_both_directions(table.read_text((table.header.index(name),))[0], current):
         return
     raise DataError(
         f"{table.path.name}: the current ({mapped.header['current_a']!r}) never changes its sign, and yet column "
@@ -158,7 +158,7 @@ def _where_kept(context: Context, kept: AnyArray, row: int) -> str:
     return context.where(int(kept[row]))
 
 
-def _of_number(
+def _with_number(
     data: Columns, context: Context, name: str, text: str, notes: list[str]
 ) -> tuple[Columns, Context]:
     """The rows of a cycle or a step."""

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from aesi.data.channels.checks import Columns, Context, scatter
-from aesi.data.channels.implausible import ENOUGH_STEPS, STEP_SHARE, answer_to_steps, clearest_answer
+from aesi.data.channels.implausible import ENOUGH_STEPS, STEP_SHARE, clearest_step_response, step_response
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 
@@ -47,7 +47,7 @@ NOISES = 10.0
 """Multiple of the noise of the voltage that a turn has to exceed."""
 
 
-def check_dead(columns: Columns, context: Context) -> None:
+def check_stuck_current(columns: Columns, context: Context) -> None:
     """Refuse a current that is constant, except for noise, over a stretch of rows in which the voltage rises and falls:
     after a load and under a constant current it is monotonic. Also refuse a current whose steps are not correlated with
     those of such a voltage: the noise of a dead sensor."""
@@ -64,7 +64,7 @@ def check_dead(columns: Columns, context: Context) -> None:
         if turns >= 2 * ENOUGH_STEPS:
             raise _stands_still(columns, context, rows, turns, least)
     turns = _turns(voltage, least)
-    clearest = clearest_answer(columns) if turns >= 2 * ENOUGH_STEPS else None
+    clearest = clearest_step_response(columns) if turns >= 2 * ENOUGH_STEPS else None
     if clearest is not None and abs(clearest[1]) < FOLLOWS:
         raise DataError(
             f"{context.at('current_a', 0)}: the voltage turns {turns} times, rising and falling by more than "
@@ -113,14 +113,14 @@ def _resolution_v(voltage: Array) -> float:
     return _smallest(moves) if moves.any() else 0.0
 
 
-def check_stuck(columns: Columns, context: Context) -> None:
+def check_stuck_voltage(columns: Columns, context: Context) -> None:
     """Refuse a voltage that is constant while the current rises and falls by steps that change it elsewhere, and by
     more than its noise.
 
     A voltage that a cycler holds is accepted.
     """
     voltage, time = columns["voltage_v"], columns["time_s"]
-    found, answer = answer_to_steps(columns), np.abs(np.diff(voltage))
+    found, answer = step_response(columns), np.abs(np.diff(voltage))
     if found is None or found[0] >= 0 or not answer.any():
         return
     expected = -found[0] * np.diff(columns["current_a"])
@@ -144,7 +144,7 @@ def check_stuck(columns: Columns, context: Context) -> None:
 
 def held_doubts(columns: Columns) -> list[str]:
     """A note on a voltage that is written less often than the current; else empty."""
-    clearest, answer = clearest_answer(columns), np.abs(np.diff(columns["voltage_v"]))
+    clearest, answer = clearest_step_response(columns), np.abs(np.diff(columns["voltage_v"]))
     if clearest is None or clearest[0] >= 0 or not answer.any():
         return []
     steps = np.abs(np.diff(columns["current_a"]))

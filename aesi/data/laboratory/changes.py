@@ -52,7 +52,7 @@ def _ambient(parameters: Any, values: Values) -> None:
         _update(parameters, {name: float(parameters[name]) + values["shift_k"]})
 
 
-def _course(parameters: Any, values: Values) -> None:
+def _temperature_course(parameters: Any, values: Values) -> None:
     """The cell's temperature rises from reference plus shift towards a plateau, as under constant load in a chamber."""
     import pybamm
 
@@ -234,7 +234,11 @@ CHANGES: dict[str, Change] = {
             _heat,
         ),
         Change("ambient_temperature", {"shift_k": -5.0}, alter=_ambient),
-        Change("temperature_course", {"shift_k": 0.0, "rise_k": 5.0, "constant_s": 1000.0}, alter=_course),
+        Change(
+            "temperature_course",
+            {"shift_k": 0.0, "rise_k": 5.0, "constant_s": 1000.0},
+            alter=_temperature_course,
+        ),
         Change("series_resistance", {"resistance_ohm": 5e-4}, {"contact resistance": "true"}, _resistance),
         Change("film_growth", {"growth_ohm_ah": 0.0, "growth_ohm_h": 0.0}, terminal_voltage=_film),
         Change(

@@ -36,8 +36,12 @@ class Profile:
 
 
 @dataclass(frozen=True)
-class Bench:
-    """Converter of pieces to currents (n,) A: with the cell's capacity, its vehicle, and the interval of rows in s."""
+class ProfileBuilder:
+    """Builds a current profile from pieces: rests, pulses and drives, each the current (n,) A, discharge positive.
+
+    capacity_ah : of the cell, Ah.  dt_s : interval of rows, s.  vehicle : in which schedules are driven; None takes one
+    for the capacity.  scale : factor on the currents of drives.
+    """
 
     capacity_ah: float
     dt_s: float = 0.1
@@ -81,7 +85,7 @@ OTHER_LOAD = 2.0
 
 
 def with_pulses(
-    bench: Bench,
+    builder: ProfileBuilder,
     name: str,
     schedules: Sequence[str],
     soc0: float,
@@ -92,15 +96,15 @@ def with_pulses(
 
     The default times add 220 s a schedule and 12 s at the start; a pulse of 0 leaves only the rests.
     """
-    pieces = [bench.rest(LEAD_S)]
+    pieces = [builder.rest(LEAD_S)]
     for one in schedules:
         pieces += [
-            bench.drive(one),
-            bench.rest(BEFORE_PULSE_S),
-            bench.pulse(-pulse_c, pulse_s),
-            bench.rest(AFTER_PULSE_S),
+            builder.drive(one),
+            builder.rest(BEFORE_PULSE_S),
+            builder.pulse(-pulse_c, pulse_s),
+            builder.rest(AFTER_PULSE_S),
         ]
-    return bench.profile(name, pieces, soc0)
+    return builder.profile(name, pieces, soc0)
 
 
 def paper_profiles(
@@ -116,9 +120,9 @@ def paper_profiles(
     other_load : times the vehicle's current in the validation and test profiles, whose schedules are milder than
     those of training.
     """
-    bench, loaded = Bench(capacity_ah, dt_s), Bench(capacity_ah, dt_s, scale=other_load)
+    builder, loaded = ProfileBuilder(capacity_ah, dt_s), ProfileBuilder(capacity_ah, dt_s, scale=other_load)
     return {
-        "train": (with_pulses(bench, "train", TRAIN, 0.68, pulse_c),),
+        "train": (with_pulses(builder, "train", TRAIN, 0.68, pulse_c),),
         "valid": (with_pulses(loaded, "artemis_urban", VALID, 0.60, 0.0),),
         "test": (
             with_pulses(loaded, "sc03", ("sc03",), 0.64, 0.0),

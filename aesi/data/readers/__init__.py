@@ -54,38 +54,49 @@ def open_table(path: str | Path, wanted: Collection[str] = ()) -> TableFile:
         from aesi.data.readers.spreadsheet import open_sheet
 
         return open_sheet(file, wanted)
-    if magic.startswith(XLS_MAGIC):
-        raise DataError(f"{file.name} is an old Excel workbook (.xls); save it as .xlsx or CSV.")
-    if magic.startswith(HDF_MAGIC):
-        raise DataError(
-            f"{file.name} is an HDF5 file, which is not read; export time, current and voltage as CSV."
-        )
+    _refuse_unread_kinds(file, magic)
     if magic.startswith(MATLAB_MAGIC) or (
         suffix == ".mat" and b"\x00" in magic
     ):  # version 4 begins with numbers
         from aesi.data.readers.matlab import open_mat
 
         return open_mat(file, wanted)
+    return _open_text(file, magic, wanted)
+
+
+def _refuse_unread_kinds(file: Path, magic: bytes) -> None:
+    """Raises DataError for a kind of file that no reader takes, by its first bytes."""
+    if magic.startswith(XLS_MAGIC):
+        raise DataError(f"{file.name} is an old Excel workbook (.xls); save it as .xlsx or CSV.")
+    if magic.startswith(HDF_MAGIC):
+        raise DataError(
+            f"{file.name} is an HDF5 file, which is not read; export time, current and voltage as CSV."
+        )
     if magic.removeprefix(codecs.BOM_UTF8).lstrip().startswith(JSON_MAGIC):
         raise DataError(
             f"{file.name} is JSON, which holds no record: a table is read as CSV, Excel or Parquet, and a cell's file "
             "is given as --cell."
         )
+
+
+def _open_text(file: Path, magic: bytes, wanted: Collection[str]) -> TableFile:
+    """The file as a table of text, with a note where its suffix promises another kind of file."""
     from aesi.data.readers.text import TextTable
 
-    compressed = magic.startswith(GZIP_MAGIC)
+    compressed, suffix = magic.startswith(GZIP_MAGIC), file.suffix.lower()
     if compressed or suffix not in PROMISES:
         return TextTable(file, compressed=compressed, wanted=wanted)
-    said = f"its name ends in {suffix}, but it is text and no {PROMISES[suffix]}"
+    mismatch = f"its name ends in {suffix}, but it is text and no {PROMISES[suffix]}"
     try:
         table = TextTable(file, compressed=False, wanted=wanted)
     except DataError as error:
-        raise DataError(f"{file.name}: {said}, and cannot be read as that either: {error}") from None
-    table.notes = (*table.notes, f"{said[0].upper()}{said[1:]}; read as text.")
+        raise DataError(f"{file.name}: {mismatch}, and cannot be read as that either: {error}") from None
+    table.notes = (*table.notes, f"{mismatch[0].upper()}{mismatch[1:]}; read as text.")
     return table
 
 
 def _first_bytes(file: Path) -> bytes:
+    """The first eight bytes of a file.  Raises DataError where it cannot be opened or is empty."""
     if file.is_dir():
         raise DataError(f"{file} is a folder; give one file of it.")
     try:

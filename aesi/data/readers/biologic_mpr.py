@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
-from aesi.data.readers.frame import FrameTable, of_mapping
+from aesi.data.readers.frame import FrameTable, table_of_columns
 from aesi.errors import DataError
 from aesi.numerics.typing import AnyArray
 
@@ -31,7 +31,7 @@ def open_mpr(path: Path) -> FrameTable:
         ) from None
     columns = {name: data[name] for name in data.dtype.names}
     notes = ["Read by galvani."]
-    return of_mapping(path, _with_current(columns, notes), tuple(notes))
+    return table_of_columns(path, _with_current(columns, notes), tuple(notes))
 
 
 CURRENTS, TIME, CHARGES = ("I/mA", "<I>/mA", "I/A", "<I>/A"), "time/s", ("dq/mA.h", "dQ/mA.h")

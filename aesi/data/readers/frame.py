@@ -71,6 +71,6 @@ class FrameTable:
         return numbers
 
 
-def of_mapping(path: Path, columns: Mapping[str, Any], notes: tuple[str, ...]) -> FrameTable:
+def table_of_columns(path: Path, columns: Mapping[str, Any], notes: tuple[str, ...]) -> FrameTable:
     """A table of named columns."""
     return FrameTable(path, list(columns), list(columns.values()), notes)

@@ -14,6 +14,7 @@ from aesi.data.readers.heading import (
     LINES_LOOKED_AT,
     NUMBER,
     WITH_COMMA,
+    Heading,
     find_heading,
     first_of_numbers,
     likely_heading,
@@ -87,46 +88,73 @@ def layout_of(text: str, encoding: str, *, whole: bool, name: str, wanted: Colle
         del lines[-1]  # the empty text after the last line end
     if not whole:
         lines = lines[:-1]  # the last one may be cut off
-    notes: list[str] = []
-    rows = [_cells(lines, at) for at in range(min(len(lines), LINES_LOOKED_AT))]
-    heading = find_heading(rows, wanted) or likely_heading(_rows_from(lines))
-    nameless = first_of_numbers(_rows_from(lines)) if heading is None else None
-    if heading is not None:
-        start, header = heading.line, heading.header
-        first_row = start + 1 + int(heading.has_units)
-    elif nameless is not None:
-        start, header = nameless, _numbered(rows[nameless], name, nameless, wanted)
-        first_row = start
-        notes.append("No line names the columns; they were numbered, #1 the first.")
-    else:
-        start, header = _first_line(lines, name)
-        first_row = start + 1
+    found = _find_header(lines, name, wanted)
+    notes, start, first_row = found.notes, found.line, found.first_row
     separator = _separator_at(lines, start)
-    if start:
-        above = "1 line" if start == 1 else f"{start} lines"
-        of = "table" if nameless is not None else "header"
-        notes.append(f"{above} before the {of} {'was' if start == 1 else 'were'} passed over.")
-    if heading is not None and heading.has_units:
-        notes.append("The line of units below the header was read as such.")
     if encoding == "latin-1":
         notes.append("The file is not UTF-8; it was read as Latin-1.")
     if whole and text and not text.endswith(("\n", "\r")):
         notes.append("The last line does not end: if the file was cut there, its last number is too short.")
     below = lines[first_row : first_row + LINES_BELOW]
     decimal = decimal_in((split(line, separator) for line in below), separator)
-    header = _as_wide_as_the_rows(header, below, separator)
-    form, units = (heading.format, heading.units) if heading else (None, ())
-    layer = _layer(lines[:start], header, below, separator) if form else 0
+    header = _padded_header(found.names, below, separator)
+    form, units = (found.heading.format, found.heading.units) if found.heading else (None, ())
+    layer = _layer_depth(lines[:start], header, below, separator) if form else 0
     if layer:
         notes.append("The rows of cycles and steps between the records were passed over.")
     layout = Layout(encoding, separator, "", header, first_row, tuple(notes), form, units, layer)
     return layout if decimal is None else with_decimal(layout, decimal)
 
 
+@dataclass(frozen=True)
+class _Header:
+    """Where a table begins.
+
+    line : that of its names, or its first one where none names its columns.  first_row : line of its first row.
+    heading : what is known of the line of names; None where they are unknown.
+    """
+
+    line: int
+    first_row: int
+    names: tuple[str, ...]
+    heading: Heading | None = None
+
+    @property
+    def notes(self) -> list[str]:
+        """Sentences on what was assumed and passed over."""
+        notes, nameless = [], self.first_row == self.line
+        if nameless:
+            notes.append("No line names the columns; they were numbered, #1 the first.")
+        if self.line:
+            above = "1 line" if self.line == 1 else f"{self.line} lines"
+            of = "table" if nameless else "header"
+            notes.append(f"{above} before the {of} {'was' if self.line == 1 else 'were'} passed over.")
+        if self.heading is not None and self.heading.has_units:
+            notes.append("The line of units below the header was read as such.")
+        return notes
+
+
+def _find_header(lines: Sequence[str], name: str, wanted: Collection[str]) -> _Header:
+    """The header by names that are known, or by numbers below it; else a table without names, else the first line.
+
+    Raises DataError where the columns have no names and the user gave no numbers, and where there is no header.
+    """
+    rows = [_cells(lines, at) for at in range(min(len(lines), LINES_LOOKED_AT))]
+    heading = find_heading(rows, wanted) or likely_heading(_rows_from(lines))
+    if heading is not None:
+        first_row = heading.line + 1 + int(heading.has_units)
+        return _Header(heading.line, first_row, heading.header, heading)
+    nameless = first_of_numbers(_rows_from(lines))
+    if nameless is not None:
+        return _Header(nameless, nameless, _column_numbers(rows[nameless], name, nameless, wanted))
+    start, names = _first_line(lines, name)
+    return _Header(start, start + 1, names)
+
+
 def with_decimal(layout: Layout, decimal: str) -> Layout:
     """The layout with this decimal sign, and a sentence where it is a comma."""
-    told = ("Numbers were read with a decimal comma.",) if decimal == "," else ()
-    return replace(layout, decimal=decimal, notes=(*layout.notes, *told))
+    notes = ("Numbers were read with a decimal comma.",) if decimal == "," else ()
+    return replace(layout, decimal=decimal, notes=(*layout.notes, *notes))
 
 
 def _rows_from(lines: Sequence[str]) -> Iterator[list[list[str]]]:
@@ -141,7 +169,7 @@ def _rows_from(lines: Sequence[str]) -> Iterator[list[list[str]]]:
         ]
 
 
-def _layer(above: Sequence[str], header: tuple[str, ...], below: Sequence[str], separator: str) -> int:
+def _layer_depth(above: Sequence[str], header: tuple[str, ...], below: Sequence[str], separator: str) -> int:
     """Number of empty cells at the beginning of a row of this table, below the names of other layers; 0 without layers.
 
     The names of layers are in the lines directly above, each indented by one cell more, and the rows of a layer have no
@@ -165,6 +193,7 @@ def _extent(line: str, separator: str) -> tuple[int, int]:
 
 
 def _cells(lines: Sequence[str], at: int) -> list[str]:
+    """The cells of the line number `at`; none of a comment."""
     return [] if lines[at].startswith(COMMENT) else split(lines[at], _separator_at(lines, at))
 
 
@@ -191,7 +220,7 @@ def _first_line(lines: Sequence[str], name: str) -> tuple[int, tuple[str, ...]]:
     return start, header
 
 
-def _numbered(cells: Sequence[str], name: str, line: int, wanted: Collection[str]) -> tuple[str, ...]:
+def _column_numbers(cells: Sequence[str], name: str, line: int, wanted: Collection[str]) -> tuple[str, ...]:
     """Names for the columns of a table that has none, which a user can recognise from its first row."""
     if not any(each.startswith(COLUMN_NUMBER) for each in wanted):
         shown = ", ".join(
@@ -207,8 +236,9 @@ def _numbered(cells: Sequence[str], name: str, line: int, wanted: Collection[str
     return tuple(f"{COLUMN_NUMBER}{i}" for i in range(1, len(cells) + 1))
 
 
-def _as_wide_as_the_rows(header: tuple[str, ...], below: Sequence[str], separator: str) -> tuple[str, ...]:
-    """The header, as wide as the rows: loggers end the line of names or the rows with a separator, not always both."""
+def _padded_header(header: tuple[str, ...], below: Sequence[str], separator: str) -> tuple[str, ...]:
+    """The header with as many names as a row has cells: loggers end the line of names or the rows with a separator, not
+    always both."""
     first = next((line for line in below if line.strip()), None)
     if first is None:
         return header

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from aesi.data.readers.formats import recognise
-from aesi.data.readers.frame import FrameTable, of_mapping
+from aesi.data.readers.frame import FrameTable, table_of_columns
 from aesi.data.readers.table import names_listed
 from aesi.errors import DataError
 
@@ -29,7 +29,7 @@ def open_mat(path: Path, wanted: Collection[str] = ()) -> FrameTable:
     """
     content = _load(path)
     tables = _tables(content)
-    name = _chosen(path, content, tables, wanted)
+    name = _chosen_table(path, content, tables, wanted)
     columns = tables[name]
     _check_lengths(path, name, columns)
     notes = [f"Read from the structure {name!r}."] if name else []
@@ -39,7 +39,7 @@ def open_mat(path: Path, wanted: Collection[str] = ()) -> FrameTable:
     shown = {
         f"{name}.{column}" if f"{name}.{column}" in wanted else column: one for column, one in columns.items()
     }
-    table = of_mapping(path, shown, tuple(notes))
+    table = table_of_columns(path, shown, tuple(notes))
     table.format = recognise(tuple(columns))
     return table
 
@@ -111,7 +111,7 @@ def _words(cells: Any) -> list[str] | None:
     return [str(cell.item()) if cell.size else "" for cell in cells.flat]
 
 
-def _chosen(
+def _chosen_table(
     path: Path, content: Mapping[str, Any], tables: Mapping[str, dict[str, Any]], wanted: Collection[str]
 ) -> str:
     """The name of the only table, or of the table that a wanted column names."""

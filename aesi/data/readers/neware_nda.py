@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from aesi.data.readers.formats import neware
-from aesi.data.readers.frame import FrameTable, of_mapping
+from aesi.data.readers.frame import FrameTable, table_of_columns
 from aesi.errors import DataError
 from aesi.numerics.typing import AnyArray
 
@@ -32,7 +32,7 @@ def open_nda(path: Path) -> FrameTable:
         raise DataError(f"{path.name} cannot be read as a cycler's file: {reason[:200]}") from None
     columns = {str(name): frame[name].to_numpy() for name in frame.columns}
     notes = ["Read by batterydf, which converted its units and names to BDF."]
-    table = of_mapping(path, _of_the_test(columns, notes), tuple(notes))
+    table = table_of_columns(path, _with_test_time(columns, notes), tuple(notes))
     # Its columns have BDF's names. Of a known export two rows may share a stamp.
     table.format = neware.FORMAT
     return table
@@ -42,7 +42,7 @@ TEST_TIME, STEP, CYCLE = "Test Time / s", "Step Count / 1", "Cycle Count / 1"
 TURN = 2.0 * np.pi
 
 
-def _of_the_test(columns: dict[str, AnyArray], notes: list[str]) -> dict[str, AnyArray]:
+def _with_test_time(columns: dict[str, AnyArray], notes: list[str]) -> dict[str, AnyArray]:
     """The columns with the time of the test. batterydf 0.1.0 returns an `.ndax` with the time of the step as that of
     the test, and with cycles converted to radians; both are corrected where found. Can go with a version that does
     neither."""

@@ -106,7 +106,9 @@ def _table(path: Path, sheet: Any, heading: Heading, alike: Sequence[str]) -> Fr
     ]
     rows = [row for _, row in numbered]
     width = len(heading.header)
-    columns = [[_plain(row[place]) if place < len(row) else None for row in rows] for place in range(width)]
+    columns = [
+        [_cell_as_text(row[place]) if place < len(row) else None for row in rows] for place in range(width)
+    ]
     notes = [f"Read from the sheet {sheet.title!r}."]
     if alike:
         notes.append(
@@ -118,10 +120,10 @@ def _table(path: Path, sheet: Any, heading: Heading, alike: Sequence[str]) -> Fr
 
 
 def _word(cell: Any) -> str:
-    return "" if cell is None else str(_plain(cell))
+    return "" if cell is None else str(_cell_as_text(cell))
 
 
-def _plain(cell: Any) -> Any:
+def _cell_as_text(cell: Any) -> Any:
     """Clock times as h:m:s and dates as ISO 8601; all else as it is."""
     if isinstance(cell, datetime.datetime) and cell.year <= LAST_YEAR_OF_CLOCKS:
         from openpyxl.utils.datetime import to_excel  # type: ignore[import-untyped]

@@ -41,7 +41,7 @@ class TextTable:
     def __init__(self, path: Path, compressed: bool = False, wanted: Collection[str] = ()) -> None:
         self.path = path
         self._compressed = compressed
-        self._layout = self._look(wanted)
+        self._layout = self._detect_layout(wanted)
         if not self._layout.decimal:
             self._layout = with_decimal(self._layout, self._first_decimal())
         self.header = self._layout.header
@@ -147,12 +147,12 @@ class TextTable:
     def _utf8(self) -> BinaryIO:
         """The file as UTF-8 bytes; without a copy where it already is UTF-8, as nearly all loggers' files."""
         if self._layout.layer:
-            return self._records_alone()
+            return self._own_layer()
         if self._layout.encoding in ("utf-8", "utf-8-sig"):
             return self._bytes()
         return cast(BinaryIO, codecs.EncodedFile(self._bytes(), "utf-8", self._layout.encoding))
 
-    def _records_alone(self) -> BinaryIO:
+    def _own_layer(self) -> BinaryIO:
         """The lines above the table and the rows of its own layer, without the tabs that pad their cells."""
         layout = self._layout
         start = layout.separator * layout.layer
@@ -216,7 +216,7 @@ class TextTable:
             f"{self.path.name} is a damaged or truncated gzip file ({error}); copy or export it again."
         )
 
-    def _look(self, wanted: Collection[str]) -> Layout:
+    def _detect_layout(self, wanted: Collection[str]) -> Layout:
         try:
             with self._bytes() as stream:
                 head = stream.read(HEAD_BYTES)

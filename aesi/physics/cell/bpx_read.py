@@ -12,7 +12,12 @@ from typing import Any
 from aesi.errors import CellError
 from aesi.physics.cell.bpx_schema import load_bpx
 from aesi.physics.cell.bpx_transport import check_kinetics, check_transport
-from aesi.physics.cell.bpx_unread import of_version_0, other_capacity, replaced_relations, unread
+from aesi.physics.cell.bpx_unread import (
+    capacity_sentences,
+    replaced_relation_sentences,
+    unread_field_sentences,
+    version_0_sentences,
+)
 from aesi.physics.cell.bpx_values import check_energies, check_values
 from aesi.physics.cell.parts import (
     CAPACITY_SHARES,
@@ -55,8 +60,15 @@ def read_bpx(source: str | PathLike[str] | Mapping[str, Any], fitted: bool = Fal
         check_kinetics(cell, where)
         if not cell.fitted_with:
             check_energies(cell, where)
-    told = (*cell.unread, *of_version_0(left_behind), *replaced_relations(cell), *other_capacity(cell))
-    return replace(cell, unread=told)
+    return replace(
+        cell,
+        unread=(
+            *cell.unread,
+            *version_0_sentences(left_behind),
+            *replaced_relation_sentences(cell),
+            *capacity_sentences(cell),
+        ),
+    )
 
 
 def _cell(v1: dict[str, Any], where: str) -> CellParameters:
@@ -65,7 +77,7 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
     state = v1.get("State") or {}
     initial = state.get("Initial conditions") or {}
     thermal = state.get("Thermal environment") or {}
-    reference = _kelvin(fields, "Reference temperature [K]", DEFAULT_TEMPERATURE_K)
+    reference = _optional_kelvin(fields, "Reference temperature [K]", DEFAULT_TEMPERATURE_K)
     user = parts.get("User-defined") or {}
     if not isinstance(user, Mapping):
         raise CellError(
@@ -83,8 +95,8 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
         upper_voltage_v=float(fields["Upper voltage cut-off [V]"]),
         reference_temperature_k=reference,
         initial_soc=_initial_soc(initial, where),
-        initial_temperature_k=_kelvin(initial, "Initial temperature [K]", reference),
-        ambient_temperature_k=_kelvin(thermal, "Ambient temperature [K]", reference),
+        initial_temperature_k=_optional_kelvin(initial, "Initial temperature [K]", reference),
+        ambient_temperature_k=_optional_kelvin(thermal, "Ambient temperature [K]", reference),
         density_kg_m3=_optional(fields, "Density [kg.m-3]"),
         specific_heat_j_kg_k=_optional(fields, "Specific heat capacity [J.K-1.kg-1]"),
         volume_m3=_optional(fields, "Volume [m3]"),
@@ -92,14 +104,14 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
         thermal_conductivity_w_m_k=_own_number(user, THERMAL_CONDUCTIVITY, where) or None,
         heat_transfer_w_m2_k=_optional(thermal, HEAT_TRANSFER),
         contact_resistance_ohm=_own_number(user, CONTACT_RESISTANCE, where),
-        capacity_shares=_by_record(user, CAPACITY_SHARES, where),
+        capacity_shares=_numbers_by_record(user, CAPACITY_SHARES, where),
         tested_on=_tested_on(user, where),
-        fitted_at_k=_by_record(user, FITTED_AT, where),
+        fitted_at_k=_numbers_by_record(user, FITTED_AT, where),
         fitted_with=_fitted_with(user, where),
         name=str(header.get("Title") or "cell").rstrip(". ") or "cell",  # it is used within sentences
         description=str(header.get("Description") or ""),
         references=str(header.get("References") or ""),
-        unread=unread(v1),
+        unread=unread_field_sentences(v1),
     )
 
 
@@ -116,13 +128,14 @@ def _initial_soc(initial: Fields, where: str) -> float:
     return soc
 
 
-def _kelvin(fields: Fields, name: str, without: float) -> float:
+def _optional_kelvin(fields: Fields, name: str, without: float) -> float:
     """A temperature, K, or `without` where the file states none; 0 is refused with all others that no cell has."""
     value = _optional(fields, name)
     return without if value is None else value
 
 
 def _optional(fields: Fields, name: str) -> float | None:
+    """A number, None where the file has none."""
     value = fields.get(name)
     return None if value is None else float(value)
 
@@ -138,6 +151,7 @@ def _own_number(user: Fields, name: str, where: str) -> float:
 
 
 def _fitted_with(user: Fields, where: str) -> str:
+    """Name of the model that the file was fitted with; '' for none.  Raises CellError for both."""
     marks = {model: _own_number(user, field, where) for model, field in FITTED_WITH.items()}
     for model, mark in marks.items():
         if mark not in (0.0, 1.0):
@@ -151,7 +165,8 @@ def _fitted_with(user: Fields, where: str) -> str:
     return "".join(marked)
 
 
-def _by_record(user: Fields, field: str, where: str) -> tuple[tuple[str, float], ...]:
+def _numbers_by_record(user: Fields, field: str, where: str) -> tuple[tuple[str, float], ...]:
+    """(record, number) pairs of a field of the section User-defined; empty where the field is missing."""
     numbers = user.get(field)
     if numbers is None:
         return ()
@@ -161,10 +176,13 @@ def _by_record(user: Fields, field: str, where: str) -> tuple[tuple[str, float],
 
 
 def _tested_on(user: Fields, where: str) -> tuple[tuple[str, date], ...]:
-    return tuple((name, _day(number, name, where)) for name, number in _by_record(user, TESTED_ON, where))
+    return tuple(
+        (name, _day(number, name, where)) for name, number in _numbers_by_record(user, TESTED_ON, where)
+    )
 
 
 def _day(number: float, name: str, where: str) -> date:
+    """The day that is written as a number: 20181113 for 13 November 2018."""
     text = f"{number:.10g}"
     try:
         return datetime.strptime(text if len(text) == len("20181113") else "", "%Y%m%d").date()

@@ -42,12 +42,12 @@ def load_bpx(
     """
     raw, where = _load(source)
     v1 = _as_v1(raw, where)
-    _refuse_what_is_not_modelled(v1, where)
+    _check_modelled(v1, where)
     _check_schema(v1, where)
-    return v1, where, _left_behind(raw, v1)
+    return v1, where, _fields_without_counterpart(raw, v1)
 
 
-def _left_behind(raw: Mapping[str, Any], v1: Mapping[str, Any]) -> tuple[str, ...]:
+def _fields_without_counterpart(raw: Mapping[str, Any], v1: Mapping[str, Any]) -> tuple[str, ...]:
     """The fields of a cell in BPX 0.x that have no counterpart in BPX 1.x."""
     state = v1.get("State") or {}
     kept = {*v1["Parameterisation"]["Cell"], *(name for section in state.values() for name in section or {})}
@@ -55,11 +55,20 @@ def _left_behind(raw: Mapping[str, Any], v1: Mapping[str, Any]) -> tuple[str, ..
 
 
 def _load(source: str | PathLike[str] | Mapping[str, Any]) -> tuple[dict[str, Any], str]:
+    """(content of a BPX file or mapping as it is, its name for messages)."""
     if isinstance(source, Mapping):
         return copy.deepcopy(dict(source)), "BPX data"
     path = Path(source)
+    raw = _parsed(path, _text_of(path))
+    if not isinstance(raw, dict):
+        raise CellError(f"{path} does not hold a BPX object with a Header and a Parameterisation.")
+    return raw, str(path)
+
+
+def _text_of(path: Path) -> str:
+    """The text of a file.  Raises CellError for one that cannot be read or is not UTF-8."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        return path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise CellError(f"cannot read the cell file {path}: {error.strerror or error}.") from None
     except UnicodeDecodeError as error:
@@ -70,20 +79,21 @@ def _load(source: str | PathLike[str] | Mapping[str, Any]) -> tuple[dict[str, An
         raise CellError(
             f"{path} is not text ({error.reason} at byte {error.start}), so no BPX file; is it a record?"
         ) from None
+
+
+def _parsed(path: Path, text: str) -> Any:
+    """The JSON value of a text.  Raises CellError for other text and for a field that is there twice."""
     try:
-        raw = json.loads(text, object_pairs_hook=_each_once)
+        return json.loads(text, object_pairs_hook=_unique_fields)
     except json.JSONDecodeError as error:
         raise CellError(
-            f"{path} is not JSON ({error.msg} in line {error.lineno}), so no BPX file{_of_text(text)}"
+            f"{path} is not JSON ({error.msg} in line {error.lineno}), so no BPX file{_fault_clause(text)}"
         ) from None
-    except _Twice as error:
+    except _RepeatedField as error:
         raise CellError(f"{path}: the field {error} is there twice in one section; leave one.") from None
-    if not isinstance(raw, dict):
-        raise CellError(f"{path} does not hold a BPX object with a Header and a Parameterisation.")
-    return raw, str(path)
 
 
-def _of_text(text: str) -> str:
+def _fault_clause(text: str) -> str:
     """End of a message on a file that is not JSON: its likely fault, from its beginning."""
     if not text.strip():
         return ": it is empty; copy or export it again."
@@ -92,21 +102,22 @@ def _of_text(text: str) -> str:
     return "; is it a record or an experiment?"
 
 
-class _Twice(Exception):
+class _RepeatedField(Exception):
     """Raised for a name that occurs twice in a JSON object."""
 
 
-def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """The pairs as a dict.  Raises _Twice for a repeated name, of which `json` would silently take the last."""
+def _unique_fields(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """The pairs as a dict.  Raises _RepeatedField for a repeated name, of which `json` would silently take the last."""
     content: dict[str, Any] = {}
     for name, value in pairs:
         if name in content:
-            raise _Twice(repr(name))
+            raise _RepeatedField(repr(name))
         content[name] = value
     return content
 
 
 def _as_v1(raw: dict[str, Any], where: str) -> dict[str, Any]:
+    """The content as BPX 1.x.  Raises CellError for another version and for content that cannot be converted."""
     from bpx import convert_v0_to_v1, is_legacy_bpx
 
     if not isinstance(raw.get("Parameterisation"), dict):
@@ -126,7 +137,8 @@ def _as_v1(raw: dict[str, Any], where: str) -> dict[str, Any]:
         raise CellError(f"{where}: {str(error).rstrip('.')}.") from None
 
 
-def _refuse_what_is_not_modelled(v1: dict[str, Any], where: str) -> None:
+def _check_modelled(v1: dict[str, Any], where: str) -> None:
+    """Raises CellError for a cell without a section, of blended electrodes, or whose Header is of the SPM."""
     parts = v1["Parameterisation"]
     for section in ("Cell", "Electrolyte", "Negative electrode", "Separator", "Positive electrode"):
         if not isinstance(parts.get(section), dict):
@@ -147,6 +159,8 @@ def _refuse_what_is_not_modelled(v1: dict[str, Any], where: str) -> None:
 
 
 def _check_schema(v1: dict[str, Any], where: str) -> None:
+    """Raises CellError for the first fault by the schema of BPX. Relations are checked by `relation`, and potentials
+    replaced by `STANDIN_TABLE`, since the package would execute their text."""
     import bpx
     from pydantic import ValidationError
 
@@ -165,12 +179,13 @@ def _check_schema(v1: dict[str, Any], where: str) -> None:
             warnings.simplefilter("ignore")
             bpx.parse_bpx_obj(shown)
     except ValidationError as error:
-        raise CellError(f"{where}: {_first_fault(error)}") from None
+        raise CellError(f"{where}: {_fault_sentence(error)}") from None
     except (ValueError, TypeError, KeyError, AttributeError) as error:
         raise CellError(f"{where} fails the BPX schema: {error}.") from None
 
 
-def _first_fault(error: Any) -> str:
+def _fault_sentence(error: Any) -> str:
+    """The first fault of a ValidationError in words, with the number of the others and what to do."""
     faults = error.errors()
     # Where several forms of an electrode were tried, only the faults of a missing field name the field itself.
     first = min(faults, key=lambda fault: fault["type"] != "missing")

@@ -47,16 +47,16 @@ HYSTERESIS_STATE = "Initial hysteresis state"
 BRANCHES = ("OCP (lithiation) [V]", "OCP (delithiation) [V]")
 
 
-def unread(v1: Mapping[str, Any]) -> tuple[str, ...]:
+def unread_field_sentences(v1: Mapping[str, Any]) -> tuple[str, ...]:
     """Sentences on the fields of a BPX 1.x mapping that are ignored but would change a simulation."""
-    parts, said = v1["Parameterisation"], []
+    parts, sentences = v1["Parameterisation"], []
     branched = [
         side
         for side in ("Negative electrode", "Positive electrode")
         if any(parts[side].get(name) is not None for name in BRANCHES)
     ]
     if branched:
-        said.append(
+        sentences.append(
             f"the cell's file declares a hysteresis ({', '.join(branched)}: OCP by direction), which is not simulated: "
             "'OCP [V]' holds both ways; the effect ocv_hysteresis adds one."
         )
@@ -68,24 +68,24 @@ def unread(v1: Mapping[str, Any]) -> tuple[str, ...]:
         or (name == INITIAL_SOC and value not in (None, 1.0))
     ]
     if begun:
-        said.append(
+        sentences.append(
             f"the cell's file declares how it begins ({', '.join(begun)}), which is not simulated: a record starts at "
             "the state of charge that is given or that its voltage says."
         )
     ageing = (v1.get("State") or {}).get("Degradation") or {}
     lost = [f"{name} {value}" for name, value in ageing.items() if value]
     if lost:
-        said.append(
+        sentences.append(
             f"the cell's file declares an aged state ({', '.join(lost)}), which is not simulated: the cell is taken as "
             "new; --soh or the effects of ageing take it as aged."
         )
     own = [name for name in parts.get("User-defined") or {} if name not in OWN_FIELDS]
     if own:
-        said.append(f"fields of the cell's file that are not read (User-defined): {', '.join(own)}.")
-    return tuple(said)
+        sentences.append(f"fields of the cell's file that are not read (User-defined): {', '.join(own)}.")
+    return tuple(sentences)
 
 
-def of_version_0(names: Sequence[str]) -> tuple[str, ...]:
+def version_0_sentences(names: Sequence[str]) -> tuple[str, ...]:
     """A sentence on fields of a cell in BPX 0.x that have no counterpart in 1.x."""
     if not names:
         return ()
@@ -97,7 +97,7 @@ def of_version_0(names: Sequence[str]) -> tuple[str, ...]:
     return (f"fields of the cell's file, of BPX 0.x, that are not read (Cell): {', '.join(names)}{own}.",)
 
 
-def other_capacity(cell: CellParameters) -> tuple[str, ...]:
+def capacity_sentences(cell: CellParameters) -> tuple[str, ...]:
     """A sentence where the nominal capacity is far from that of an electrode between its stoichiometry limits."""
     for side, electrode in (("negative", cell.negative), ("positive", cell.positive)):
         held = (electrode.theta_max - electrode.theta_min) * cell.electrode_capacity_ah(electrode)
@@ -111,16 +111,18 @@ def other_capacity(cell: CellParameters) -> tuple[str, ...]:
     return ()
 
 
-def replaced_relations(cell: CellParameters) -> tuple[str, ...]:
+def replaced_relation_sentences(cell: CellParameters) -> tuple[str, ...]:
     """Sentences on relations that are not simulated as declared somewhere in the range of the surfaces or the salt."""
-    said = []
+    sentences = []
     stoichiometry = np.linspace(0.0, 1.0, POINTS)
     for side, electrode in (("negative", cell.negative), ("positive", cell.positive)):
         what = f"the diffusivity of the {side} electrode"
-        said += _no_number(electrode.diffusivity, stoichiometry, what, "stoichiometries of {}", "at 0.5")
+        sentences += _not_positive_sentences(
+            electrode.diffusivity, stoichiometry, what, "stoichiometries of {}", "at 0.5"
+        )
         ocp = electrode.ocp
         if isinstance(ocp, LookupTable) and (ocp.x[0] > 0.0 or ocp.x[-1] < 1.0):
-            said.append(
+            sentences.append(
                 f"the potential of the {side} electrode is a table from {ocp.x[0]:.4g} to {ocp.x[-1]:.4g}; "
                 "where surfaces leave that under load it stays at the last value, and the voltage falls or rises late."
             )
@@ -130,11 +132,17 @@ def replaced_relations(cell: CellParameters) -> tuple[str, ...]:
         ("diffusivity", electrolyte.diffusivity),
         ("conductivity", electrolyte.conductivity),
     ):
-        said += _no_number(relation, salt, f"the {name} of the electrolyte", "{} mol/m3", "at rest")
-    return tuple(said)
+        sentences += _not_positive_sentences(
+            relation, salt, f"the {name} of the electrolyte", "{} mol/m3", "at rest"
+        )
+    return tuple(sentences)
 
 
-def _no_number(relation: Relation, at: Array, what: str, places: str, rest: str) -> list[str]:
+def _not_positive_sentences(relation: Relation, at: Array, what: str, places: str, rest: str) -> list[str]:
+    """A sentence where a relation is not positive at some of the places `at` (n,); empty where it is.
+
+    what : the relation, in words.  places : format of a range of `at`.  rest : place of the value that is taken.
+    """
     values = relation(at)
     wrong = at[~((values > 0.0) & np.isfinite(values))]
     if not len(wrong):

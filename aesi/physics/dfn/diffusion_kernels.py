@@ -4,8 +4,8 @@ For a reaction that is linear in time from y0 at the start of a step to y1 at it
 
     z1 = E z0 - gain (a y0 + b y1) - rate (a f0 + b f1)
 
-with E, a, b of `kernels.step_weights` and f the diffusion beyond that of the constant diffusivity. `calm` is z1 with
-y1 = 0. In a particle the constant diffusivity is adapted to the profile at every step, as in the single particle
+with E, a, b of `kernels.step_weights` and f the diffusion beyond that of the constant diffusivity. `base_...` is z1
+with y1 = 0. In a particle the constant diffusivity is adapted to the profile at every step, as in the single particle
 (`transport_kernels.EXACT_SHARE`): f is the mode of the flux of all diffusion less `near` times z.
 """
 
@@ -57,62 +57,65 @@ def renew_salt(s, faster, dt, w_salt, spread):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def calm_particles(p, state, t, faster, dt, w):  # type: ignore[no-untyped-def]
-    """Modes, means and surfaces of all particles at the end of the step, for zero reaction at its end."""
+def set_particle_bases(p, state, t, faster, dt, w):  # type: ignore[no-untyped-def]
+    """Set t.base_z, t.base_mean and t.theta_base: modes, means and surfaces of all particles at the end of the step,
+    for zero reaction there."""
     for u in range(p.place.shape[0]):
         k = p.kind[u]
         side = p.side[k]
         varies = p.strength[side] > 0.0
-        t.calm_mean[u] = state.mean[u] - 1.5 * p.scale[u] * dt * t.y_start[u]
-        surface = t.calm_mean[u]
+        t.base_mean[u] = state.mean[u] - 1.5 * p.scale[u] * dt * t.y_start[u]
+        surface = t.base_mean[u]
         for j in range(p.gains.shape[0]):
             value = w[k, 0, j] * state.z[u, j] - p.scale[u] * p.gains[j] * w[k, 1, j] * t.y_start[u]
             if varies:
                 value -= faster[side] * p.rates[k, j] * (
                     w[k, 1, j] * (state.flow[u, j] - t.near[k] * state.z[u, j]) + w[k, 2, j] * t.rest[u, j]
                 )  # fmt: skip
-            t.calm_z[u, j] = value
+            t.base_z[u, j] = value
             surface += value
-        t.reach[u] = surface
+        t.theta_base[u] = surface
 
 
 @njit(inline="always", fastmath=FASTMATH)
 def end_mode(p, t, u, j, y, w):  # type: ignore[no-untyped-def]
     """Mode j of particle u with a reaction y at the end of the step."""
-    return t.calm_z[u, j] - p.scale[u] * p.gains[j] * w[p.kind[u], 2, j] * y
+    return t.base_z[u, j] - p.scale[u] * p.gains[j] * w[p.kind[u], 2, j] * y
 
 
 @njit(inline="always", fastmath=FASTMATH)
 def end_mean(p, t, u, y, dt):  # type: ignore[no-untyped-def]
     """Mean of particle u with a reaction y at the end of the step."""
-    return t.calm_mean[u] - 1.5 * p.scale[u] * dt * y
+    return t.base_mean[u] - 1.5 * p.scale[u] * dt * y
 
 
 @compiled
-def calm_salt(s, state, t, faster, w):  # type: ignore[no-untyped-def]
-    """Modes of the salt, and salt over rest at the places, at the end of the step, for zero reaction at its end."""
+def set_salt_base(s, state, t, faster, w):  # type: ignore[no-untyped-def]
+    """Set t.base_q and t.base_salt: modes of the salt, and salt over rest at the places, at the end of the step, for
+    zero reaction there."""
     strength = s.strength * faster
     for j in range(s.rates.shape[0]):
         source = 0.0
         for v in range(s.at.shape[0]):
-            source += s.at[v, j] * t.given_start[v]
+            source += s.at[v, j] * t.reaction_start[v]
         value = w[0, j] * state.q[j] + w[1, j] * s.supply * source
         if strength > 0.0:
             value -= strength * s.rates[j] * (w[1, j] * state.forcing[j] + w[2, j] * t.forcing[j])
-        t.calm_q[j] = value
-    salt_at_places(s, t.calm_q, t.calm_salt)
+        t.base_q[j] = value
+    salt_at_places(s, t.base_q, t.base_salt)
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def end_salt(s, t, given, w):  # type: ignore[no-untyped-def]
-    """Modes t.q and concentrations t.c (mol/m3, at the nodes) with a reaction `given` at the end of the step."""
+def end_salt(s, t, reaction, w):  # type: ignore[no-untyped-def]
+    """Set modes t.q and concentrations t.c (mol/m3, at the nodes) at the end of the step, for `reaction` (places,) A/m2
+    there."""
     for i in range(t.c.shape[0]):
         t.c[i] = s.c0
     for j in range(t.q.shape[0]):
         source = 0.0
         for v in range(s.at.shape[0]):
-            source += s.at[v, j] * given[v]
-        t.q[j] = t.calm_q[j] + w[2, j] * s.supply * source
+            source += s.at[v, j] * reaction[v]
+        t.q[j] = t.base_q[j] + w[2, j] * s.supply * source
     for i in range(t.c.shape[0]):
         for j in range(t.q.shape[0]):
             t.c[i] += s.to_nodes[i, j] * t.q[j]
@@ -139,7 +142,7 @@ def salt_forcing(s, c, forcing):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def drops(kappa, path, before, after, solid, ohm):  # type: ignore[no-untyped-def]
+def place_drops(kappa, path, before, after, solid, ohm):  # type: ignore[no-untyped-def]
     """ohm[r, v] (ohm m2): drop from the collector to place r and on to the separator, per current at point v.
 
     kappa : (places,) S/m.  path : (2,) thickness over transport efficiency, m.  solid : (2, points, points) ohm m2.

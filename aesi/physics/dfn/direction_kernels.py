@@ -10,39 +10,39 @@ over 2 R T / F, 0.05 uV."""
 
 
 @compiled
-def add_side_currents(e, t, n, thermal, psi, given, salt):  # type: ignore[no-untyped-def]
-    """Add double layers and plating of each place to the currents `given` of the units, and to the conductance."""
+def add_side_currents(e, t, n, thermal, psi, reaction, salt):  # type: ignore[no-untyped-def]
+    """Add double layers and plating of each place to `reaction` (places,), A/m2, and to the conductance."""
     half = psi.shape[0] // 2
     for r in range(psi.shape[0]):
-        given[r] += t.layer_c[r] * psi[r] - t.layer_old[r]
+        reaction[r] += t.layer_c[r] * psi[r] - t.layer_old[r]
         n.conductance[r] += t.layer_c[r]
         if e.plating[0] > 0.0 and r < half:
             metal, slope, _ = stripped(
                 e.plating[0] * e.node_share[r], e.plating[1], t.metal_before[r], t.metal_filled[r],
                 e.plating[2] * max(salt[r], 0.0), psi[r], thermal,
             )  # fmt: skip
-            given[r] += metal
+            reaction[r] += metal
             n.conductance[r] += slope
 
 
 @compiled
-def newton_direction(p, t, n, spread, chi, total, psi, given, salt, half):  # type: ignore[no-untyped-def]
-    """Newton's step: d_given, d_psi, d_y, d_salt into `n`, and the new potentials of both collectors.
+def newton_direction(p, t, n, spread, chi, total, psi, reaction, salt, half):  # type: ignore[no-untyped-def]
+    """Newton's step: d_reaction, d_psi, d_y, d_salt into `n`, and the new potentials of both collectors.
 
-    chi : V.  total : (2,) A/m2, delithiation positive.  psi : (places,) V.  given : (places,) A/m2.  salt : over rest.
-    Returns phi_n, phi_p, V.
+    chi : V.  total : (2,) A/m2, delithiation positive.  psi : (places,) V.  reaction : (places,) A/m2.  salt : over
+    rest.  Returns phi_n, phi_p, V.
     """
     places = 2 * half
     for r in range(places):
         first = 0 if r < half else half
         logarithm, d_logarithm = salt_logarithm(salt[r])
         held = 1.0 / n.conductance[r]
-        residual = psi[r] - n.slack[r] * held + chi * logarithm
+        residual = psi[r] - n.excess[r] * held + chi * logarithm
         by = n.shift[r] * held + chi * d_logarithm
         for v in range(places):
             n.matrix[r, v] = by * spread[r, v]
         for v in range(half):
-            residual += t.ohm[r, v] * given[first + v]
+            residual += t.ohm[r, v] * reaction[first + v]
             n.matrix[r, first + v] += t.ohm[r, v]
         n.matrix[r, r] += held
         n.rhs[r, 0] = -residual
@@ -51,24 +51,24 @@ def newton_direction(p, t, n, spread, chi, total, psi, given, salt, half):  # ty
     eliminate_three(n.matrix, n.rhs, places)
     off_n, off_p, nn, np_, pn, pp = total[0], total[1], 0.0, 0.0, 0.0, 0.0
     for r in range(half):
-        off_n -= given[r] + n.rhs[r, 0]
+        off_n -= reaction[r] + n.rhs[r, 0]
         nn += n.rhs[r, 1]
         np_ += n.rhs[r, 2]
     for r in range(half, places):
-        off_p -= given[r] + n.rhs[r, 0]
+        off_p -= reaction[r] + n.rhs[r, 0]
         pn += n.rhs[r, 1]
         pp += n.rhs[r, 2]
     determinant = nn * pp - np_ * pn
     phi_n = (off_n * pp - off_p * np_) / determinant
     phi_p = (off_p * nn - off_n * pn) / determinant
     for r in range(places):
-        n.d_given[r] = n.rhs[r, 0] + phi_n * n.rhs[r, 1] + phi_p * n.rhs[r, 2]
+        n.d_reaction[r] = n.rhs[r, 0] + phi_n * n.rhs[r, 1] + phi_p * n.rhs[r, 2]
     for r in range(places):
         s = 0.0
         for v in range(places):
-            s += spread[r, v] * n.d_given[v]
+            s += spread[r, v] * n.d_reaction[v]
         n.d_salt[r] = s
-        n.d_psi[r] = (n.d_given[r] - n.slack[r] + n.shift[r] * s) / n.conductance[r]
+        n.d_psi[r] = (n.d_reaction[r] - n.excess[r] + n.shift[r] * s) / n.conductance[r]
     for u in range(n.pot.shape[0]):
         r = p.place[u]
         n.d_y[u] = (psi[r] - n.pot[u] + n.d_psi[r] - n.by_salt[u] * n.d_salt[r]) / n.slope[u]

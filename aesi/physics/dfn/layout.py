@@ -100,7 +100,8 @@ class DfnState(NamedTuple):
     the current.  flow : (units, modes) stoichiometry, modes of the integral of (diffusivity over that of the rates).
     largest : (kinds,) largest diffusivity of a profile over that of the rates.
     q, forcing : (salt modes,) mol/m3, of the salt, the latter of the variable part of diffusion.  c : (nodes,) mol/m3.
-    given : (places,) A/m2, of particles, double layers and plating.  psi : (places,) V, see `reaction_kernels`.
+    reaction : (places,) A/m2 of cell, sum of particles, double layers and plating.  psi : (places,) V, see
+    `reaction_kernels`.
     salt : (places,) over rest.  layer : (places,) A/m2 into double layers.  plated : (places,) mol/m3.
     """
 
@@ -114,7 +115,7 @@ class DfnState(NamedTuple):
     q: Array
     forcing: Array
     c: Array
-    given: Array
+    reaction: Array
     psi: Array
     salt: Array
     layer: Array
@@ -122,12 +123,12 @@ class DfnState(NamedTuple):
 
 
 class DfnTrial(NamedTuple):
-    """Scratch of a step. `calm_...` is its end for zero reaction there; `..._start` and `..._back` are its start.
+    """Scratch of a step. `base_...` is its end for zero reaction there; `..._start` and `..._back` are its start.
     Fields that `DfnState` has too have the same units.
 
-    calm_z, calm_mean, calm_q, calm_salt, y_start, given_start, psi_start, flow, largest, forcing, q, c, salt : as
+    base_z, base_mean, base_q, base_salt, y_start, reaction_start, psi_start, flow, largest, forcing, q, c, salt : as
     there; y_start with what double layers lag by.
-    reach, give : (units,) stoichiometry, and that per A/m2: surface = reach - give y.
+    theta_base, theta_per_y : (units,) stoichiometry, and that per A/m2: surface = theta_base - theta_per_y y.
     near : (kinds,) exactly stepped diffusivity over that of the rates.
     rest : (units, modes) stoichiometry, flow minus its exactly stepped part.
     force, z_end : (modes + 1,) and (modes,) of one unit, see `solid_forcing`.
@@ -141,14 +142,14 @@ class DfnTrial(NamedTuple):
     no_spread : zeros, for a solution at an instant.  rates : (8,) Arrhenius factors, by `Electrodes.energies`.
     """
 
-    calm_z: Array
-    calm_mean: Array
-    calm_q: Array
-    calm_salt: Array
-    reach: Array
-    give: Array
+    base_z: Array
+    base_mean: Array
+    base_q: Array
+    base_salt: Array
+    theta_base: Array
+    theta_per_y: Array
     y_start: Array
-    given_start: Array
+    reaction_start: Array
     psi_start: Array
     y_back: Array
     flow: Array
@@ -183,19 +184,19 @@ class DfnTrial(NamedTuple):
 class NewtonScratch(NamedTuple):
     """Scratch of Newton's method, and its start values y_in and psi_in.
 
-    By unit: pot V, slope V per y, by_salt V, d_y and y_in as y.  By place: slack, shift, d_given A/m2, conductance
+    By unit: pot V, slope V per y, by_salt V, d_y and y_in as y.  By place: excess, shift, d_reaction A/m2, conductance
     A/(V m2), d_psi, psi_in V, d_salt over rest.
     """
 
     pot: Array
     slope: Array
     by_salt: Array
-    slack: Array
+    excess: Array
     shift: Array
     conductance: Array
     d_y: Array
     d_psi: Array
-    d_given: Array
+    d_reaction: Array
     d_salt: Array
     y_in: Array
     psi_in: Array
@@ -204,7 +205,11 @@ class NewtonScratch(NamedTuple):
 
 
 class Weights(NamedTuple):
-    """Weights of step lengths in use, by slot: see `diffusion_kernels.renew`."""
+    """Weights of step lengths in use, by slot: see `diffusion_kernels.renew_particles` and `renew_salt`.
+
+    keys : (slots,) nanoseconds, -1 for none.  particle : (slots, kinds, 3, modes).  taken : (slots, kinds) s.
+    salt : (slots, 3, salt modes).  spread : (slots, places, places) m2/A.
+    """
 
     keys: IntArray
     particle: Array

@@ -47,11 +47,13 @@ def porous_impedance(
     thermal = GAS_CONSTANT_J_MOL_K * kelvin / FARADAY_C_MOL
     places = len(stack.at)
     half = places // 2
-    local = _local(model, particles, electrodes, slopes_v, rest, thermal, rates, s)
+    local = _place_impedance(model, particles, electrodes, slopes_v, rest, thermal, rates, s)
     e = model.cell.electrolyte
     kappa = float(e.conductivity(np.array([e.c0_mol_m3]))[0]) * rates[5]
     matrix = np.zeros((len(s), places + 2, places + 2), dtype=complex)
-    matrix[:, :places, :places] = _ohm(stack, electrodes, kappa) + _salt(model, stack, thermal, rates[4], s)
+    matrix[:, :places, :places] = _ohmic_drops(stack, electrodes, kappa) + _salt_impedance(
+        model, stack, thermal, rates[4], s
+    )
     matrix[:, np.arange(places), np.arange(places)] += local
     right = np.zeros((len(s), places + 2, 1), dtype=complex)
     for side, sign in enumerate((1.0, -1.0)):
@@ -65,7 +67,7 @@ def porous_impedance(
     return cast(ComplexArray, solved[:, places] - solved[:, places + 1] + series)
 
 
-def _local(
+def _place_impedance(
     model: EspmModel,
     p: Particles,
     e: Electrodes,
@@ -96,7 +98,9 @@ def _local(
     return cast(ComplexArray, 1.0 / admittance)
 
 
-def _salt(model: EspmModel, stack: Stack, thermal: float, warmer: float, s: ComplexArray) -> ComplexArray:
+def _salt_impedance(
+    model: EspmModel, stack: Stack, thermal: float, warmer: float, s: ComplexArray
+) -> ComplexArray:
     """(frequencies, places, places) ohm m2: potential of the salt at r per reaction at v; its mean does not move."""
     e = model.cell.electrolyte
     d0 = electrolyte_diffusion(e.diffusivity, e.c0_mol_m3).d0
@@ -107,7 +111,7 @@ def _salt(model: EspmModel, stack: Stack, thermal: float, warmer: float, s: Comp
     return cast(ComplexArray, chi * stack.supply / stack.c0 * np.einsum("rk,fk,vk->frv", at, modes, at))
 
 
-def _ohm(stack: Stack, e: Electrodes, kappa: float) -> Array:
+def _ohmic_drops(stack: Stack, e: Electrodes, kappa: float) -> Array:
     """(places, places) ohm m2: drop from the collector to r and on to the separator, per reaction at v."""
     half = len(e.before)
     out = np.zeros((2 * half, 2 * half))

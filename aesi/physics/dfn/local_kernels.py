@@ -77,7 +77,7 @@ def salt_logarithm(s):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def unit_potential(e, side, exchange, film, surface, give, y, s, thermal, rise):  # type: ignore[no-untyped-def]
+def unit_potential(e, side, exchange, film, surface, theta_per_y, y, s, thermal, rise):  # type: ignore[no-untyped-def]
     """Potential of a unit at a current y, its slopes in y and in the salt s, the kinetic part of the slope, and the
     exchange current.  film : factor on the film's ohm m2: that of temperature over reactive surface."""
     room, d_room = occupancy(surface)
@@ -90,7 +90,7 @@ def unit_potential(e, side, exchange, film, surface, give, y, s, thermal, rise):
     resistance = film * ohm
     slope = d_eta + resistance
     slope = max(
-        slope - give * (falls + moved * (d_room + 2.0 * d_quicker / quicker) + film * d_ohm * y),
+        slope - theta_per_y * (falls + moved * (d_room + 2.0 * d_quicker / quicker) + film * d_ohm * y),
         SMALLEST_SLOPE * slope,
     )
     return level + eta + resistance * y, slope, moved / s, d_eta, scale

@@ -49,8 +49,8 @@ def record(p, e, state, half, out, k):  # type: ignore[no-untyped-def]
 @compiled
 def record_profile(k, p, e, state, profile, salt_profile):  # type: ignore[no-untyped-def]
     """Write sample k of the profiles: the quantities of each place, and the salt at each node."""
-    for r in range(state.given.shape[0]):
-        profile[k, 1, r] = state.given[r] / e.node_share[r]
+    for r in range(state.reaction.shape[0]):
+        profile[k, 1, r] = state.reaction[r] / e.node_share[r]
         profile[k, 2, r] = state.salt[r]
         profile[k, 3, r] = state.psi[r]
     for u in range(p.place.shape[0]):

@@ -7,7 +7,13 @@ from numba import njit
 from aesi.physics.dfn.diffusion_kernels import renew_particles, renew_salt, salt_forcing
 from aesi.physics.dfn.local_kernels import equilibrium, row_lookup
 from aesi.physics.dfn.output_kernels import left_range, mean_surfaces, record, record_profile
-from aesi.physics.dfn.stepping_kernels import advance, hold_layers, hold_metal, settle, take_back
+from aesi.physics.dfn.stepping_kernels import (
+    advance,
+    instant_reaction,
+    restore_start,
+    start_layers,
+    start_metal,
+)
 from aesi.physics.espm.kernels import FASTMATH, ROUND_OFF, compiled, lookup, parts_of, slot_of
 from aesi.physics.espm.transport_kernels import arrhenius, heated, mean_heat, renew_factors, solid_forcing
 
@@ -23,7 +29,7 @@ TEMPERATURE_STEP_K = 0.01
 
 
 @compiled
-def run_porous(  # type: ignore[no-untyped-def]
+def step_porous_record(  # type: ignore[no-untyped-def]
     drive, theta0, p, s, e, state, t, newton, weights, out, profile, salt_profile
 ):
     """Step all samples; `layout` describes the named tuples.
@@ -42,12 +48,12 @@ def run_porous(  # type: ignore[no-untyped-def]
     watts, last_dt = 0.0, 0.0
     moves, fault_at, fault = False, -1, 0
     set_currents(t, current[0], e.area)
-    phi_n, phi_p, steps = settle(p, s, e, state, t, newton, t.total, t.total, t_k)
+    phi_n, phi_p, steps = instant_reaction(p, s, e, state, t, newton, t.total, t.total, t_k)
     for k in range(time.shape[0]):
         whole = time[k] - time[k - 1] if k > 0 else 0.0
         jumped = k > 0 and drive.backward and current[k] != current[k - 1]
         if jumped:
-            jump(current[k - 1], current[k], p, s, e, state, t, newton, half, t_k)
+            jump_current(current[k - 1], current[k], p, s, e, state, t, newton, half, t_k)
             last_dt = 0.0
         parts = parts_of(whole, drive.substep, drive.most, drive.finer) if k > 0 else 0
         restless = False
@@ -63,11 +69,11 @@ def run_porous(  # type: ignore[no-untyped-def]
             i1 = current[k] if drive.backward else current[k - 1] + (current[k] - current[k - 1]) * share
             set_currents(t, i1, e.area)
             start_k, around_k = t_k, e.heat[2]
-            if drive.given:
+            if drive.has_temperature:
                 around_k = temperature[k - 1] + (temperature[k] - temperature[k - 1]) * share
             if e.heat[0] > 0.0:
                 t_k = heated(start_k, watts, dt, e.heat, around_k)
-            elif drive.given:
+            elif drive.has_temperature:
                 t_k = around_k
             t_weights = renew_factors(
                 t_k, t_weights, TEMPERATURE_STEP_K, e.energies, e.reference_k, t.faster, weights.keys
@@ -82,15 +88,15 @@ def run_porous(  # type: ignore[no-untyped-def]
             if missing:
                 renew_salt(s, t.faster, dt, weights.salt[slot], weights.spread[slot])
             if e.has_layers:
-                hold_layers(e, state, t, newton, dt)
+                start_layers(e, state, t, newton, dt)
             if e.plating[0] > 0.0:
-                hold_metal(e, state, t, dt, start_k)
+                start_metal(e, state, t, dt, start_k)
             last_try = length <= SHORTEST or fault_at >= 0
             phi_n, phi_p, steps = advance(
                 p, s, e, state, t, newton, weights, slot, dt, last_dt, t_k, last_try
             )
             if steps < 0 and not last_try:
-                take_back(state, t)
+                restore_start(state, t)
                 t_k, last_dt = start_k, 0.0
                 length *= SHORTER
                 continue
@@ -131,7 +137,7 @@ def set_currents(t, current, area):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def jump(last, current, p, s, e, state, t, newton, half, t_k):  # type: ignore[no-untyped-def]
+def jump_current(last, current, p, s, e, state, t, newton, half, t_k):  # type: ignore[no-untyped-def]
     """The reaction at the instant at which the current jumps; a double layer takes all of the jump."""
     t.change[0] = (current - last) / e.area
     t.change[1] = -t.change[0]
@@ -139,10 +145,10 @@ def jump(last, current, p, s, e, state, t, newton, half, t_k):  # type: ignore[n
     if e.has_layers:
         for r in range(2 * half):
             taken = e.node_share[r] * t.change[0 if r < half else 1]
-            state.given[r] += taken
+            state.reaction[r] += taken
             state.layer[r] += taken
     else:
-        settle(p, s, e, state, t, newton, t.change, t.total, t_k)
+        instant_reaction(p, s, e, state, t, newton, t.change, t.total, t_k)
 
 
 @compiled

@@ -34,21 +34,20 @@ def run_porous_electrode(
 
     profiles : filled with the arrays of `Run.profiles`.  Raises InputError for an electrode cut into regions.
     """
-    from aesi.physics.dfn.record_kernels import run_porous
+    from aesi.physics.dfn.record_kernels import step_porous_record
 
     check_whole(model)
     particles, stack, electrodes = porous_arguments(model)
     out = np.empty((9, len(time)))
-    given = temperature_k is not None
     kelvin = temperature_k if temperature_k is not None else np.array([model.cell.initial_temperature_k])
     state, trial, newton, weights = _memory(particles, stack, electrodes)
     kept = 0 if profiles is None else len(time)
     profile = np.zeros((kept, 4, len(electrodes.node_share)))
     salt_profile = np.zeros((kept, len(stack.to_nodes)))
     steps = LONGER_STEPS * model.substep_s, model.most_substeps, model.step_refinement
-    drive = Drive(time, current, kelvin, given, hold == "backward", *steps)
+    drive = Drive(time, current, kelvin, temperature_k is not None, hold == "backward", *steps)
     theta0 = np.array(model.cell.stoichiometries(soc0))
-    fault_at, fault = run_porous(
+    fault_at, fault = step_porous_record(
         drive, theta0, particles, stack, electrodes, state, trial, newton, weights, out, profile, salt_profile
     )
     extra = {"temperature_k": out[7]}
@@ -70,7 +69,7 @@ def check_whole(model: EspmModel) -> None:
 
 
 def _named(model: EspmModel, profile: Array) -> dict[str, Array]:
-    """The rows (n, 4, places) of `run_porous` by name, places from the negative collector to the positive."""
+    """The rows (n, 4, places) of `step_porous_record` by name, places from the negative collector to the positive."""
     n, s, p = model.cell.negative, model.cell.separator, model.cell.positive
     x = gauss_layer(model.electrode_points).x
     whole = n.thickness_m + s.thickness_m + p.thickness_m
@@ -109,12 +108,12 @@ def _memory(p: Particles, s: Stack, e: Electrodes) -> tuple[DfnState, DfnTrial, 
 
     state = DfnState(
         z=of(units, modes), mean=of(units), y=of(units), trend=of(units), theta=of(units), flow=of(units, modes),
-        largest=np.ones(kinds), q=of(salt_modes), forcing=of(salt_modes), c=of(nodes), given=of(places),
+        largest=np.ones(kinds), q=of(salt_modes), forcing=of(salt_modes), c=of(nodes), reaction=of(places),
         psi=of(places), salt=np.ones(places), layer=of(places), plated=of(places),
     )  # fmt: skip
     trial = DfnTrial(
-        calm_z=of(units, modes), calm_mean=of(units), calm_q=of(salt_modes), calm_salt=of(places),
-        reach=of(units), give=of(units), y_start=of(units), given_start=of(places),
+        base_z=of(units, modes), base_mean=of(units), base_q=of(salt_modes), base_salt=of(places),
+        theta_base=of(units), theta_per_y=of(units), y_start=of(units), reaction_start=of(places),
         psi_start=of(places), y_back=of(units), skew=of(places), lag=of(places),
         metal_before=of(places), metal_filled=of(places),
         flow=of(units, modes), largest=np.ones(kinds), near=np.ones(kinds), rest=of(units, modes), force=of(modes + 1),
@@ -125,8 +124,8 @@ def _memory(p: Particles, s: Stack, e: Electrodes) -> tuple[DfnState, DfnTrial, 
         total=of(2), before=of(2), change=of(2), faster=np.ones(3),
     )  # fmt: skip
     newton = NewtonScratch(
-        pot=of(units), slope=of(units), by_salt=of(units), slack=of(places), shift=of(places), conductance=of(places),
-        d_y=of(units), d_psi=of(places), d_given=of(places), d_salt=of(places),
+        pot=of(units), slope=of(units), by_salt=of(units), excess=of(places), shift=of(places), conductance=of(places),
+        d_y=of(units), d_psi=of(places), d_reaction=of(places), d_salt=of(places),
         y_in=of(units), psi_in=of(places),
         matrix=of(places, places), rhs=of(places, 3),
     )  # fmt: skip

@@ -5,15 +5,15 @@ import math
 from numba import njit
 
 from aesi.physics.dfn.diffusion_kernels import (
-    calm_particles,
-    calm_salt,
-    drops,
     end_mean,
     end_mode,
     end_salt,
+    place_drops,
     renew_kind,
     salt_at_places,
     salt_forcing,
+    set_particle_bases,
+    set_salt_base,
 )
 from aesi.physics.dfn.reaction_kernels import GAS_OVER_FARADAY, solve_reaction
 from aesi.physics.espm.interface_kernels import bounded_exp, end_weight, stripped
@@ -32,13 +32,13 @@ LARGEST_GROWTH = 4.0
 
 
 @compiled
-def take_back(state, t):  # type: ignore[no-untyped-def]
+def restore_start(state, t):  # type: ignore[no-untyped-def]
     """Restore the start of a step whose end was not found; only `commit` changes the rest of the state."""
     t.total[0], t.total[1] = t.before[0], t.before[1]
     for u in range(state.y.shape[0]):
         state.y[u] = t.y_back[u]
-    for r in range(state.given.shape[0]):
-        state.given[r] = t.given_start[r]
+    for r in range(state.reaction.shape[0]):
+        state.reaction[r] = t.reaction_start[r]
         state.psi[r] = t.psi_start[r]
         state.salt[r] = t.salt_before[r]
 
@@ -49,34 +49,35 @@ def find_reaction(p, s, e, state, t, newton, spread, total, t_k):  # type: ignor
     half = s.at.shape[0] // 2
     for r in range(2 * half):
         t.kappa[r] = t.rates[5] * lookup(s.kappa, t.salt[r] * s.c0 / s.top)
-    drops(t.kappa, s.path, e.before, e.after, e.solid, t.ohm)
+    place_drops(t.kappa, s.path, e.before, e.after, e.solid, t.ohm)
     return solve_reaction(
         p, e, t, newton, spread, total, t_k,
-        state.y, state.theta, state.psi, state.given, state.salt,
+        state.y, state.theta, state.psi, state.reaction, state.salt,
     )  # fmt: skip
 
 
 @compiled
-def settle(p, s, e, state, t, newton, change, total, t_k):  # type: ignore[no-untyped-def]
-    """The reaction at an instant: particles and salt stay as they are, the current has jumped by `change` (2,)."""
+def instant_reaction(p, s, e, state, t, newton, change, total, t_k):  # type: ignore[no-untyped-def]
+    """The reaction at an instant: particles and salt stay as they are, the currents have jumped by `change` (2,), A/m2.
+    Returns as `solve_reaction`."""
     half = s.at.shape[0] // 2
     for u in range(p.place.shape[0]):
         state.y[u] += p.share[u] * change[0 if p.place[u] < half else 1]
         state.trend[u] = 0.0
-        t.give[u] = 0.0
-        t.reach[u] = state.mean[u]
+        t.theta_per_y[u] = 0.0
+        t.theta_base[u] = state.mean[u]
         for j in range(p.gains.shape[0]):
-            t.reach[u] += state.z[u, j]
-    salt_at_places(s, state.q, t.calm_salt)
+            t.theta_base[u] += state.z[u, j]
+    salt_at_places(s, state.q, t.base_salt)
     for r in range(2 * half):
-        t.salt[r] = t.calm_salt[r]
+        t.salt[r] = t.base_salt[r]
         t.layer_c[r], t.layer_old[r] = 0.0, 0.0
         t.metal_before[r], t.metal_filled[r] = state.plated[r], 0.0
     return find_reaction(p, s, e, state, t, newton, t.no_spread, total, t_k)
 
 
 @compiled
-def hold_layers(e, state, t, newton, dt):  # type: ignore[no-untyped-def]
+def start_layers(e, state, t, newton, dt):  # type: ignore[no-untyped-def]
     """Double layers over a step, each as a conductance `t.layer_c` and a current `t.layer_old`.
 
     That is exact for a layer that relaxes by its kinetics at the start of the step: the conductance of the last
@@ -96,7 +97,7 @@ def hold_layers(e, state, t, newton, dt):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def hold_metal(e, state, t, dt, t_k):  # type: ignore[no-untyped-def]
+def start_metal(e, state, t, dt, t_k):  # type: ignore[no-untyped-def]
     """Plated lithium over a step, exact for metal that strips at the rate at the start of the step, t_k (K)."""
     thermal, alpha = GAS_OVER_FARADAY * t_k, e.plating[1]
     for r in range(state.plated.shape[0] // 2):
@@ -122,15 +123,15 @@ def advance(  # type: ignore[no-untyped-def]
     extrapolate(p, s, e, state, t, dt, last_dt, taken, t.change)
     varies = p.strength[0] > 0.0 or p.strength[1] > 0.0
     if varies:
-        hold_flows(p, state, t)
-        calm_particles(p, state, t, faster, dt, w)
+        start_flows(p, state, t)
+        set_particle_bases(p, state, t, faster, dt, w)
         end_flows(p, state, t, faster, dt, w, taken, True)
     phi_n, phi_p, steps = 0.0, 0.0, 0
     for passed in range(PASSES):
-        calm_salt(s, state, t, faster[2], w_salt)
-        calm_particles(p, state, t, faster, dt, w)
+        set_salt_base(s, state, t, faster[2], w_salt)
+        set_particle_bases(p, state, t, faster, dt, w)
         phi_n, phi_p, steps = find_reaction(p, s, e, state, t, newton, spread, t.total, t_k)
-        end_salt(s, t, state.given, w_salt)
+        end_salt(s, t, state.reaction, w_salt)
         if s.strength > 0.0:
             salt_forcing(s, t.c, t.forcing)
         off = 0.0
@@ -159,7 +160,7 @@ def extrapolate(p, s, e, state, t, dt, last_dt, taken, change):  # type: ignore[
     half = s.at.shape[0] // 2
     ahead = dt / last_dt if dt < LARGEST_GROWTH * last_dt else 0.0
     for r in range(2 * half):
-        t.given_start[r] = state.given[r]
+        t.reaction_start[r] = state.reaction[r]
         t.psi_start[r] = state.psi[r]
         t.salt[r] = state.salt[r] + ahead * (state.salt[r] - t.salt_before[r])
         t.salt_before[r] = state.salt[r]
@@ -174,11 +175,11 @@ def extrapolate(p, s, e, state, t, dt, last_dt, taken, change):  # type: ignore[
             t.y_start[u] += p.share[u] / e.node_share[r] * t.lag[r]
         trend = state.trend[u] * dt if ahead > 0.0 else 0.0
         state.y[u] += p.share[u] * change[0 if p.place[u] < half else 1] + trend
-        t.give[u] = p.scale[u] * taken[p.kind[u]]
+        t.theta_per_y[u] = p.scale[u] * taken[p.kind[u]]
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def hold_flows(p, state, t):  # type: ignore[no-untyped-def]
+def start_flows(p, state, t):  # type: ignore[no-untyped-def]
     """Set t.rest, the diffusion beyond the exactly stepped part, at the start of the step."""
     for u in range(p.place.shape[0]):
         for j in range(p.gains.shape[0]):
@@ -213,7 +214,7 @@ def end_flows(p, state, t, faster, dt, w, taken, more):  # type: ignore[no-untyp
             worst = max(worst, abs(moved))
             if t.near[k] > last:
                 renew_kind(p, k, t.near[k] * faster[side], dt, w, taken)
-                t.give[u] = p.scale[u] * taken[k]
+                t.theta_per_y[u] = p.scale[u] * taken[k]
                 worst = math.inf
     return worst
 
@@ -249,7 +250,7 @@ def commit_metal(p, e, state, t, dt, t_k):  # type: ignore[no-untyped-def]
         )[2]  # fmt: skip
         layers = state.layer[r] + t.layer_c[r] * state.psi[r] - t.layer_old[r]
         gave = (state.plated[r] - metal) * e.node_share[r] / (e.plating_to_c * dt)
-        rest = t.given_start[r] + state.given[r] - layers - 2.0 * gave
+        rest = t.reaction_start[r] + state.reaction[r] - layers - 2.0 * gave
         for u in range(p.place.shape[0]):
             if p.place[u] == r:
                 rest -= t.y_back[u] + state.y[u]

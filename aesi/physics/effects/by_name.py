@@ -169,7 +169,7 @@ def active_effect(content: Mapping[str, Any], folder: Path | None = None) -> Act
     return effect.activate(**content["parameters"])
 
 
-def _reduced(effect: Effect) -> tuple[Any, ...]:
+def _pickle_parts(effect: Effect) -> tuple[Any, ...]:
     """How an effect is pickled: by id where it can be looked up, so that unpickling gives the catalogue's object; else
     by value."""
     if effect.file is None and CATALOGUE.get(effect.id) is not effect:
@@ -179,4 +179,4 @@ def _reduced(effect: Effect) -> tuple[Any, ...]:
     return find_effect, (effect.id, effect.file)
 
 
-copyreg.pickle(Effect, _reduced)
+copyreg.pickle(Effect, _pickle_parts)

@@ -188,8 +188,8 @@ def evaluate_electrode(lo, hi, side, total, begins, at, particles, surfaces, mem
 @njit(inline="always", fastmath=FASTMATH)
 def surface_potential(u, side, total, at, particles, surfaces, memory):  # type: ignore[no-untyped-def]
     """Potential (V) of unit u against the electrolyte beside it, at its current, and the slope in the current."""
-    ocp, y, give = surfaces.ocp[side], memory.y, memory.give
-    t = memory.pred[u] - give[u] * (y[u] - particles.share[u] * total)
+    ocp, y, theta_per_y = surfaces.ocp[side], memory.y, memory.theta_per_y
+    t = memory.pred[u] - theta_per_y[u] * (y[u] - particles.share[u] * total)
     memory.theta[u] = t
     region = side * memory.ohm.shape[0] + particles.place[u, 1]
     k, salt = 3 * region, memory.salt
@@ -206,8 +206,8 @@ def surface_potential(u, side, total, at, particles, surfaces, memory):  # type:
     u_eq = open_circuit(ocp, t) + at.rise * lookup(surfaces.entropic[side], inside)
     # The room that the reaction has changes with the current, too.
     if occupancy > SMALLEST_OCCUPANCY:
-        d_eta *= 1.0 + give[u] * y[u] * (0.5 - t) / occupancy
-    return u_eq + eta + resistance * y[u], max(d_eta + resistance - give[u] * falls, SMALLEST_SLOPE)
+        d_eta *= 1.0 + theta_per_y[u] * y[u] * (0.5 - t) / occupancy
+    return u_eq + eta + resistance * y[u], max(d_eta + resistance - theta_per_y[u] * falls, SMALLEST_SLOPE)
 
 
 @njit(inline="always", fastmath=FASTMATH)

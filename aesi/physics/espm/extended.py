@@ -1,4 +1,4 @@
-"""Arguments of the compiled general path, which has all that effects add to the plain model.
+"""Arguments of the compiled extended path, which has all that effects add to the plain model.
 
 Particles of several sizes, regions across each electrode, diffusivities that depend on stoichiometry, asymmetric
 kinetics, double layers, plating, and a temperature that is measured or follows from a heat balance.
@@ -46,16 +46,17 @@ def run_extended(
 
     model : that of the record, see `of_record`.
     """
-    from aesi.physics.espm.extended_kernels import run_general
+    from aesi.physics.espm.extended_kernels import step_extended_record
 
     out = np.empty((9, len(time)))
     theta0 = np.array(model.cell.stoichiometries(soc0))
-    given = temperature_k is not None
     kelvin = temperature_k if temperature_k is not None else np.array([model.cell.initial_temperature_k])
     steps = model.substep_s, model.most_substeps, model.step_refinement
-    drive = Drive(time, current, kelvin, given, hold == "backward", *steps)
-    arguments = general_arguments(model)
-    fault_at, fault = run_general(drive, theta0, *arguments, *_memory(*arguments[:2], model.regions), out)
+    drive = Drive(time, current, kelvin, temperature_k is not None, hold == "backward", *steps)
+    arguments = extended_arguments(model)
+    fault_at, fault = step_extended_record(
+        drive, theta0, *arguments, *_memory(*arguments[:2], model.regions), out
+    )
     extra = {"temperature_k": out[7]}
     if model.negative.plating is not None:
         extra["plated_mol_m3"] = out[8]
@@ -67,7 +68,7 @@ def _memory(particles: Units, salt: Salt, regions: int) -> tuple[Memory, Modes, 
     units, order = particles.rates.shape
     nodes, salt_order = salt.to_nodes.shape
     memory = Memory(
-        y=of(units), theta=of(units), pred=of(units), give=of(units), ohm=of((regions, regions)),
+        y=of(units), theta=of(units), pred=of(units), theta_per_y=of(units), ohm=of((regions, regions)),
         salt=np.ones(len(salt.gauss)), log_salt=of(2 * regions), region_salt=np.ones(2 * regions),
         delta=of(2 * regions), layer=of(2 * regions), ahead=of(2 * regions), total=of(2 * regions),
         plated=of(regions), new_plated=of(regions), kappa=np.ones(2 * regions + 1), deviation=of(2 * regions),
@@ -85,8 +86,8 @@ def _memory(particles: Units, salt: Salt, regions: int) -> tuple[Memory, Modes, 
 
 
 @lru_cache(maxsize=64)
-def general_arguments(model: EspmModel) -> tuple[Units, Salt, Surfaces, Whole]:
-    """Constants of the cell for `extended_kernels.run_general`."""
+def extended_arguments(model: EspmModel) -> tuple[Units, Salt, Surfaces, Whole]:
+    """Constants of the cell for `extended_kernels.step_extended_record`."""
     cell = model.cell
     whole = Whole(
         energies=activation_energies(cell),

@@ -28,7 +28,7 @@ from aesi.physics.espm.transport_kernels import (
     heated,
     mean_heat,
     observe_salt,
-    predict,
+    predict_surfaces,
     renew_factors,
     renew_weights,
     solid_forcing,
@@ -38,7 +38,7 @@ GAS_OVER_FARADAY = GAS_CONSTANT_J_MOL_K / FARADAY_C_MOL
 
 
 @compiled
-def run_general(  # type: ignore[no-untyped-def]
+def step_extended_record(  # type: ignore[no-untyped-def]
     drive, theta0, particles, electrolyte, surfaces, cell, memory, modes, dissolved, out
 ):
     """Step all samples; see `layout` for what the arguments hold.
@@ -75,7 +75,7 @@ def run_general(  # type: ignore[no-untyped-def]
                 renew_weights(dt, missing, particles, electrolyte.rates, slot, modes)
                 diffuse(i0 / area, j1, dt, last_step, slot, particles, electrolyte, memory, modes, dissolved)
                 last_step = dt
-            predict(memory, modes)
+            predict_surfaces(memory, modes)
             observe_salt(
                 dissolved.c,
                 electrolyte.c0,
@@ -85,11 +85,11 @@ def run_general(  # type: ignore[no-untyped-def]
                 memory.region_salt,
             )
             start_k, around_k = t_k, heat[2]
-            if drive.given and k > 0:
+            if drive.has_temperature and k > 0:
                 around_k = temperature[k - 1] + (temperature[k] - temperature[k - 1]) * end_share
             if k > 0 and heat[0] > 0.0:
                 t_k = heated(start_k, watts, dt, heat, around_k)
-            elif drive.given and k > 0:
+            elif drive.has_temperature and k > 0:
                 t_k = around_k
             set_conductivities(
                 arrhenius(cell.energies[5], t_k, cell.reference_k), electrolyte, memory, dissolved.c
@@ -99,7 +99,7 @@ def run_general(  # type: ignore[no-untyped-def]
             at = end_of_step(1, dt, drive.backward, t_k, electrolyte.supply, cell)
             phi_p = react(1, -j1, -last_j, at, particles, surfaces, memory)
             if k > 0:
-                take_deviations(j1, dt, slot, particles, memory, modes)
+                add_deviations(j1, dt, slot, particles, memory, modes)
             last_j = j1
             voltage = phi_p - phi_n - j1 * cell.separator / memory.kappa[memory.kappa.shape[0] - 1]
             voltage -= i1 * cell.contact
@@ -197,7 +197,7 @@ def units_of(side, particles):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def take_deviations(density, dt, slot, particles, memory, modes):  # type: ignore[no-untyped-def]
+def add_deviations(density, dt, slot, particles, memory, modes):  # type: ignore[no-untyped-def]
     """Add to the particles the currents of their units beyond their shares, over the whole step, and the double layers'
     current at the end of the step minus its mean, at the beginning of the step."""
     regions = memory.ohm.shape[0]

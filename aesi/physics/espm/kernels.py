@@ -79,7 +79,7 @@ def open_circuit(table, theta):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def wet(salt):  # type: ignore[no-untyped-def]
+def positive_salt(salt):  # type: ignore[no-untyped-def]
     """Salt concentration over rest, kept positive: unchanged down to `NEARLY_DRY`, then decaying to zero with the same
     slope there."""
     return (

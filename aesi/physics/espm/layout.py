@@ -21,7 +21,7 @@ stoichiometries (n, p). Rows of further states follow."""
 class Drive(NamedTuple):
     """A record for the compiled steps.
 
-    time, current : (n,) s, A.  temperature : K, (n,) where `given`, else (1,) at the start.
+    time, current : (n,) s, A.  temperature : K, (n,) where `has_temperature`, else (1,) at the start.
     backward : a row's current holds since the row before.  substep, most : s and count of the steps within a row.
     finer : see `EspmModel.step_refinement`.
     """
@@ -29,7 +29,7 @@ class Drive(NamedTuple):
     time: Array
     current: Array
     temperature: Array
-    given: bool
+    has_temperature: bool
     backward: bool
     substep: float
     most: int
@@ -123,8 +123,9 @@ class Whole(NamedTuple):
 class Memory(NamedTuple):
     """Arrays that a step of the reaction reads and changes.
 
-    y, theta, pred, give : (units,) A/m2 of cell; surface stoichiometry, that if each unit carried its share, and what
-    one unit of deviating current takes from it.  ohm : (regions, regions) ohm m2.
+    y : (units,) A/m2 of cell.  theta, pred : (units,) surface stoichiometry, and that if each unit carried its share of
+    the current.  theta_per_y : (units,) what 1 A/m2 of deviating current takes off theta.
+    ohm : (regions, regions) ohm m2.
     salt, log_salt, region_salt : at Gauss points over rest; by region its mean logarithm and mean, mol/m3.
     delta, layer, ahead : (2 regions,) V and A/m2 of the double layers, and how far the latter is at the end of the step
     above its mean.  total : (2 regions,) A/m2.
@@ -137,7 +138,7 @@ class Memory(NamedTuple):
     y: Array
     theta: Array
     pred: Array
-    give: Array
+    theta_per_y: Array
     ohm: Array
     salt: Array
     log_salt: Array

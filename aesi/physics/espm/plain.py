@@ -25,13 +25,13 @@ def run_plain(
 
     Rows: voltage, surface stoichiometries (n, p), c_e0, c_eL, mean stoichiometries (n, p).
     """
-    from aesi.physics.espm.plain_kernels import run_linear
+    from aesi.physics.espm.plain_kernels import step_plain_record
 
     out = np.empty((7, len(time)))
     theta0 = np.array(model.cell.stoichiometries(soc0))
     arguments = plain_arguments(model)
     memory = _memory(*arguments[:2])
-    fault_at, fault = run_linear(time, current, hold == "backward", theta0, *arguments, memory, out)
+    fault_at, fault = step_plain_record(time, current, hold == "backward", theta0, *arguments, memory, out)
     return out, fault_at, fault
 
 
@@ -93,7 +93,7 @@ def _salt_gain(stack: StackModes) -> Array:
 
 @lru_cache(maxsize=64)
 def plain_arguments(model: EspmModel) -> tuple[PlainSolid, PlainSalt, PlainCell]:
-    """Constants of the cell for `plain_kernels.run_linear`."""
+    """Constants of the cell for `plain_kernels.step_plain_record`."""
     cell = model.cell
     n, p, e = cell.negative, cell.positive, cell.electrolyte
     temperature, reference = cell.initial_temperature_k, cell.reference_temperature_k

@@ -18,16 +18,16 @@ from aesi.physics.espm.kernels import (
     open_circuit,
     out_of_range,
     parts_of,
+    positive_salt,
     salt_at_separator,
     share_ahead,
     slot_of,
     step_weights,
-    wet,
 )
 
 
 @compiled
-def run_linear(time, current, backward, theta0, solid, salt, cell, memory, out):  # type: ignore[no-untyped-def]
+def step_plain_record(time, current, backward, theta0, solid, salt, cell, memory, out):  # type: ignore[no-untyped-def]
     """Step all samples; the rows of `out`, (7, n), are those of `plain.run_plain`.
 
     theta0 : (2,) stoichiometries at rest.  solid, salt, cell, memory : see `plain_layout`.
@@ -144,7 +144,7 @@ def salt_at_gauss_points(c, c0, gauss, g):  # type: ignore[no-untyped-def]
         value = 0.0
         for j in range(width):
             value += gauss[i, first + j] * c[first + j]
-        g[i] = wet(value / c0)
+        g[i] = positive_salt(value / c0)
 
 
 @njit(inline="always", fastmath=FASTMATH)

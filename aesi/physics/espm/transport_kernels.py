@@ -1,11 +1,11 @@
-"""Compiled steps of diffusion and heat for the general path."""
+"""Compiled steps of diffusion and heat for the extended path."""
 
 import math
 
 from numba import njit
 
 from aesi.constants import GAS_CONSTANT_J_MOL_K
-from aesi.physics.espm.kernels import FASTMATH, compiled, lookup, share_ahead, step_weights, wet
+from aesi.physics.espm.kernels import FASTMATH, compiled, lookup, positive_salt, share_ahead, step_weights
 
 EXACT_SHARE = 0.78
 """Share of the largest diffusivity in a particle that is stepped exactly: between `CORRECTED_MARGIN`, above which the
@@ -151,7 +151,7 @@ def observe_salt(c, c0, gauss, salt, log_salt, region_salt):  # type: ignore[no-
         g = 0.0
         for j in range(c.shape[0]):
             g += gauss[i, j] * c[j]
-        salt[i] = wet(g / c0)
+        salt[i] = positive_salt(g / c0)
     regions = log_salt.shape[0] // 2
     for r in range(2 * regions):
         g1, g2, g3 = salt[3 * r], salt[3 * r + 1], salt[3 * r + 2]
@@ -208,14 +208,14 @@ def diffuse(  # type: ignore[no-untyped-def]
     for u in range(modes.means.shape[0]):
         side = particles.place[u, 0]
         nominal = particles.share[u] if side == 0 else -particles.share[u]
-        modes.means[u], memory.give[u], modes.largest[u] = step_particle(
+        modes.means[u], memory.theta_per_y[u], modes.largest[u] = step_particle(
             u, modes.means[u], modes.z[u], nominal * j0, nominal * j1, dt, modes.faster[side], modes.near[u],
             particles, modes.w[slot, u], scratch,
         )  # fmt: skip
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def predict(memory, modes):  # type: ignore[no-untyped-def]
+def predict_surfaces(memory, modes):  # type: ignore[no-untyped-def]
     """Surface stoichiometries if each unit carries its share."""
     for u in range(modes.means.shape[0]):
         surface = modes.means[u]

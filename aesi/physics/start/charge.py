@@ -24,11 +24,16 @@ MOVED_SDS = 0.1
 """Smallest correction by the bounds that is applied, in standard deviations of the reading."""
 
 
-def told_by_charge(read: InitialState, record: Measurement, hold: Hold, capacity_ah: float) -> InitialState:
-    """The state read under load, truncated so that no row of the record is further beyond empty or full than cells may
-    be; unchanged where the bounds hardly matter, or contradict it."""
+def truncated_by_charge(
+    read: InitialState, record: Measurement, hold: Hold, capacity_ah: float
+) -> InitialState:
+    """The state read under load, truncated to the states that the charge of the record admits (`charge_admits`);
+    unchanged where these bounds move it by less than `MOVED_SDS`, and where they contradict it.
+
+    capacity_ah : of the declared cell, Ah.
+    """
     moved = record.discharged_ah(hold) / capacity_ah
-    ends = _ends(moved)
+    ends = _start_bounds(moved)
     low, high = ((ends - read.soc) / read.sd).tolist()
     share = ndtr(high) - ndtr(low)
     if share < CONTRADICTED:
@@ -43,14 +48,15 @@ def told_by_charge(read: InitialState, record: Measurement, hold: Hold, capacity
     return replace(read, soc=soc, sd=sd, sentence=words, ends=None)
 
 
-def carried_from(soc: float, record: Measurement, hold: Hold, capacity_ah: float) -> bool:
-    """Whether no row of a record that begins at a state of charge is further beyond empty or full than cells hold more
-    than they are declared to."""
-    low, high = _ends(record.discharged_ah(hold) / capacity_ah)
+def charge_admits(soc: float, record: Measurement, hold: Hold, capacity_ah: float) -> bool:
+    """Whether a record that begins at this state of charge stays within `SOC_MARGIN` of empty and full in every row."""
+    low, high = _start_bounds(record.discharged_ah(hold) / capacity_ah)
     return bool(low <= soc <= high)
 
 
-def _ends(moved: Array) -> Array:
-    """(2,) the least and the largest state of charge that a record may begin at which moves these shares (n,) of the
-    capacity."""
+def _start_bounds(moved: Array) -> Array:
+    """(2,) least and largest state of charge at the first row, within which no row is beyond `SOC_MARGIN`.
+
+    moved : (n,) discharged since the first row, as a share of the capacity.
+    """
     return np.array([float(moved.max()) - SOC_MARGIN, 1.0 + SOC_MARGIN + float(moved.min())])

@@ -94,11 +94,11 @@ def contradicted_temperature(
     """
     if record.temperature_degc is None or not np.all(np.isfinite(record.voltage_v)):
         return None
-    left_v = partial(_left_v, cell, record, soc0, hold, tuple(effects), model)
-    return other_temperature(record.temperature_degc, cell.initial_temperature_k - ZERO_CELSIUS_K, left_v)
+    error_v = partial(_rmse_at, cell, record, soc0, hold, tuple(effects), model)
+    return other_temperature(record.temperature_degc, cell.initial_temperature_k - ZERO_CELSIUS_K, error_v)
 
 
-def _left_v(
+def _rmse_at(
     cell: Cell,
     record: Measurement,
     soc0: float,
@@ -107,6 +107,7 @@ def _left_v(
     model: ModelName,
     degc: Array,
 ) -> float | None:
+    """RMS error of the cell at temperatures degc (n,), V; None where it cannot be simulated."""
     try:
         run = simulate(
             cell,

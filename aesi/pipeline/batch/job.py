@@ -43,21 +43,24 @@ def run_job(job: Job, out: Path, settings: Settings) -> dict[str, Any]:
     A job that cannot be done is a row with its reason, so that one bad file does not stop a hundred cells.
     """
     if job.unusable:
-        return _about(job, "failed") | {"reason": job.unusable}
+        return _job_columns(job, "failed") | {"reason": job.unusable}
     folder = out / job.name
     try:
         key = job.key(settings.key)
-        known = _known(folder, key)
-        if known is not None:
-            return known | _about(job, "done")  # whose check-up it is, and when, may be told otherwise by now
+        finished = _finished_row(folder, key)
+        if finished is not None:
+            # Whose check-up it is, and when, may have been corrected in the plan since.
+            return finished | _job_columns(job, "done")
         row = _row(job, folder, settings)
         write_whole(
             folder / ROW, json.dumps({"key": key, "code": source_digest(), "row": row}, indent=1) + "\n"
         )
     except AesiError as error:
-        return _about(job, "failed") | {"reason": str(error)}
+        return _job_columns(job, "failed") | {"reason": str(error)}
     except OSError as error:
-        return _about(job, "failed") | {"reason": f"{error.filename or 'a file'}: {error.strerror or error}"}
+        return _job_columns(job, "failed") | {
+            "reason": f"{error.filename or 'a file'}: {error.strerror or error}"
+        }
     return row
 
 
@@ -67,28 +70,29 @@ def lost_job(job: Job) -> dict[str, Any]:
         "the system ended the process that worked on it, perhaps for want of memory; the same command tries it again, "
         "with fewer --workers there is more for each."
     )
-    return _about(job, "failed") | {"reason": reason}
+    return _job_columns(job, "failed") | {"reason": reason}
 
 
-def _about(job: Job, status: str) -> dict[str, Any]:
+def _job_columns(job: Job, status: str) -> dict[str, Any]:
+    """The columns of a row that say which job it is of, and how that ended."""
     return {"name": job.name, "specimen": job.specimen, "at": job.at, "status": status}
 
 
 def of_other_code(jobs: Iterable[Job], out: Path) -> list[str]:
     """The names of those jobs that another version of the program did before; they are done again."""
-    kept = {job.name: _kept(out / job.name) for job in jobs if not job.unusable}
+    kept = {job.name: _stored_row(out / job.name) for job in jobs if not job.unusable}
     return [name for name, one in kept.items() if one and one.get("code") != source_digest()]
 
 
-def _known(folder: Path, key: str) -> dict[str, Any] | None:
+def _finished_row(folder: Path, key: str) -> dict[str, Any] | None:
     """The row of a job that was done before, with the same files, settings and code. None where its finding or its
     page is gone: the row would stand alone then."""
-    kept = _kept(folder)
+    kept = _stored_row(folder)
     whole = kept.get("key") == key and all((folder / name).is_file() for name in (FINDING, REPORT))
     return kept["row"] if whole else None
 
 
-def _kept(folder: Path) -> dict[str, Any]:
+def _stored_row(folder: Path) -> dict[str, Any]:
     """The row that a job left in its folder; empty where there is none that can be read."""
     try:
         kept = json.loads((folder / ROW).read_text(encoding="utf-8"))
@@ -98,6 +102,7 @@ def _kept(folder: Path) -> dict[str, Any]:
 
 
 def _row(job: Job, folder: Path, settings: Settings) -> dict[str, Any]:
+    """The row of a job, done now: its discovery, and for a check-up its calibration, are written to the folder."""
     started = time.monotonic()
     case = case_of_files(
         job.cell,
@@ -111,7 +116,7 @@ def _row(job: Job, folder: Path, settings: Settings) -> dict[str, Any]:
         soh=job.soh,
     )
     content = write_discovery(folder, case, run_case(case, folder))
-    row = _about(job, "done") | {
+    row = _job_columns(job, "done") | {
         "verdict": content["verdict"],
         "effects": ", ".join(content["effects"]),
         "finding": short_finding(content),

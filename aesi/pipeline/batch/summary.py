@@ -39,7 +39,7 @@ CellRow = Mapping[str, Any]
 
 def write_summary(out: Path, rows: Sequence[CellRow], title: str) -> Path:
     """Write summary.csv, summary.json and index.html to `out`; returns the page."""
-    write_whole(out / SUMMARY_TABLE, _csv(rows))
+    write_whole(out / SUMMARY_TABLE, _csv_text(rows))
     specimens = trends(rows)
     content = {"schema": SCHEMA, "jobs": list(rows), "trends": specimens}
     write_whole(out / SUMMARY, json.dumps(content, indent=1) + "\n")
@@ -69,7 +69,7 @@ def trends(rows: Sequence[CellRow]) -> dict[str, list[dict[str, float]]]:
     return {name: sorted(each, key=lambda r: r["at"]) for name, each in found.items() if len(each) > 1}
 
 
-def _csv(rows: Sequence[CellRow]) -> str:
+def _csv_text(rows: Sequence[CellRow]) -> str:
     stream = io.StringIO()
     writer = csv.DictWriter(stream, HEADER, extrasaction="ignore", lineterminator="\n")
     writer.writeheader()
@@ -77,7 +77,7 @@ def _csv(rows: Sequence[CellRow]) -> str:
     return stream.getvalue()
 
 
-def _apart(upper: float | None, lower: float | None) -> float | None:
+def _error_bar(upper: float | None, lower: float | None) -> float | None:
     """Length of one half of an error bar; None where a quantity was not fitted."""
     return None if upper is None or lower is None else upper - lower
 
@@ -102,8 +102,8 @@ def _figure(specimens: Mapping[str, Sequence[Mapping[str, float]]]) -> Figure:
                 y=[row[key] for row in each],
                 error_y={
                     "type": "data",
-                    "array": [_apart(row[f"{key}_high"], row[key]) for row in each],
-                    "arrayminus": [_apart(row[key], row[f"{key}_low"]) for row in each],
+                    "array": [_error_bar(row[f"{key}_high"], row[key]) for row in each],
+                    "arrayminus": [_error_bar(row[key], row[f"{key}_low"]) for row in each],
                     "thickness": 1,
                 },
                 name=name,

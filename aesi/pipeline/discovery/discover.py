@@ -20,7 +20,7 @@ from aesi.physics.folded import folded
 from aesi.physics.simulation import ModelName
 from aesi.pipeline.distinct import check_distinct
 from aesi.pipeline.experiment.sources import with_keys
-from aesi.pipeline.notes import of_day, on_temperatures, temperature_sentence, together
+from aesi.pipeline.notes import soh_day_sentences, temperature_range_sentences, temperature_sentence, together
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.report.views import DiscoveryTrace, DiscoveryView, EffectView
@@ -128,8 +128,10 @@ class Case:
         left = () if given.correction is None else (without,)
         return (
             *given.cell.unread,
-            *of_day(declared_model(self.cell).cell, self.soh),
-            *on_temperatures(given.cell, (m.temperature_degc for m in self.records), given.effects),
+            *soh_day_sentences(declared_model(self.cell).cell, self.soh),
+            *temperature_range_sentences(
+                given.cell, (m.temperature_degc for m in self.records), given.effects
+            ),
             *left,
             *(temperature_sentence(given.cell, m, given.effects) for m in untold),
         )

@@ -40,7 +40,7 @@ def comparison(result: Result) -> dict[str, Any]:
     }
 
 
-def _left(trace: RecordTrace, name: str) -> Array:
+def _free_run_error_v(trace: RecordTrace, name: str) -> Array:
     """Error of a model in free run along a record, (n,) V, measured minus model; that of the corrected physics for a
     name without a prediction in the trace."""
     if name in trace.all_physics_v:
@@ -54,8 +54,8 @@ def _intervals(tests: list[RecordTrace], name: str, seed: int) -> dict[str, list
     """Bootstrap intervals [low, high] of a model's test figures: RMSE, mV, and reduction of the declared model's mean
     squared error, per cent. The same blocks are drawn for the model and for the declared physics, so that what both
     have in common cancels in the reduction."""
-    squares = np.concatenate([_block_sums(trace, _left(trace, name)) for trace in tests])
-    bare = np.concatenate([_block_sums(trace, _left(trace, DECLARED)) for trace in tests])
+    squares = np.concatenate([_block_sums(trace, _free_run_error_v(trace, name)) for trace in tests])
+    bare = np.concatenate([_block_sums(trace, _free_run_error_v(trace, DECLARED)) for trace in tests])
     rows = np.concatenate([_block_sums(trace, np.ones(len(trace.time_s))) for trace in tests])
     drawn = np.random.default_rng([seed, 7]).integers(len(rows), size=(DRAWS, len(rows)))
     total = squares[drawn].sum(axis=1)
@@ -80,7 +80,7 @@ def _map(tests: list[RecordTrace], name: str) -> dict[str, Any]:
     with too few samples."""
     current = np.concatenate([trace.current_a for trace in tests])
     soc = np.concatenate([trace.soc for trace in tests])
-    error = MV_PER_V * np.concatenate([_left(trace, name) for trace in tests])
+    error = MV_PER_V * np.concatenate([_free_run_error_v(trace, name) for trace in tests])
     binned = error_map(current, soc, error, BINS)
     return {
         "current_a": [round(float(v), 3) for v in binned.current_a],

@@ -85,12 +85,13 @@ def build_problem(loaded: Loaded, config: ExperimentConfig) -> Problem:
     return Problem.build(loaded.split, options, left_out=loaded.left_out.parts)
 
 
-def _anew(name: str, fit: Callable[[], Fitted]) -> Fitted:
+def _fit_again(name: str, fit: Callable[[], Fitted]) -> Fitted:
+    """The `KeepModel` that keeps none."""
     return fit()
 
 
 def final_models(
-    problem: Problem, chosen: Candidate, config: ExperimentConfig, keep: KeepModel = _anew
+    problem: Problem, chosen: Candidate, config: ExperimentConfig, keep: KeepModel = _fit_again
 ) -> FinalModels:
     """The models that the experiment names, in its order: physics, the two ensembles of the chosen candidate,
     baselines.

@@ -105,16 +105,21 @@ class TrainingDrives:
         slopes = np.array([self._slope(*each) for each in zip(refitted, pieces.folds, strict=True)])
         drives = np.array([piece.drive for piece in pieces.folds])
         folds = [
-            self._left_out(physics.carried(carried_over(np.delete(slopes, number))), piece)
+            self._left_out(physics.with_recalibration_share(carried_over(np.delete(slopes, number))), piece)
             for number, (physics, piece) in enumerate(zip(refitted, pieces.folds, strict=True))
         ]
         wholes = [
             self._left_out(
-                self._refitted(fitted, whole).carried(carried_over(slopes[drives != whole.drive])), whole
+                self._refitted(fitted, whole).with_recalibration_share(
+                    carried_over(slopes[drives != whole.drive])
+                ),
+                whole,
             )
             for whole in pieces.drives
         ]
-        return fitted.carried(carried_over(slopes)), LeftOutDrives(tuple(folds), tuple(wholes))
+        return fitted.with_recalibration_share(carried_over(slopes)), LeftOutDrives(
+            tuple(folds), tuple(wholes)
+        )
 
     def _left_out(self, physics: PhysicsModels, piece: Piece) -> HeldOutDrive:
         return HeldOutDrive.of(self.under(physics, piece), piece.drive, piece.rows)

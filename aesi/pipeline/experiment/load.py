@@ -24,7 +24,7 @@ from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.drives import by_role, cut_short, training_drives
 from aesi.pipeline.experiment.left_out import TrainingDrives, series_under
 from aesi.pipeline.experiment.physics_models import FREE, PhysicsModels, no_rows, physics_models
-from aesi.pipeline.experiment.recalibrate import Beginning, FitRecord
+from aesi.pipeline.experiment.recalibrate import FitRecord, StateSource
 from aesi.pipeline.experiment.sources import (
     Sources,
     cell_path,
@@ -33,10 +33,15 @@ from aesi.pipeline.experiment.sources import (
     sources_of,
     with_keys,
 )
-from aesi.pipeline.notes import of_contradiction, of_day, on_temperatures, temperature_sentence
+from aesi.pipeline.notes import (
+    contradiction_sentences,
+    soh_day_sentences,
+    temperature_range_sentences,
+    temperature_sentence,
+)
 from aesi.pipeline.product.contents import contents
 from aesi.pipeline.product.declared import declared_model
-from aesi.pipeline.product.deviations import PhysicsStart
+from aesi.pipeline.product.deviations import PhysicsVariant
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import ErrorSeries, Hold, LeftOutDrives, Measurement, Role, Split, hold_sentence
 
@@ -105,15 +110,15 @@ def load(config: ExperimentConfig) -> Loaded:
             else str(error).rstrip(".")
         )
         reason = (
-            f"The data set {config.data.set} cannot be had ({why}), so this is the same job on {_called(fallback)}; "
-            "it says nothing about the measured cell."
+            f"The data set {config.data.set} cannot be had ({why}), so this is the same job on "
+            f"{_data_words(fallback)}; it says nothing about the measured cell."
         )
         loaded = _load(fallback)
         return replace(loaded, notes=(reason, *loaded.notes), fallback=reason)
     return _load(config)
 
 
-def _called(config: ExperimentConfig) -> str:
+def _data_words(config: ExperimentConfig) -> str:
     """The data of an experiment in words, for the note on a fallback."""
     if config.data.kind != "virtual":
         return str(config.data.set or config.cell.bpx)
@@ -129,20 +134,20 @@ def _load(config: ExperimentConfig) -> Loaded:
     file = declared.with_soh(config.cell.soh)
     given = replace(file, effects=(*file.effects, *_effects(config)), model=config.cell.model or file.model)
     sources = sources_of(config, path)
-    records, starts, told = _on_grid(config, given, sources)
+    records, starts, grid_notes = _on_grid(config, given, sources)
     training = _training(config, given, records, sources.roles)
     physics, left_out = _physics(given, training)
-    series, of_empty = _series(physics, training)
+    series, depletion_notes = _series(physics, training)
     split = by_role(config.data, series, sources.roles)
     notes = [
         *given.cell.unread,
-        *of_day(declared.cell, config.cell.soh),
-        *_of_starts(physics, records, starts, config.data.hold),
-        *told,
-        *_of_repeats(config, records),
-        *_of_single(training),
+        *soh_day_sentences(declared.cell, config.cell.soh),
+        *_start_sentences(physics, records, starts, config.data.hold),
+        *grid_notes,
+        *_repeat_sentences(config, records),
+        *_single_drive_sentences(training),
         *([DFN_NOTE] if given.model == "dfn" else []),
-        *of_empty,
+        *depletion_notes,
     ]
     chosen = physics.chosen
     return Loaded(
@@ -152,14 +157,14 @@ def _load(config: ExperimentConfig) -> Loaded:
         split=split,
         left_out=left_out or training.as_they_are(split.train),
         soc0={
-            name: physics.begin(physics.start, record, config.data.hold)[0]
+            name: physics.initial_soc(physics.corrected, record, config.data.hold)[0]
             for name, record in records.items()
         },
         digests={name: measurement.digest for name, (measurement, _) in sources.records.items()},
         notes=tuple(notes),
         config=config,
         model=given.model,
-        files=_declared_in(path, config),
+        files=_cell_files_digest(path, config),
     )
 
 
@@ -171,25 +176,25 @@ def _training(
 ) -> TrainingDrives:
     """The training drives. In the records, their rows are marked as those that fits may see."""
     drives = training_drives(config.data, records, roles)
-    declared = PhysicsStart(given.cell, given.cell, given.effects, model=given.model)
-    opened = {name: records[name].as_declared(declared, config.data.hold) for name, _ in drives}
+    declared = PhysicsVariant(given.cell, given.cell, given.effects, model=given.model)
+    opened = {name: records[name].with_resampling_change(declared, config.data.hold) for name, _ in drives}
     for name, rows in drives:
         opened[name].rows[rows] = True
     return TrainingDrives(config, {**records, **opened}, drives, roles)
 
 
-def _of_starts(
+def _start_sentences(
     physics: PhysicsModels, records: Mapping[str, FitRecord], starts: Mapping[str, InitialState], hold: Hold
 ) -> list[str]:
     """A sentence on the initial state of charge of each record under the physics.
 
     starts : the initial states that the declared cell reads.
     """
-    own = {name: physics.own_reading(physics.start, record, hold) for name, record in records.items()}
+    own = {name: physics.own_reading(physics.corrected, record, hold) for name, record in records.items()}
     return [with_keys((own[name] or start).sentence) for name, start in starts.items()]
 
 
-def _of_repeats(config: ExperimentConfig, records: Mapping[str, FitRecord]) -> list[str]:
+def _repeat_sentences(config: ExperimentConfig, records: Mapping[str, FitRecord]) -> list[str]:
     """Sentences on the repeats that are incomplete because the record ends in them (`cut_short`)."""
     if config.data.repeats is None:
         return []
@@ -197,7 +202,7 @@ def _of_repeats(config: ExperimentConfig, records: Mapping[str, FitRecord]) -> l
     return cut_short(cut.measurement.time_s, config.data.repeats)
 
 
-def _of_single(training: TrainingDrives) -> list[str]:
+def _single_drive_sentences(training: TrainingDrives) -> list[str]:
     """A sentence on the calibration of fitted physics if there is a single training drive; else empty."""
     config = training.config
     fitted = config.cell.start == "recalibrated" or set(config.models) & set(FREE)
@@ -238,18 +243,19 @@ def _series(physics: PhysicsModels, training: TrainingDrives) -> tuple[dict[str,
     Raises SimulationError if the model runs out on a record that trains or validates.
     """
     records, hold = training.records, training.config.data.hold
-    series, empty = series_under(physics, records, training.config)
+    series, depleted = series_under(physics, records, training.config)
     for name, record in records.items():
         series[name] = physics.with_slopes(series[name], record, hold)
-    for name in empty:
+    for name in depleted:
         if name not in training.roles["test"]:
-            _refuse(physics, name, records[name], hold)
+            _raise_depletion(physics, name, records[name], hold)
     return series, [
-        f"{name} runs empty in the model; its kinetics were held at the edge from there on." for name in empty
+        f"{name} runs empty in the model; its kinetics were held at the edge from there on."
+        for name in depleted
     ]
 
 
-def _declared_in(cell: Path, config: ExperimentConfig) -> str:
+def _cell_files_digest(cell: Path, config: ExperimentConfig) -> str:
     """Hash of the contents of the cell file, or saved model, and of the user's own effect files, since a file that is
     edited keeps its name."""
     sha = hashlib.sha256()
@@ -278,25 +284,29 @@ def _on_grid(
         except DataError as error:
             raise DataError(with_keys(str(error))) from None
         declared = known_soc0 if config.cell.soc0 is None else config.cell.soc0
-        begins = Beginning(measurement, declared, shared)
-        start = starts[name] = begins.under(cell, given.effects, data.hold, given.model)
+        state_source = StateSource(measurement, declared, shared)
+        start = starts[name] = state_source.initial_state(cell, given.effects, data.hold, given.model)
         held = hold_sentence(measurement.name, data.hold, data.declared_hold is not None, "data.hold: {}")
         # Resampling comes first, since it refuses a time step that would make too many rows, or none.
         even = to_even(measurement, data.dt_s, data.hold)
-        sampled = _of_sampling(measurement, even, data.dt_s, judges=name in judging)
+        sampled = _sampling_sentences(measurement, even, data.dt_s, judges=name in judging)
         notes += [
             held,
             *sampled,
             temperature_sentence(cell, measurement, given.effects),
-            *map(with_keys, of_contradiction(given, measurement, start.soc, data.hold)),
+            *map(with_keys, contradiction_sentences(given, measurement, start.soc, data.hold)),
             *map(with_keys, even.notes),
         ]
-        records[name] = no_rows(even, start.soc, start.read_sd, begins)
-    notes += on_temperatures(cell, (m.temperature_degc for m, _ in sources.records.values()), given.effects)
+        records[name] = no_rows(even, start.soc, start.read_sd, state_source)
+    notes += temperature_range_sentences(
+        cell, (m.temperature_degc for m, _ in sources.records.values()), given.effects
+    )
     return records, starts, notes
 
 
-def _of_sampling(measurement: Measurement, even: Measurement, dt_s: float, *, judges: bool) -> list[str]:
+def _sampling_sentences(
+    measurement: Measurement, even: Measurement, dt_s: float, *, judges: bool
+) -> list[str]:
     """A sentence on a record whose rows had to be resampled to the even time grid; else empty.
 
     dt_s : s, step of the grid.  judges : whether it is a test record, whose free run needs no dense voltage.
@@ -322,7 +332,7 @@ def _of_sampling(measurement: Measurement, even: Measurement, dt_s: float, *, ju
     ]
 
 
-def _refuse(physics: PhysicsModels, name: str, record: FitRecord, hold: Hold) -> None:
+def _raise_depletion(physics: PhysicsModels, name: str, record: FitRecord, hold: Hold) -> None:
     """Raises the SimulationError of a record on which the model runs out of lithium or salt, with the name of the
     record and the remedies that an experiment has."""
     chosen = physics.chosen
@@ -332,7 +342,7 @@ def _refuse(physics: PhysicsModels, name: str, record: FitRecord, hold: Hold) ->
                 chosen.cell,
                 data.time_s,
                 data.current_a,
-                physics.begin(physics.start, record, hold)[0],
+                physics.initial_soc(physics.corrected, record, hold)[0],
                 chosen.effects,
                 data.temperature_degc,
                 hold,

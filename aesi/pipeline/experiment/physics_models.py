@@ -26,12 +26,12 @@ import numpy as np
 
 from aesi.errors import DataError
 from aesi.physics import ActiveEffect, Cell, InitialState, ModelName
-from aesi.pipeline.experiment.recalibrate import Beginning, FitRecord, recalibrate
+from aesi.pipeline.experiment.recalibrate import FitRecord, StateSource, recalibrate
 from aesi.pipeline.product.deviations import (
     ALL,
     INITIAL_STATE,
     RESISTOR,
-    PhysicsStart,
+    PhysicsVariant,
     deviating,
     slopes_v,
     start_v,
@@ -50,18 +50,18 @@ PHYSICS_NAMES = (DECLARED, *FREE)
 class PhysicsModels:
     """The physics models of an experiment.
 
-    by_name : name -> model.  start : name of the model that is corrected.
+    by_name : name -> model.  corrected : name of the model that the correction is learnt on.
     """
 
-    by_name: Mapping[str, PhysicsStart]
-    start: str
+    by_name: Mapping[str, PhysicsVariant]
+    corrected: str
 
     @property
-    def chosen(self) -> PhysicsStart:
+    def chosen(self) -> PhysicsVariant:
         """The model that the correction is learnt on."""
-        return self.by_name[self.start]
+        return self.by_name[self.corrected]
 
-    def carried(self, share: float) -> PhysicsModels:
+    def with_recalibration_share(self, share: float) -> PhysicsModels:
         """The models, with each deviation of the recalibrated one multiplied by `share`, 0 to 1."""
         whole = self.by_name[RECALIBRATED]
         if share == 1.0:
@@ -71,7 +71,7 @@ class PhysicsModels:
         moved = replace(moved, missed_v=whole.missed_v)
         return replace(self, by_name={**self.by_name, RECALIBRATED: moved})
 
-    def begin(self, name: str, record: FitRecord, hold: Hold) -> tuple[float, float]:
+    def initial_soc(self, name: str, record: FitRecord, hold: Hold) -> tuple[float, float]:
         """(state of charge at the first row, in the stoichiometry windows of the named model; its standard deviation if
         it was read from a voltage, else 0)."""
         if (read := self.own_reading(name, record, hold)) is not None:
@@ -86,20 +86,20 @@ class PhysicsModels:
         be the shift of just this reading. The declared reading is also used for records that the fit has seen, and for
         a record whose voltage belongs to no state of the recalibrated cell.
         """
-        if name != RECALIBRATED or record.begins is None or record.rows.any():
+        if name != RECALIBRATED or record.state_source is None or record.rows.any():
             return None
         each = self.by_name[name]
         try:
-            return record.begins.under(each.cell, each.effects, hold, each.model)
+            return record.state_source.initial_state(each.cell, each.effects, hold, each.model)
         except DataError:  # the voltage belongs to a state of the declared cell only
             return None
 
     def run(self, name: str, record: FitRecord, hold: Hold, rows: Measurement | None = None) -> Run:
-        """A simulation of the record with the named model, from its initial state (`begin`).
+        """A simulation of the record with the named model, from its initial state (`initial_soc`).
 
         rows : the rows to simulate, by default those on the even time grid.
         """
-        soc0, _ = self.begin(name, record, hold)
+        soc0, _ = self.initial_soc(name, record, hold)
         return self.by_name[name].run(record.measurement if rows is None else rows, soc0, hold)
 
     def series(self, record: FitRecord, dt_s: float, hold: Hold) -> tuple[ErrorSeries, bool]:
@@ -110,35 +110,36 @@ class PhysicsModels:
         of a correction are simulated at the rows of the even grid.
         """
         runs = {name: self.run(name, record, hold, record.logged) for name in self.by_name}
-        says = {name: each.voltage_v for name, each in runs.items()}
-        read = [runs[self.start]]
-        series = replace(error_series(record.logged, read[0], dt_s), physics=says)
+        voltages_v = {name: each.voltage_v for name, each in runs.items()}
+        of_corrected = [runs[self.corrected]]
+        series = replace(error_series(record.logged, of_corrected[0], dt_s), physics=voltages_v)
         if record.logged is not record.measurement:
-            read.append(self.run(self.start, record, hold))
+            of_corrected.append(self.run(self.corrected, record, hold))
             # No correction is evaluated at the logged rows, so that their inputs do not matter.
             own = replace(series, inputs=record.logged.current_a[:, None], input_names=("I",))
-            series = as_resampled(error_series(record.measurement, read[1], dt_s), own)
+            series = as_resampled(error_series(record.measurement, of_corrected[1], dt_s), own)
         series = replace(
             series,
             missed_v=self.by_name[RECALIBRATED].missed_v,
             ran_out_s=min(
-                (t for run in (*runs.values(), *read) if (t := _ran_out_s(run)) is not None), default=None
+                (t for run in (*runs.values(), *of_corrected) if (t := _ran_out_s(run)) is not None),
+                default=None,
             ),
         )
-        return series, any(_ran_out_s(run) is not None for run in read)
+        return series, any(_ran_out_s(run) is not None for run in of_corrected)
 
     def with_slopes(self, series: ErrorSeries, record: FitRecord, hold: Hold) -> ErrorSeries:
         """The series of the record with the change of the voltage by one prior standard deviation of each parameter of
         the chosen model (`slopes_v`), and by one of an initial state that was read from a voltage (`start_v`)."""
         chosen, data = self.chosen, record.measurement
-        soc0, soc0_sd = self.begin(self.start, record, hold)
+        soc0, soc0_sd = self.initial_soc(self.corrected, record, hold)
         # Differences are taken at the rows of the even grid, where the changed models are simulated as well.
         model_v = chosen.run(data, soc0, hold).voltage_v
         slopes = slopes_v(chosen.cell, chosen.effects, data, soc0, hold, chosen.model, model_v)
-        begins_v = None
+        start_change_v = None
         if soc0_sd > 0.0:
-            begins_v = start_v(chosen, data, soc0, soc0_sd, hold, model_v)
-        return replace(series, slopes_v=slopes, start_v=begins_v)
+            start_change_v = start_v(chosen, data, soc0, soc0_sd, hold, model_v)
+        return replace(series, slopes_v=slopes, start_v=start_change_v)
 
 
 def _ran_out_s(run: Run) -> float | None:
@@ -153,22 +154,22 @@ def physics_models(
     records: Mapping[str, FitRecord],
     hold: Hold,
     start: str,
-    begin: PhysicsModels | None = None,
+    warm_start: PhysicsModels | None = None,
     model: ModelName = "espm",
     *,
     own_charges: bool,
 ) -> PhysicsModels:
     """All physics models, fitted to the open rows of the records.
 
-    start : the model that is corrected, "declared" or "recalibrated".  begin : models fitted to nearly the same rows,
-    from which the fits begin.  model : kind of the physics.  own_charges : see `recalibrate`.
+    start : the model that is corrected, "declared" or "recalibrated".  warm_start : models fitted to nearly the same
+    rows, from which the fits begin.  model : kind of the physics.  own_charges : see `recalibrate`.
     """
-    known = {} if begin is None else begin.by_name
+    known = {} if warm_start is None else warm_start.by_name
     fitted = {
         name: recalibrate(cell, effects, records, hold, free, known.get(name), model, own_charges=own_charges)
         for name, free in FREE.items()
     }
-    by_name = {DECLARED: PhysicsStart(cell, cell, effects, model=model), **fitted}
+    by_name = {DECLARED: PhysicsVariant(cell, cell, effects, model=model), **fitted}
     return PhysicsModels(by_name, RECALIBRATED if start == "recalibrated" else DECLARED)
 
 
@@ -180,7 +181,7 @@ def without(records: Mapping[str, FitRecord], name: str, rows: slice) -> dict[st
 
 
 def no_rows(
-    measurement: Measurement, soc0: float, soc0_sd: float = 0.0, begins: Beginning | None = None
+    measurement: Measurement, soc0: float, soc0_sd: float = 0.0, state_source: StateSource | None = None
 ) -> FitRecord:
     """A record all of whose rows are closed to fits.  The arguments are those of `FitRecord`."""
-    return FitRecord(measurement, soc0, np.zeros(len(measurement), dtype=bool), soc0_sd, begins)
+    return FitRecord(measurement, soc0, np.zeros(len(measurement), dtype=bool), soc0_sd, state_source)

@@ -52,7 +52,7 @@ from aesi.pipeline.product.deviations import (
     PRIORS,
     RESISTOR,
     STEP,
-    PhysicsStart,
+    PhysicsVariant,
     deviating,
 )
 from aesi.records import Hold, Measurement
@@ -90,8 +90,8 @@ GAIN = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Beginning:
-    """What the initial state of a record is read from.
+class StateSource:
+    """From what the initial state of a record is read, for any cell.
 
     measured : the record as logged.  given : the given state of charge at its first row, 0 to 1, or None.
     shared : whether it was given for several records.
@@ -101,7 +101,7 @@ class Beginning:
     given: float | None
     shared: bool
 
-    def under(
+    def initial_state(
         self, cell: Cell, effects: tuple[ActiveEffect, ...], hold: Hold, model: ModelName
     ) -> InitialState:
         """The initial state of the record by a cell.  Raises DataError if its voltage belongs to no state of the
@@ -116,31 +116,34 @@ class FitRecord:
     soc0 : state of charge at the first row by the declared cell, 0 to 1.  rows : (n,), True where a fit may see the
     row.
     soc0_sd : standard deviation of soc0 if it was read from a voltage, else 0.
-    begins : what another cell reads its own initial state from; None if only soc0 is known.
-    lost_v : (n,) V, change of the declared model's voltage by the resampling (`as_declared`); None if there is none.
+    state_source : from what another cell reads its own initial state; None if only soc0 is known.
+    resampling_change_v : (n,) V, change of the declared model's voltage by the resampling, see
+    `with_resampling_change`; None if there is none.
     """
 
     measurement: Measurement
     soc0: float
     rows: BoolArray
     soc0_sd: float = 0.0
-    begins: Beginning | None = None
-    lost_v: Array | None = None
+    state_source: StateSource | None = None
+    resampling_change_v: Array | None = None
 
     @property
     def logged(self) -> Measurement:
         """The record as logged; that on the even grid if no other is known."""
-        return self.measurement if self.begins is None else self.begins.measured
+        return self.measurement if self.state_source is None else self.state_source.measured
 
     @property
     def voltage_v(self) -> Array:
         """The voltage that a simulation on the even grid should give, (n,) V: the measured one minus the change by the
         resampling."""
-        return self.measurement.voltage_v - (0.0 if self.lost_v is None else self.lost_v)
+        return self.measurement.voltage_v - (
+            0.0 if self.resampling_change_v is None else self.resampling_change_v
+        )
 
-    def as_declared(self, declared: PhysicsStart, hold: Hold) -> FitRecord:
-        """The record with the change of the voltage by the resampling (`lost_v`), computed with the declared model: its
-        voltage at the logged rows, resampled as the measured one was, minus its voltage when simulated on the grid.
+    def with_resampling_change(self, declared: PhysicsVariant, hold: Hold) -> FitRecord:
+        """The record with `resampling_change_v`, computed with the declared model: its voltage at the logged rows,
+        resampled as the measured one was, minus its voltage when simulated on the grid.
 
         All fits use this change, so that they need not simulate the logged rows. Test: two drives of a Panasonic
         18650PF with rows of 0.1 s, simulated with all parameters one standard deviation off and 1 mV of noise, and
@@ -152,8 +155,8 @@ class FitRecord:
         logged, even = (
             declared.simulate(rows, self.soc0, hold).voltage_v for rows in (self.logged, self.measurement)
         )
-        brought = BetweenStamps(self.logged.time_s, self.measurement.time_s).as_voltage(logged)
-        return replace(self, lost_v=brought - even)
+        resampled_v = BetweenStamps(self.logged.time_s, self.measurement.time_s).as_voltage(logged)
+        return replace(self, resampling_change_v=resampled_v - even)
 
 
 def recalibrate(
@@ -162,16 +165,16 @@ def recalibrate(
     records: Mapping[str, FitRecord],
     hold: Hold,
     free: Sequence[int] = ALL,
-    begin: PhysicsStart | None = None,
+    warm_start: PhysicsVariant | None = None,
     model: ModelName = "espm",
     *,
     own_charges: bool = False,
-) -> PhysicsStart:
+) -> PhysicsVariant:
     """The declared physics with its free parameters fitted to the open rows of the records and to the priors, (1).
 
-    free : indices in PRIORS of the fitted parameters.  begin : a fit of the same parameters to nearly the same rows,
-    from which fewer steps are sufficient.  model : kind of the physics.  own_charges : whether the training drives are
-    from several records, each with an initial state of charge of its own, (2).
+    free : indices in PRIORS of the fitted parameters.  warm_start : a fit of the same parameters to nearly the same
+    rows, from which fewer steps are sufficient.  model : kind of the physics.  own_charges : whether the training
+    drives are from several records, each with an initial state of charge of its own, (2).
     Returns the declared physics if no row is open, or if it cannot be simulated.
     """
     fit = _Fit(
@@ -186,8 +189,8 @@ def recalibrate(
     if not fit.records:
         return fit.physics(np.zeros(len(free)))
     low, high = fit.bounds()
-    x = np.array(begin.deviations) if begin and begin.deviations else np.zeros(len(free))
-    rounds = ROUNDS if begin is None else ROUNDS_AGAIN
+    x = np.array(warm_start.deviations) if warm_start and warm_start.deviations else np.zeros(len(free))
+    rounds = ROUNDS if warm_start is None else ROUNDS_AGAIN
     while True:
         found = descend(fit, x, low, high, rounds, GAIN)
         if not np.isfinite(found.cost):
@@ -200,6 +203,11 @@ def recalibrate(
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
+    """The problem (1) with one s, `error_v` (V), as a descent takes it.
+
+    records : those with open rows.  free : (n_free,) indices in PRIORS.
+    """
+
     declared: Cell
     effects: tuple[ActiveEffect, ...]
     records: tuple[FitRecord, ...]
@@ -214,18 +222,19 @@ class _Fit:
 
         z : (n_free,) in prior standard deviations, at which the model can be simulated.
         """
-        left = self._left(z)
+        left = self._voltage_residual(z)
         assert left is not None
         _, every_s = _spacing(self.records[0].measurement)  # all records have the same time step
         return self.error_v * float(np.sqrt(np.mean(left**2) * MEMORY_S / every_s))
 
     def bounds(self) -> tuple[Array, Array]:
+        """(lower, upper), (n_free,) each, in prior standard deviations; infinite for all but the contact."""
         low, high = np.full(len(PRIORS), -np.inf), np.full(len(PRIORS), np.inf)  # the priors limit the others
         contact = RESISTOR[0]
-        low[contact] = -self.declared.contact_resistance_ohm / self._ohm()
+        low[contact] = -self.declared.contact_resistance_ohm / self._contact_sd_ohm()
         return low[self.free], high[self.free]
 
-    def physics(self, z: Array) -> PhysicsStart:
+    def physics(self, z: Array) -> PhysicsVariant:
         """The physics with its parameters changed by z, (n_free,) prior standard deviations."""
         moved = deviating(self.declared, self.effects, self.free, z, self.model)
         return replace(moved, missed_v=self.error_v)
@@ -233,7 +242,7 @@ class _Fit:
     def residual(self, z: Array) -> Array | None:
         """Residuals of the voltages and of the priors, (m + n_free,) in standard deviations; None if the model cannot
         be simulated."""
-        left = self._left(z)
+        left = self._voltage_residual(z)
         return None if left is None else np.concatenate([left, z])
 
     def slopes(self, z: Array, residual: Array) -> Array | None:
@@ -241,23 +250,24 @@ class _Fit:
         left = residual[: -len(z)]
         slopes = np.empty((len(left), len(z)))
         for j, bounds in enumerate(zip(*self.bounds(), strict=True)):
-            slope = slope_within(self._left, z, left, j, bounds, STEP)
+            slope = slope_within(self._voltage_residual, z, left, j, bounds, STEP)
             if slope is None:
                 return None
             slopes[:, j] = slope
         return np.vstack([slopes, np.eye(len(z))])
 
-    def _left(self, z: Array) -> Array | None:
+    def _voltage_residual(self, z: Array) -> Array | None:
         """Residuals of the voltages, (m,) in standard deviations; None if the model cannot be simulated."""
         try:
             physics = self.physics(z)
-            parts = [self._of(physics, record) for record in self.records]
+            parts = [self._record_residual(physics, record) for record in self.records]
         except (AesiError, FloatingPointError, ZeroDivisionError, OverflowError):
             return None
         left = np.concatenate(parts)
         return left if np.isfinite(left).all() else None
 
-    def _of(self, physics: PhysicsStart, record: FitRecord) -> Array:
+    def _record_residual(self, physics: PhysicsVariant, record: FitRecord) -> Array:
+        """Weighted voltage errors at the fitted rows of a record, in standard deviations; of (2) for `own_charges`."""
         data = record.measurement
         every, every_s = _spacing(data)
         rows = np.flatnonzero(record.rows)[::every]
@@ -283,7 +293,7 @@ class _Fit:
             for r in self.records
         }
 
-    def _ohm(self) -> float:
+    def _contact_sd_ohm(self) -> float:
         """One prior standard deviation of the contact resistance, ohm."""
         return PRIORS[RESISTOR[0]].prior_sd / self.declared.nominal_capacity_ah
 

@@ -62,8 +62,8 @@ def sources_of(config: ExperimentConfig, cell: Path) -> Sources:
     where = _locator(config)
     roles: dict[Role, tuple[str, ...]] = {role: getattr(data, role) for role in ROLES}
     records: dict[str, tuple[Measurement, float | None]] = {
-        name: (_record(path, data.reading(name), called), None)
-        for name, (path, called) in _placed(where, data.listed).items()
+        name: (_record(path, data.reading(name), record_name), None)
+        for name, (path, record_name) in _files_and_names(where, data.listed).items()
     }
     train, valid, test = ([records[name][0] for name in roles[role]] for role in ROLES)
     check_distinct(train, test)
@@ -140,7 +140,7 @@ def discovery_records(
         ends = (int(np.searchsorted(test.time_s, stop_s, side="right")) for test in experiment.test)
         cut = (test.take(slice(end)) for test, end in zip(experiment.test, ends, strict=True))
         return experiment.train, tuple(cut), ()
-    placed = _placed(_locator(config), (*wanted.fit, *wanted.test, *wanted.good))
+    placed = _files_and_names(_locator(config), (*wanted.fit, *wanted.test, *wanted.good))
     hold = wanted.hold or config.data.declared_hold
 
     def until(names: Sequence[str], stop_s: Mapping[str, float | None]) -> tuple[Measurement, ...]:
@@ -204,23 +204,23 @@ def cell_path(config: ExperimentConfig) -> Path:
     return locate(config.data.set, "cell.bpx.json")
 
 
-def _placed(where: Callable[[str], Path], names: Sequence[str]) -> dict[str, tuple[Path, str]]:
+def _files_and_names(where: Callable[[str], Path], names: Sequence[str]) -> dict[str, tuple[Path, str]]:
     """Name in the experiment -> (file, name of the record). The names of the records are all different, also where
     files of several folders share a name, because results are stored by them."""
     paths = {name: where(name) for name in names}
-    called = record_names(list(paths.values()))
-    return {name: (path, one) for (name, path), one in zip(paths.items(), called, strict=True)}
+    of_records = record_names(list(paths.values()))
+    return {name: (path, one) for (name, path), one in zip(paths.items(), of_records, strict=True)}
 
 
-def _record(path: Path, reading: Reading, called: str | None = None) -> Measurement:
+def _record(path: Path, reading: Reading, record_name: str | None = None) -> Measurement:
     """The record in a file, with all its rows.
 
-    called : its name; None takes that of the file.
+    record_name : None takes that of the file.
     Raises DataError that names the keys of an experiment file beside the options of a command.
     """
     try:
         return read(
-            path, reading, None, called
+            path, reading, None, record_name
         )  # all rows are read, since they are averaged once, to the step of the experiment
     except DataError as error:
         raise DataError(with_keys(str(error))) from None

@@ -82,9 +82,10 @@ RESISTOR = (1,)
 
 
 @dataclass(frozen=True)
-class PhysicsStart:
-    """A cell and its effects; `shift` is added to every record's state of charge at the start, by the declared cell.
+class PhysicsVariant:
+    """One physics model of an experiment: the declared cell, or that cell with deviations of `PRIORS`.
 
+    shift : added to the state of charge at the start of every record, in the windows of the declared cell.
     deviations : of the parameters that were free, where the fit ended.  missed_v : V, the error of the model that a
     recalibration allowed for; None of physics that is not from one.
     """
@@ -125,7 +126,7 @@ class PhysicsStart:
 
 def deviating(
     declared: Cell, effects: tuple[ActiveEffect, ...], free: Sequence[int] | Array, z: Array, model: ModelName
-) -> PhysicsStart:
+) -> PhysicsVariant:
     """The declared physics with its free parameters, or films, moved by z (n_free,) deviations."""
     x = np.zeros(len(ENERGIES_J_MOL))
     x[np.array(free)] = z
@@ -142,7 +143,7 @@ def deviating(
     ohm = declared.contact_resistance_ohm + volts_at_1c / declared.nominal_capacity_ah
     # A fit may take the whole contact away, and rounding leave less than none, which no file may declare.
     cell = _with_films(replace(cell, contact_resistance_ohm=max(ohm, 0.0)), films)
-    return PhysicsStart(declared, cell, effects, shift, tuple(np.asarray(z).tolist()), model)
+    return PhysicsVariant(declared, cell, effects, shift, tuple(np.asarray(z).tolist()), model)
 
 
 def _with_films(cell: Cell, factors: Mapping[str, float]) -> Cell:
@@ -174,12 +175,12 @@ def slopes_v(
 
 
 def start_v(
-    physics: PhysicsStart, record: Measurement, soc0: float, soc0_sd: float, hold: Hold, voltage_v: Array
+    physics: PhysicsVariant, record: Measurement, soc0: float, soc0_sd: float, hold: Hold, voltage_v: Array
 ) -> Array:
     """(n,) V, >= 0, how far the voltage_v (n,) of the record under the physics moves where it starts a deviation
     `soc0_sd` fuller or emptier, whichever is more: a knee lies to one side. No cell starts beyond full or empty.
 
-    soc0 : as of `PhysicsStart.run`.
+    soc0 : as of `PhysicsVariant.run`.
     """
     others = {float(np.clip(soc0 + sign * soc0_sd, 0.0, 1.0)) for sign in (-1.0, 1.0)}
     moved = [np.abs(physics.run(record, other, hold).voltage_v - voltage_v) for other in others]

@@ -26,7 +26,7 @@ from aesi.physics.belongs import check_voltage
 from aesi.physics.cell import Soh
 from aesi.physics.depletion import RUN_ON
 from aesi.physics.effects import active_effect, saved_effect
-from aesi.pipeline.product.deviations import PhysicsStart, slopes_v, start_v
+from aesi.pipeline.product.deviations import PhysicsVariant, slopes_v, start_v
 from aesi.pipeline.product.error_series import error_series
 from aesi.pipeline.product.model_folder import part_file, read_model, write_model
 from aesi.pipeline.product.one_step import rows_ahead
@@ -162,7 +162,7 @@ class HybridModel:
         if one_step or from_first:
             check_voltage(self.cell, record.take(slice(0, 1)))  # from which state and error start
         if soc0 is None:
-            soc0, soc0_sd = self._begins(record, soc0_sd)
+            soc0, soc0_sd = self._initial_soc(record, soc0_sd)
         if one_step:
             self._check_dense(record)
         else:
@@ -174,7 +174,7 @@ class HybridModel:
         if one_step:
             return self._one_step(replace(series, own=own))
         prediction = self._free_run(self._with_slopes(series, even, soc0, soc0_sd), error0_v)
-        return prediction if own is None else _back(prediction, own)
+        return prediction if own is None else _on_own_rows(prediction, own)
 
     def save(self, folder: str | Path) -> Path:
         """Write the model to a folder, made where it is missing; returns the folder."""
@@ -221,7 +221,7 @@ class HybridModel:
                 **read,
             )
 
-    def _begins(self, record: Measurement, soc0_sd: float) -> tuple[float, float]:
+    def _initial_soc(self, record: Measurement, soc0_sd: float) -> tuple[float, float]:
         """(state of charge at the first row, its standard deviation), from its voltage; without a voltage the model's
         own, and `soc0_sd`."""
         if np.isfinite(record.voltage_v[:1]).any():
@@ -294,7 +294,7 @@ class HybridModel:
     def start_worth_v(self, record: Measurement, soc0: float, soc0_sd: float, physics_v: Array) -> Array:
         """(n,) V, >= 0, change of the record's physics_v (n,) where it starts `soc0_sd` away from soc0; see
         `start_v`."""
-        physics = PhysicsStart(self.cell, self.cell, self.effects, model=self.model)
+        physics = PhysicsVariant(self.cell, self.cell, self.effects, model=self.model)
         return start_v(physics, record, soc0, soc0_sd, self.hold, physics_v)
 
     def _free_run(self, series: ErrorSeries, error0_v: float | None) -> Prediction:
@@ -320,13 +320,13 @@ class HybridModel:
             n = len(own)
             none = np.full(n, np.nan)
             return Prediction.of(own, np.zeros(n), none, none, np.zeros(n, dtype=bool), none, None)
-        known, ahead = series.as_known, rows_ahead(self.correction, series)
+        known, ahead = series.with_known_error, rows_ahead(self.correction, series)
         step = next_stamp(own.time_s, series.time_s)
         error = self.correction.one_step(known)
         error[0] = 0.0  # nothing was measured before the first sample
         low = high = np.full(len(own), np.nan)
         if self.intervals is not None:
-            residual = ahead.left_v
+            residual = ahead.residual_v
             residual[0] = np.nan
             band = self.intervals.intervals(residual, ahead.current_a)
             at = np.searchsorted(ahead.stamps, step)
@@ -337,7 +337,7 @@ class HybridModel:
         return Prediction.of(own, error[step], low, high, outside[step], kept[step], alpha)
 
 
-def _back(prediction: Prediction, own: ErrorSeries) -> Prediction:
+def _on_own_rows(prediction: Prediction, own: ErrorSeries) -> Prediction:
     """A free run on the record's own rows: the physics is simulated there (`own`), correction and band are
     interpolated."""
 

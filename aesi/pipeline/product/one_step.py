@@ -1,8 +1,8 @@
 """One step ahead of a record, as its rows were measured.
 
-A step of the grid that has rows is one prediction: of the last of these rows, from what rows until the stamp before
-tell (their average over a step, or the last one). Nothing that was filled in between rows is predicted, nor an average
-of them, and no row is seen by its own prediction.
+Each step of the grid that holds rows gives one prediction: that of its last row, from the rows up to the stamp before
+(their average over a step, or the last one where the step has none). What is predicted is always a measured row, not an
+interpolated value or an average, and a prediction never uses the row that it predicts.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from aesi.sparse.yardsticks import Bare
 class RowsAhead:
     """The p measured rows of a record that are the last of a step.
 
-    stamps : (p,) at the end of which step each is, among the record's stamps.  predicted_v : (p,) V, of the error
-    error_v.  held_v : (p,) V, the error that was known before, which persistence repeats.
-    unscored : (p,) True for rows that are not predicted just so far ahead: the first, those with none a step before
-    them, and the last one where it lies behind the last stamp.
+    stamps : (p,) number of the stamp at the end of the step of each.  error_v : (p,) V, measured error of the physics.
+    predicted_v : (p,) V, its prediction.  known_v : (p,) V, the error that was known before, which persistence repeats.
+    unscored : (p,) True for rows that are not exactly so far ahead of what was known: the first, those without a row in
+    the step before, and the last one where it lies after the last stamp.
     """
 
     dt_s: float
@@ -33,41 +33,41 @@ class RowsAhead:
     soc: Array
     error_v: Array
     predicted_v: Array
-    held_v: Array
+    known_v: Array
     unscored: BoolArray
 
     @property
-    def left_v(self) -> Array:
+    def residual_v(self) -> Array:
         """(p,) V, measured minus predicted; 0 at the first time, whose error is given."""
         return self.error_v - self.predicted_v
 
     @property
-    def judged_v(self) -> Array:
-        """(p,) V, as `left_v`; NaN for rows that are not scored."""
-        return np.where(self.unscored, np.nan, self.left_v)
+    def scored_v(self) -> Array:
+        """(p,) V, as `residual_v`; NaN for rows that are not scored."""
+        return np.where(self.unscored, np.nan, self.residual_v)
 
     @property
     def persistence_v(self) -> Array:
-        """(p,) V, as `judged_v`, left by repeating the error that was known before."""
-        return np.where(self.unscored, np.nan, self.error_v - self.held_v)
+        """(p,) V, as `scored_v`, for persistence: the error minus the one that was known before."""
+        return np.where(self.unscored, np.nan, self.error_v - self.known_v)
 
     def of(self, rows: slice) -> BoolArray:
-        """(p,) True for those at the end of these steps."""
+        """(p,) True for the rows at the ends of these steps of the grid."""
         start, stop, _ = rows.indices(int(self.stamps[-1]) + 1)
         return (self.stamps >= start) & (self.stamps < stop)
 
 
 def rows_ahead(model: ErrorModel, series: ErrorSeries, steps: int = 1) -> RowsAhead:
-    """The measured rows of a record, predicted so many steps ahead by a model of its error."""
-    known, own = series.as_known, series if series.own is None else series.own
+    """The last measured row of each step of a record, predicted `steps` steps ahead by a model of its error."""
+    known, own = series.with_known_error, series if series.own is None else series.own
     until = rows_until(own.time_s, series.time_s)
-    behind = until[-1] < len(own)
+    after_last_stamp = until[-1] < len(own)
     until[-1] = len(own)
     first = np.append(0, until[:-1])
     stamps = np.flatnonzero(until > first)
     last = until[stamps] - 1
     unscored = (stamps < steps) | after_gap(own.time_s, series.dt_s)[first[stamps]]
-    unscored[-1] |= behind
+    unscored[-1] |= after_last_stamp
     # No measured error helps physics alone, which knows its own current at the row.
     at_rows = isinstance(model, Bare)
     predicted_v = model.k_step(own, 1)[last] if at_rows else model.k_step(known, steps)[stamps]
@@ -78,6 +78,6 @@ def rows_ahead(model: ErrorModel, series: ErrorSeries, steps: int = 1) -> RowsAh
         soc=own.soc[last],
         error_v=own.error_v[last],
         predicted_v=np.where(stamps == 0, own.error_v[last], predicted_v),
-        held_v=known.error_v[np.maximum(stamps - steps, 0)],
+        known_v=known.error_v[np.maximum(stamps - steps, 0)],
         unscored=unscored,
     )

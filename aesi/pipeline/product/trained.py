@@ -14,7 +14,7 @@ from aesi.records import ErrorModel, ErrorSeries
 from aesi.sparse import SparseModel
 
 ALL_PCT, NONE_PCT = 99.5, 0.5
-"""From and up to here a share is told as 100 and as 0 %."""
+"""A share, per cent, is reported as 100 from the first on, and as 0 up to the second."""
 TELLING_K = 2.0
 """K by which the mean temperature has to be off to be told: by itself that leaves 94 % of a fading correction at 25
 degC, and 88 % at -20 degC."""
@@ -65,24 +65,26 @@ def trained_figures(
 def trained_sentence(name: str, figures: Mapping[str, Any], *, one_step: bool = False) -> str:
     """A sentence from the figures on a record of that name, predicted in free run or one step ahead."""
     share, kept = figures["outside_pct"], figures["kept_pct"]
-    head = f"{name}: {_share(share)} of the rows lie outside the range the correction was trained on"
+    head = f"{name}: {_percent_words(share)} of the rows lie outside the range the correction was trained on"
     where, beyond = "", figures["beyond_k"] or 0.0
     if abs(beyond) >= TELLING_K:
         side = "below" if beyond < 0 else "above"
-        where = f"at {figures['mean_degc']:.1f} degC, {_kelvin(abs(beyond))} {side} what it was trained at, "
+        where = f"at {figures['mean_degc']:.1f} degC, {_kelvin_words(abs(beyond))} {side} what it was trained at, "
     if kept is None:
         return f"{head}; {where}inputs beyond it are held at its edge." if share else f"{head}."
     if kept >= ALL_PCT:
         return f"{head}."
     if kept >= NONE_PCT:
-        return f"{head}; {where}the correction fades towards the physics, to {_share(kept)} of its size on average."
+        share_kept = _percent_words(kept)
+        return f"{head}; {where}the correction fades towards the physics, to {share_kept} of its size on average."
     alone = "the physics model and its last measured error" if one_step else "the physics model"
     return f"{head}; {where}none of the correction is applied: this is {alone}."
 
 
-def _share(percent: float) -> str:
+def _percent_words(percent: float) -> str:
+    """A share in per cent, as text: all of it from `ALL_PCT` on."""
     return f"{percent:.2g} %" if percent < ALL_PCT else "100 %"
 
 
-def _kelvin(size: float) -> str:
+def _kelvin_words(size: float) -> str:
     return f"{size:.0f} K" if size >= 10.0 else f"{size:.2g} K"

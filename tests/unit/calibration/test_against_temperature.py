@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aesi.calibration import Conditions, calibrate
-from aesi.calibration.fit import problem
+from aesi.calibration.fit import prepared_model
 from aesi.calibration.records.temperature import against_temperature
 from aesi.physics import simulate
 from aesi.records import Measurement
@@ -21,7 +21,7 @@ def warm(start, records):
 
 
 def told(start, record):
-    model, _ = problem(start, [record], Conditions())
+    model, _ = prepared_model(start, [record], Conditions())
     return against_temperature(start, model.records, "espm")
 
 

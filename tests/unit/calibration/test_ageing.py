@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from aesi.calibration.ageing import LOADED_SD, LOSS_SD, SLOW_SD, Ageing
-from aesi.calibration.fit import problem
+from aesi.calibration.fit import prepared_model
 from aesi.calibration.records.conditions import Conditions
 from aesi.errors import DataError
 
@@ -103,7 +103,7 @@ def test_what_a_slow_record_tells_of_silicon_is_of_its_day_and_of_those_between(
 
 def test_a_record_of_years_before_the_file_s_state_ended_the_fit(start, records):
     dates = {"at_25": date(2015, 3, 11), "at_0": DAYS["june"]}
-    model = problem(start, records, Conditions(dates=dates))[0]
+    model = prepared_model(start, records, Conditions(dates=dates))[0]
     x = np.zeros(model.layout.size)
     x[model.layout.ages] = model.high[model.layout.ages]
     assert model.material(0, x) > 2.0  # it had lost half since, at the end of the box
@@ -117,8 +117,8 @@ def test_a_date_of_no_record_is_refused():
 
 def test_the_slopes_follow_a_shared_course(start, records):
     dates = {"at_25": DAYS["march"], "at_0": DAYS["june"]}
-    model = problem(start, records, Conditions(dates=dates))[0]
-    model_back = problem(start, records[::-1], Conditions(dates=dates))[0]
+    model = prepared_model(start, records, Conditions(dates=dates))[0]
+    model_back = prepared_model(start, records[::-1], Conditions(dates=dates))[0]
     for each in (model, model_back):
         x = 0.1 * np.sin(np.arange(each.layout.size))
         jacobian = each.jacobian(x)

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from aesi.calibration import calibrate
-from aesi.calibration.fit import problem
+from aesi.calibration.fit import prepared_model
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.model import ERROR_V, REPEATS
-from aesi.calibration.parameters import Free, free_parameters
-from aesi.calibration.posterior import PosteriorSamples, sampled
+from aesi.calibration.parameters import FitParameter, free_parameters
+from aesi.calibration.posterior import PosteriorSamples, sample_posterior
 from aesi.calibration.records.conditions import Conditions, Prior
 from aesi.calibration.result import at_bounds, information_weights, intervals
-from aesi.calibration.start import size_assumed, sized, tell_the_size
+from aesi.calibration.start import full_discharge_numbers, scaled_to_discharge, size_assumed
 from aesi.errors import DataError, InputError
 from aesi.physics import simulate
 from aesi.records import Measurement
@@ -61,7 +61,7 @@ def test_the_energies_that_a_fit_starts_from_were_told_as_others(start, records)
     given = Conditions(priors={"negative.rate_energy": Prior(40e3, 5e3)})
     told = {}
     for name, some in cases.items():
-        model, notes = problem(bare, some, given if name == "given" else Conditions())
+        model, notes = prepared_model(bare, some, given if name == "given" else Conditions())
         told[name] = " ".join(note for note in notes if "activation energ" in note and "declared" in note)
         begins = model.cell_at(np.zeros(model.layout.size))
         rate = begins.negative.rate_ea_j_mol / 1e3
@@ -117,9 +117,9 @@ def test_the_size_of_a_cell_is_said_to_be_the_files_where_no_record_is_a_full_di
 
 
 def test_the_mean_temperatures_of_one_record_were_said_to_span_nothing(start, records):
-    _, notes = problem(start, records[:1], Conditions())
+    _, notes = prepared_model(start, records[:1], Conditions())
     assert any(note.startswith("a single record does not tell how the cell answers") for note in notes)
-    _, notes = problem(start, [records[0], replace(records[0], name="again")], Conditions())
+    _, notes = prepared_model(start, [records[0], replace(records[0], name="again")], Conditions())
     assert any("temperatures of the records are 0.0 K apart, less than 8 K" in note for note in notes)
 
 
@@ -190,16 +190,16 @@ def test_a_prior_that_the_records_contradict_is_told(start, records, found):
 )
 def test_a_prior_that_no_parameter_can_have_is_told(start, records, name, prior, sentence):
     with pytest.raises(InputError, match=re.escape(sentence)):
-        problem(start, records, Conditions(priors={name: Prior(*prior)}))
+        prepared_model(start, records, Conditions(priors={name: Prior(*prior)}))
 
 
 def test_a_record_without_the_column_takes_the_temperature_that_is_given_for_it(start, records, found):
     bare = [replace(r, temperature_degc=None) for r in records]
-    given = problem(start, bare, Conditions(temperatures_degc={"at_25": 25.0, "at_0": 0.0}))[0]
-    measured = problem(start, records, Conditions())[0]
+    given = prepared_model(start, bare, Conditions(temperatures_degc={"at_25": 25.0, "at_0": 0.0}))[0]
+    measured = prepared_model(start, records, Conditions())[0]
     x = np.linspace(-0.2, 0.2, given.layout.size)
     assert given.residual(x) == pytest.approx(measured.residual(x), abs=1e-9)
-    without = problem(start, bare, Conditions())
+    without = prepared_model(start, bare, Conditions())
     assert len(without[0].free) < len(given.free)  # nothing tells energies
     assert any("declares; its own can be given (--temperature FILE=DEGC)." in note for note in without[1])
 
@@ -211,7 +211,7 @@ def test_a_temperature_that_never_moves_was_taken_for_one_of_the_case_and_told_h
     stated = records[0]
     moving = replace(stated, temperature_degc=stated.temperature_degc + np.linspace(0.0, 1.0, len(stated)))
     for record, told in ((stated, False), (moving, True)):
-        model, _ = problem(start, [record], Conditions())
+        model, _ = prepared_model(start, [record], Conditions())
         assert ("thermal.conductivity" in {one.name for one in model.free}) == told
         assert (model.cell.thermal_conductivity_w_m_k is not None) == told
 
@@ -224,7 +224,7 @@ def test_a_temperature_that_cannot_be_used_is_refused(start, records):
 
 
 def test_the_slopes_are_those_of_the_residual(start, records):
-    model = problem(start, records, Conditions())[0]
+    model = prepared_model(start, records, Conditions())[0]
     x = 0.1 * np.sin(np.arange(model.layout.size))
     jacobian = model.jacobian(x)
     for j in range(model.layout.size):
@@ -238,7 +238,7 @@ def test_the_slopes_are_those_of_the_residual(start, records):
 @pytest.mark.slow
 def test_the_posterior_says_how_far_the_linear_intervals_were_off(found):
     pytest.importorskip("emcee")
-    posterior = sampled(found, 12, seed=1)
+    posterior = sample_posterior(found, 12, seed=1)
     assert set(posterior.intervals) == set(found.parameters)
     assert "times as wide as the linear ones" in posterior.sentence
     assert "too short" in posterior.sentence
@@ -248,13 +248,16 @@ def test_the_posterior_says_how_far_the_linear_intervals_were_off(found):
 def test_a_posterior_kept_to_itself_that_it_takes_losses_between_days_to_be_linear():
     posterior = PosteriorSamples(np.zeros((1, 1)), {}, {"negative.rate": 1.1}, 0.2, 5.0)
     assert "losses" not in posterior.sentence
-    assert "losses between dated records are taken to be linear" in replace(posterior, dated=True).sentence
+    assert (
+        "losses between dated records are taken to be linear"
+        in replace(posterior, linearised_losses=True).sentence
+    )
 
 
 def test_a_posterior_of_too_few_samples_is_refused(found):
     pytest.importorskip("emcee")
     with pytest.raises(InputError, match="--posterior 2: at least 4 samples"):
-        sampled(found, 2)
+        sample_posterior(found, 2)
 
 
 @pytest.mark.slow
@@ -262,7 +265,7 @@ def test_a_chain_whose_walkers_stand_still_warned_of_a_division(found):
     pytest.importorskip("emcee")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert "too short" in sampled(found, 4, seed=1).sentence
+        assert "too short" in sample_posterior(found, 4, seed=1).sentence
 
 
 def test_a_record_that_the_declared_cell_runs_empty_on_was_told_with_an_error_of_half_a_volt(start):
@@ -361,9 +364,9 @@ def test_a_resistance_of_zero_was_written_as_what_round_off_left(found):
 
 
 def test_a_parameter_on_a_lower_bound_was_passed_over_where_its_kind_may_be_zero():
-    energy = Free("negative.rate_energy", 55e3, 12e3, "J/mol", "", low=0.0)
-    full = Free("negative.full_stoichiometry", 0.9, 0.015, "1", "", low=0.0)
-    contact = Free("contact.resistance", 0.01, 0.007, "ohm", "", low=0.0)
+    energy = FitParameter("negative.rate_energy", 55e3, 12e3, "J/mol", "", low=0.0)
+    full = FitParameter("negative.full_stoichiometry", 0.9, 0.015, "1", "", low=0.0)
+    contact = FitParameter("contact.resistance", 0.01, 0.007, "ohm", "", low=0.0)
     low, high = np.transpose([one.bounds for one in (energy, full, contact)])
     model = SimpleNamespace(free=(energy, full, contact), low=low, high=high)
     assert at_bounds(model, low) == (energy.name, full.name)
@@ -390,7 +393,7 @@ def test_a_state_of_charge_given_of_a_record_that_begins_with_a_charge_was_taken
     current = np.concatenate([np.full(int(seconds / 10.0), amperes) for seconds, amperes in phases])
     time = 10.0 * np.arange(len(current))
     record = Measurement(time, current, simulate(start, time, current, 0.08, (), None, "backward").voltage_v)
-    model, notes = problem(start, [record], Conditions(soc0=0.08))
+    model, notes = prepared_model(start, [record], Conditions(soc0=0.08))
     (fitted,) = model.records
     assert fitted.rows.time_s[0] > 15_000.0
     assert fitted.start.basis == "rest"
@@ -405,9 +408,11 @@ def test_a_pulse_that_touched_the_lower_limit_half_way_was_taken_for_a_full_disc
     voltage = np.where(pulse, 2.6, 3.9 - 4e-5 * time)
     voltage[:300] = 4.2
     cold = Measurement(time, current, voltage, name="cold", hold="backward")
-    assert sized(start, [cold])[0] == start
+    assert scaled_to_discharge(start, [cold])[0] == start
     whole = replace(cold, voltage_v=np.where(pulse, 2.9, np.linspace(4.2, 2.55, len(time))))
-    assert sized(start, [whole])[0].capacity_ah == pytest.approx(whole.discharged_ah("backward")[-1])
+    assert scaled_to_discharge(start, [whole])[0].capacity_ah == pytest.approx(
+        whole.discharged_ah("backward")[-1]
+    )
 
 
 @pytest.mark.parametrize("hold", ["linear", "backward", None])
@@ -417,7 +422,7 @@ def test_the_charge_of_a_full_discharge_was_held_since_the_row_before_whatever_w
     voltage = np.linspace(start.upper_voltage_v, start.lower_voltage_v, len(time))
     slow = Measurement(time, current, voltage, name="slow", hold=hold)
     taken = slow.discharged_ah(hold or "backward")[-1]
-    assert sized(start, [slow])[0].capacity_ah == pytest.approx(taken, rel=1e-9)
+    assert scaled_to_discharge(start, [slow])[0].capacity_ah == pytest.approx(taken, rel=1e-9)
 
 
 def test_a_large_cell_from_the_file_of_a_small_one_kept_its_contact_resistance(start):
@@ -427,7 +432,9 @@ def test_a_large_cell_from_the_file_of_a_small_one_kept_its_contact_resistance(s
     time = np.arange(0.0, 19.0 * 3600.0, 600.0)
     current = np.full(len(time), factor * start.nominal_capacity_ah / 20.0)
     voltage = np.linspace(start.upper_voltage_v, start.lower_voltage_v, len(time))
-    found = sized(small, [Measurement(time, current, voltage, name="large", hold="backward")])[0]
+    found = scaled_to_discharge(small, [Measurement(time, current, voltage, name="large", hold="backward")])[
+        0
+    ]
     grown = found.electrode_area_m2 / small.electrode_area_m2
     assert grown == pytest.approx(factor, rel=0.1)
     assert found.contact_resistance_ohm == pytest.approx(0.015 / grown)
@@ -458,13 +465,17 @@ def test_the_full_discharge_after_a_charge_told_no_size(start):
     cell = replace(start, nominal_capacity_ah=1.1 * start.nominal_capacity_ah)
     record = cycled(cell, cell.nominal_capacity_ah)
     assert record.voltage_v[0] < 3.0  # so that its first row is not full
-    assert sized(start, [record])[0].capacity_ah == pytest.approx(cell.nominal_capacity_ah, rel=1e-3)
+    assert scaled_to_discharge(start, [record])[0].capacity_ah == pytest.approx(
+        cell.nominal_capacity_ah, rel=1e-3
+    )
 
 
 def test_a_charge_before_the_full_discharge_was_taken_off_its_size(start):
     record = cycled(start, 0.05 * start.nominal_capacity_ah)  # begins near full, and is charged first
     assert record.voltage_v[0] > start.upper_voltage_v - 0.15
-    assert sized(start, [record])[0].capacity_ah == pytest.approx(start.nominal_capacity_ah, rel=1e-3)
+    assert scaled_to_discharge(start, [record])[0].capacity_ah == pytest.approx(
+        start.nominal_capacity_ah, rel=1e-3
+    )
 
 
 def test_of_several_cycles_each_discharge_is_one(start):
@@ -472,8 +483,12 @@ def test_of_several_cycles_each_discharge_is_one(start):
     twice = Measurement(
         10.0 * np.arange(2 * len(one)), np.tile(one.current_a, 2), np.tile(one.voltage_v, 2), name="twice"
     )
-    assert sized(start, [twice])[0].capacity_ah == pytest.approx(start.nominal_capacity_ah, rel=1e-3)
-    assert tell_the_size(start, [twice, replace(one, current_a=1e-3 * one.current_a, name="kA")]) == (0,)
+    assert scaled_to_discharge(start, [twice])[0].capacity_ah == pytest.approx(
+        start.nominal_capacity_ah, rel=1e-3
+    )
+    assert full_discharge_numbers(
+        start, [twice, replace(one, current_a=1e-3 * one.current_a, name="kA")]
+    ) == (0,)
 
 
 def test_a_file_that_is_fuller_than_most_cells_started_from_another_one(start):

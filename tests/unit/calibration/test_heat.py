@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aesi.calibration.heat import fitted, with_heat
+from aesi.calibration.heat import fit_heat, with_fitted_heat
 from aesi.calibration.records.prepared import prepared
 from aesi.errors import CellError, ParameterError
 from aesi.physics import Cell, simulate
@@ -29,14 +29,14 @@ def warming() -> Measurement:
 
 def test_the_heat_balance_behind_a_temperature_is_found(warming):
     ready = prepared(NMC, [warming], 0.9)
-    found = fitted(NMC, ready, NMC.heat_capacity_j_k)
+    found = fit_heat(NMC, ready, NMC.heat_capacity_j_k)
     assert found.conductance_w_k == pytest.approx(TRUE_W_K, rel=0.15)
     assert found.heat_capacity_j_k == pytest.approx(TRUE_FACTOR * NMC.heat_capacity_j_k, rel=0.15)
     assert found.rmse_k < 0.3
 
 
 def test_it_goes_into_the_file_and_comes_back(warming):
-    cell, notes = with_heat(NMC, prepared(NMC, [warming], 0.9))
+    cell, notes = with_fitted_heat(NMC, prepared(NMC, [warming], 0.9))
     again = Cell.from_bpx(cell.to_bpx())
     assert again.conductance_w_k == pytest.approx(TRUE_W_K, rel=0.15)
     assert again.heat_capacity_j_k == pytest.approx(cell.heat_capacity_j_k)
@@ -61,7 +61,7 @@ def test_a_case_that_lags_its_winding_does_not_make_the_cell_heavier(warming):
     case = air + (winding - air) / (1.0 + outside * cell.winding_resistance_k_w)
     record = Measurement(time, warming.current_a, run.voltage_v, case, "case")
     found, as_one_lump = (
-        fitted(one, prepared(one, [record], 0.9), one.heat_capacity_j_k)
+        fit_heat(one, prepared(one, [record], 0.9), one.heat_capacity_j_k)
         for one in (cell, replace(cell, thermal_conductivity_w_m_k=None))
     )
     assert found.heat_capacity_j_k == pytest.approx(cell.heat_capacity_j_k, rel=0.15)
@@ -71,7 +71,7 @@ def test_a_case_that_lags_its_winding_does_not_make_the_cell_heavier(warming):
 
 def test_records_that_do_not_warm_leave_the_file_as_it_is(warming):
     flat = replace(warming, temperature_degc=np.full(len(warming), 25.0))
-    assert with_heat(NMC, prepared(NMC, [flat], 0.9)) == (NMC, ())
+    assert with_fitted_heat(NMC, prepared(NMC, [flat], 0.9)) == (NMC, ())
 
 
 def in_a_chamber(degc, c_rate: float = 0.1) -> Measurement:
@@ -95,7 +95,7 @@ CHAMBERS = {
 @pytest.mark.parametrize("what", CHAMBERS)
 def test_a_chamber_or_a_noisy_sensor_was_written_into_the_file_as_heat(what):
     """Twelve times the heat capacity of noise; of a swing 9e5 W/K, which left all 2.8 K of it."""
-    cell, notes = with_heat(NMC, prepared(NMC, [in_a_chamber(CHAMBERS[what])], 0.9))
+    cell, notes = with_fitted_heat(NMC, prepared(NMC, [in_a_chamber(CHAMBERS[what])], 0.9))
     assert cell is NMC
     assert notes == (
         "heat: the losses of the cell do not explain the temperature of chamber; it is not used.",
@@ -103,8 +103,10 @@ def test_a_chamber_or_a_noisy_sensor_was_written_into_the_file_as_heat(what):
 
 
 def test_a_record_in_a_chamber_does_not_take_part_in_what_another_tells_of_heat(warming):
-    alone, of_alone = with_heat(NMC, prepared(NMC, [warming], 0.9))
-    both, of_both = with_heat(NMC, prepared(NMC, [warming, in_a_chamber(CHAMBERS["a ramp down"])], 0.9))
+    alone, of_alone = with_fitted_heat(NMC, prepared(NMC, [warming], 0.9))
+    both, of_both = with_fitted_heat(
+        NMC, prepared(NMC, [warming, in_a_chamber(CHAMBERS["a ramp down"])], 0.9)
+    )
     assert both.heat_capacity_j_k == pytest.approx(alone.heat_capacity_j_k, rel=1e-6)
     assert both.conductance_w_k == pytest.approx(alone.conductance_w_k, rel=1e-6)
     assert of_both[0] == of_alone[0]

@@ -6,7 +6,7 @@ from datetime import date
 import numpy as np
 import pytest
 
-from aesi.calibration.fit import calibrate, problem
+from aesi.calibration.fit import calibrate, prepared_model
 from aesi.calibration.records.conditions import Conditions
 from aesi.calibration.silicon import SILICON_V, may_have_silicon, silicon_edge, with_silicon
 from aesi.physics import Cell, simulate
@@ -58,7 +58,7 @@ def test_of_two_slow_discharges_the_silicon_that_one_has_lost_is_found(start, re
 
 
 def test_one_slow_discharge_does_not_tell_silicon(start, records):
-    assert not problem(start, records[:1], Conditions())[0].layout.silicon
+    assert not prepared_model(start, records[:1], Conditions())[0].layout.silicon
 
 
 def test_silicon_was_told_of_a_cell_whose_file_has_graphite_alone():
@@ -66,7 +66,7 @@ def test_silicon_was_told_of_a_cell_whose_file_has_graphite_alone():
     cell = Cell.from_bpx(CELLS / "nca_kim2011.bpx.json")
     old = lose_lithium(EspmModel(cell), loss=0.08).cell
     records = discharge(cell, "new"), discharge(old, "old")
-    model = problem(cell, records, Conditions(same_cell=True))[0]
+    model = prepared_model(cell, records, Conditions(same_cell=True))[0]
     assert not model.layout.silicon
 
 
@@ -94,7 +94,9 @@ DAYS = {"new": date(2018, 10, 26), "loaded": date(2018, 11, 11), "old": date(201
 def test_slopes_are_those_of_differences_with_silicon_too(start, records, conditions):
     time, current = np.arange(0.0, 3400.0, 10.0), np.full(340, start.nominal_capacity_ah)
     voltage = simulate(start, time, current, 1.0, on_depletion="clip").voltage_v
-    model = problem(start, [*records, Measurement(time, current, voltage, None, "loaded")], conditions)[0]
+    model = prepared_model(
+        start, [*records, Measurement(time, current, voltage, None, "loaded")], conditions
+    )[0]
     x = 0.3 * np.random.default_rng(3).standard_normal(model.layout.size)
     x = np.clip(x, model.low + 0.1, model.high - 0.1)
     slopes = model.jacobian(x)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from aesi.calibration import Conditions, calibrate
-from aesi.calibration.fit import problem
+from aesi.calibration.fit import prepared_model
 from aesi.errors import DataError
 from aesi.numerics.metrics import rms
 from aesi.physics import impedance
@@ -42,7 +42,7 @@ def test_spectra_tell_of_other_states_and_temperatures_what_a_record_leaves_open
 
 def test_the_slopes_of_spectra_are_those_of_the_residual(start, truth, records):
     spectra = (spectrum_of(truth, 0.5, 15.0), spectrum_of(truth, 0.2, 25.0))
-    model = problem(start, records[:1], Conditions(spectra=spectra))[0]
+    model = prepared_model(start, records[:1], Conditions(spectra=spectra))[0]
     x = 0.1 * np.sin(np.arange(model.layout.size))
     jacobian = model.jacobian(x)[-model.layout.size - 4 * len(FREQUENCY_HZ) : -model.layout.size]
     for j in range(model.layout.size):
@@ -56,7 +56,7 @@ def test_the_slopes_of_spectra_are_those_of_the_residual(start, truth, records):
 def test_more_frequencies_of_one_decade_say_no_more(start, truth, records):
     few, many = (spectrum_of(truth, 0.5, 25.0, np.geomspace(1e-2, 1e2, n)) for n in (41, 401))
     of_few, of_many = (
-        problem(start, records[:1], Conditions(spectra=(one,)))[0].spectra.misfits(start)
+        prepared_model(start, records[:1], Conditions(spectra=(one,)))[0].spectra.misfits(start)
         for one in (few, many)
     )
     assert of_many @ of_many == pytest.approx(of_few @ of_few, rel=0.03)
@@ -66,18 +66,18 @@ def test_of_spectra_in_percent_that_of_1_percent_was_taken_for_a_full_cell(start
     good = spectrum_of(truth, 1.0, 25.0)
     half = Spectrum("half", FREQUENCY_HZ, np.ones(13), soc=50.0)
     with pytest.raises(DataError, match=r"half: its state of charge of 50 .* so are the others of its file"):
-        problem(start, records[:1], Conditions(spectra=(good, half)))
+        prepared_model(start, records[:1], Conditions(spectra=(good, half)))
 
 
 def test_a_spectrum_that_cannot_be_fitted_is_told(start, truth, records):
     good, empty = spectrum_of(truth, 0.5, 25.0), Spectrum("low", FREQUENCY_HZ, np.ones(13), soc=-0.1)
     fast = spectrum_of(truth, 0.5, 25.0, np.array([200.0, 1000.0]))
-    model, notes = problem(start, records[:1], Conditions(spectra=(good, empty, fast)))
+    model, notes = prepared_model(start, records[:1], Conditions(spectra=(good, empty, fast)))
     assert [one.name for one in model.spectra.spectra] == [good.name]
     assert any(note.startswith("low: left out, since its state of charge of -0.1 is not") for note in notes)
     assert f"{fast.name}: not fitted, since it has no frequency from 0.01 to 100 Hz." in notes
     with pytest.raises(DataError, match="no spectrum that was given to be fitted can be; none within"):
-        problem(start, records[:1], Conditions(spectra=(fast,)))
+        prepared_model(start, records[:1], Conditions(spectra=(fast,)))
     in_milliohm = Spectrum("m", FREQUENCY_HZ, 1e3 * good.z_ohm, soc=0.5)
     with pytest.raises(DataError, match=r"m: \|Z\| is .* as of no cell of 5 A.h"):
-        problem(start, records[:1], Conditions(spectra=(in_milliohm,)))
+        prepared_model(start, records[:1], Conditions(spectra=(in_milliohm,)))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from aesi.calibration import calibrate
-from aesi.calibration.result import Interval, told_of_ends
+from aesi.calibration.result import Interval, ends_sentences
 
 
 def interval(value):
@@ -25,14 +25,14 @@ def test_the_best_of_several_ends_is_taken_and_the_others_are_told(start, record
 def test_parameters_beyond_their_intervals_at_another_end_are_named():
     here = {"rate": interval(1.0), "radius": interval(2.0)}
     near, far = {**here, "rate": interval(1.05)}, {**here, "radius": interval(2.5)}
-    assert told_of_ends([3.0], [here], 0) == ()
-    (agree,) = told_of_ends([3.0, 3.5], [here, near], 0)
+    assert ends_sentences([3.0], [here], 0) == ()
+    (agree,) = ends_sentences([3.0, 3.5], [here, near], 0)
     assert (
         "1 drawn start: the best end, from the start file, is taken; the others are 0.5 nats less likely"
         in agree
     )
     assert "All parameters there lie within their 95 % intervals." in agree
-    (differ,) = told_of_ends([3.0, 3.5, 9.0], [here, near, far], 2)
+    (differ,) = ends_sentences([3.0, 3.5, 9.0], [here, near, far], 2)
     assert (
         "from a drawn start, is taken; the others are 0.5, 6.0 (from the start file) nats less likely"
         in differ

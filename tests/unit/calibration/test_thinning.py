@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from aesi.calibration.model import leniency, saturated
-from aesi.calibration.records.prepared import hold_told, prepared
+from aesi.calibration.records.prepared import fitted_rows_sentence, prepared
 from aesi.calibration.records.thinning import thinned
 from aesi.physics import initial_state, simulate
 from aesi.physics.cell import Cell
@@ -99,7 +99,7 @@ def drive(step_s: float, hold: str | None = None) -> Measurement:
 def test_how_the_current_was_taken_between_the_rows_of_a_fit_is_told(data, taken):
     cell = Cell.from_bpx(CELLS / "lg_m50_chen2020.bpx.json")
     (ready,) = prepared(cell, [data], 0.8)
-    assert hold_told(ready).endswith(taken)
+    assert fitted_rows_sentence(ready).endswith(taken)
 
 
 def test_a_start_was_read_with_another_hold_than_its_record_is_simulated_with():

@@ -101,11 +101,11 @@ def test_a_cycle_that_could_not_be_used_was_passed_over_in_silence(start, cycle,
 
 def test_the_zero_is_taken_out_of_slow_records_alone(start, cycle):
     zero = zero_of(start, [cycle])
-    taken = zero.taken_out(cycle, start.nominal_capacity_ah).current_a
+    taken = zero.subtracted_from(cycle, start.nominal_capacity_ah).current_a
     assert taken[0] == 0.0
     assert np.abs(taken).max() == pytest.approx(start.capacity_ah / 20.0, abs=2.0 * zero.sd_a)
     fast = replace(cycle, current_a=20.0 * cycle.current_a)
-    assert zero.taken_out(fast, start.nominal_capacity_ah) is fast
+    assert zero.subtracted_from(fast, start.nominal_capacity_ah) is fast
 
 
 def test_a_record_of_rest_alone_ended_with_an_index_that_is_out_of_bounds(start, cycle):

@@ -10,20 +10,26 @@ from aesi.data.laboratory.changes import CHANGES, find_change
 from aesi.data.laboratory.instrument import Instrument
 from aesi.data.laboratory.mixing import porous_electrode
 from aesi.data.laboratory.simulator import Applied, Setup, TrueRun, edges, parameter_values, simulate_truth
-from aesi.data.profiles.profile import Bench, Profile
+from aesi.data.profiles.profile import Profile, ProfileBuilder
 from aesi.errors import DataError, SimulationError
 from aesi.physics import Cell, simulate
 from aesi.physics.effects import CATALOGUE
 
 pytestmark = pytest.mark.usefixtures("laboratory_cache")
 
-BENCH = Bench(30.0, 1.0)
+BUILDER = ProfileBuilder(30.0, 1.0)
 
 
 def short(soc0=0.6) -> Profile:
     """Rest, a 1C pulse, rest, a 2C charge pulse, rest: 160 s."""
-    pieces = [BENCH.rest(20), BENCH.pulse(1.0, 40), BENCH.rest(30), BENCH.pulse(-2.0, 20), BENCH.rest(50)]
-    return BENCH.profile("short", pieces, soc0)
+    pieces = [
+        BUILDER.rest(20),
+        BUILDER.pulse(1.0, 40),
+        BUILDER.rest(30),
+        BUILDER.pulse(-2.0, 20),
+        BUILDER.rest(50),
+    ]
+    return BUILDER.profile("short", pieces, soc0)
 
 
 def voltage(nmc, *applied, model="SPMe", soc0=0.6):
@@ -38,8 +44,8 @@ def test_the_solver_stops_on_both_sides_of_every_step():
 
 def test_a_short_pulse_after_a_long_rest_is_not_stepped_over(nmc):
     # PyBaMM's issue 5145: without break points the solver steps over such a pulse.
-    pieces = [BENCH.rest(3000), BENCH.pulse(2.0, 5), BENCH.rest(1000)]
-    trace = simulate_truth(Setup(nmc, "SPMe"), BENCH.profile("late", pieces, 0.6))
+    pieces = [BUILDER.rest(3000), BUILDER.pulse(2.0, 5), BUILDER.rest(1000)]
+    trace = simulate_truth(Setup(nmc, "SPMe"), BUILDER.profile("late", pieces, 0.6))
     assert trace.voltage_v[2000] - trace.voltage_v[3002] > 0.05
     assert trace.soc[-1] == pytest.approx(0.6 - 2.0 * 5 / 3600, abs=1e-9)
 
@@ -72,9 +78,9 @@ def test_the_contact_resistance_of_a_cell_file_is_in_every_run(nmc, tmp_path):
 
 def test_slow_particles_are_resolved_at_their_surface(m50):
     """The symptom: 60 even radial points left 0.4 mV between two solvers of the same equations on the LG M50."""
-    bench = Bench(5.0, 1.0)
-    pieces = [piece for rate in (2.0, -1.0, 1.5) for piece in (bench.pulse(rate, 30), bench.rest(60))]
-    profile = bench.profile("pulses", [bench.rest(20), *pieces], 0.7)
+    builder = ProfileBuilder(5.0, 1.0)
+    pieces = [piece for rate in (2.0, -1.0, 1.5) for piece in (builder.pulse(rate, 30), builder.rest(60))]
+    profile = builder.profile("pulses", [builder.rest(20), *pieces], 0.7)
     other = simulate_truth(Setup(m50, "SPMe"), profile).voltage_v
     ours = simulate(Cell.from_bpx(m50), profile.time_s, profile.current_a, 0.7).voltage_v
     assert np.sqrt(np.mean((other - ours) ** 2)) < 1e-4
@@ -82,9 +88,9 @@ def test_slow_particles_are_resolved_at_their_surface(m50):
 
 def test_the_mesh_follows_slow_diffusion(m50):
     """The symptom: at a tenth of the diffusivity 60 points of one mesh for all left 0.66 mV."""
-    bench = Bench(5.0, 1.0)
-    pieces = [piece for rate in (0.5, -0.5, 0.5) for piece in (bench.pulse(rate, 20), bench.rest(40))]
-    profile = bench.profile("pulses", [bench.rest(20), *pieces], 0.7)
+    builder = ProfileBuilder(5.0, 1.0)
+    pieces = [piece for rate in (0.5, -0.5, 0.5) for piece in (builder.pulse(rate, 20), builder.rest(40))]
+    profile = builder.profile("pulses", [builder.rest(20), *pieces], 0.7)
     factors = {"negative_factor": 0.1, "positive_factor": 0.1}
     other = simulate_truth(Setup(m50, "SPMe", (Applied("solid_diffusivity", factors),)), profile).voltage_v
     slow = (CATALOGUE["solid_diffusivity"].activate(**factors),)
@@ -94,9 +100,9 @@ def test_the_mesh_follows_slow_diffusion(m50):
 
 def test_the_mesh_across_adds_no_resistance(m50):
     """The symptom: 80 even points across left 0.17 mV between two solvers of a DFN, 36 microohm of which."""
-    bench = Bench(5.0, 1.0)
-    pieces = [piece for rate in (2.0, -1.0, 1.5) for piece in (bench.pulse(rate, 30), bench.rest(60))]
-    profile = bench.profile("pulses", [bench.rest(20), *pieces], 0.7)
+    builder = ProfileBuilder(5.0, 1.0)
+    pieces = [piece for rate in (2.0, -1.0, 1.5) for piece in (builder.pulse(rate, 30), builder.rest(60))]
+    profile = builder.profile("pulses", [builder.rest(20), *pieces], 0.7)
     current = profile.current_a
     other = simulate_truth(Setup(m50, "DFN"), profile).voltage_v
     ours = simulate(Cell.from_bpx(m50), profile.time_s, current, 0.7, model="dfn").voltage_v
@@ -111,7 +117,7 @@ def test_a_film_grows_with_throughput(nmc):
 
 
 def test_full_and_reduced_model_agree_at_a_low_rate(nmc):
-    slow = BENCH.profile("slow", [BENCH.rest(20), BENCH.pulse(0.2, 100)], 0.6)
+    slow = BUILDER.profile("slow", [BUILDER.rest(20), BUILDER.pulse(0.2, 100)], 0.6)
     full = simulate_truth(Setup(nmc, "DFN"), slow).voltage_v
     reduced = simulate_truth(Setup(nmc, "SPMe"), slow).voltage_v
     assert np.sqrt(np.mean((full - reduced) ** 2)) < 0.5e-3
@@ -166,7 +172,7 @@ def test_a_cell_without_cooling_warms_up(nmc):
 
 
 def test_an_emptied_cell_is_an_error_not_a_short_record(nmc):
-    profile = BENCH.profile("empty", [BENCH.rest(10), BENCH.pulse(1.0, 1200)], 0.1)
+    profile = BUILDER.profile("empty", [BUILDER.rest(10), BUILDER.pulse(1.0, 1200)], 0.1)
     with pytest.raises(SimulationError, match="empty"):
         simulate_truth(Setup(nmc, "SPMe"), profile)
 

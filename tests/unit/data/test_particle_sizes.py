@@ -6,7 +6,7 @@ import pytest
 from aesi.data.laboratory import simulator
 from aesi.data.laboratory.simulator import Applied, Setup, simulate_truth
 from aesi.data.laboratory.sizes import gauss_sizes
-from aesi.data.profiles.profile import Bench
+from aesi.data.profiles.profile import ProfileBuilder
 
 pytestmark = pytest.mark.usefixtures("laboratory_cache")
 
@@ -28,9 +28,15 @@ def test_mean_and_scatter_are_those_that_were_asked_for(scatter):
 
 
 def test_the_number_of_sizes_had_decided_the_voltage_by_millivolts(nmc, monkeypatch):
-    bench = Bench(30.0, 1.0)
-    pieces = [bench.rest(10), bench.pulse(2.0, 60), bench.rest(60), bench.pulse(-3.0, 30), bench.rest(60)]
-    profile = bench.profile("pulses", pieces, 0.6)
+    builder = ProfileBuilder(30.0, 1.0)
+    pieces = [
+        builder.rest(10),
+        builder.pulse(2.0, 60),
+        builder.rest(60),
+        builder.pulse(-3.0, 30),
+        builder.rest(60),
+    ]
+    profile = builder.profile("pulses", pieces, 0.6)
     spread = {"negative_spread": 0.6, "positive_spread": 0.6}
     setup = Setup(nmc, "SPMe", (Applied("particle_size_distribution", spread),), radial_points=30)
 
@@ -44,8 +50,8 @@ def test_the_number_of_sizes_had_decided_the_voltage_by_millivolts(nmc, monkeypa
 
 def test_a_cell_of_many_sizes_that_warms_itself_can_be_made(nmc):
     """PyBaMM has no heat of mixing for it."""
-    bench = Bench(30.0, 1.0)
-    profile = bench.profile("pulse", [bench.rest(10), bench.pulse(2.0, 60)], 0.6)
+    builder = ProfileBuilder(30.0, 1.0)
+    profile = builder.profile("pulse", [builder.rest(10), builder.pulse(2.0, 60)], 0.6)
     sizes = Applied("particle_size_distribution", {"negative_spread": 0.3, "positive_spread": 0.3})
     truth = simulate_truth(Setup(nmc, "SPMe", (sizes, Applied("self_heating")), radial_points=30), profile)
     assert truth.temperature_degc[-1] > truth.temperature_degc[0] + 0.1

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from aesi.data.profiles.drive import TITLES, Schedule, schedule
-from aesi.data.profiles.profile import AFTER_PULSE_S, Bench, paper_profiles
+from aesi.data.profiles.profile import AFTER_PULSE_S, ProfileBuilder, paper_profiles
 from aesi.data.profiles.vehicle import Pack, Vehicle
 from aesi.errors import DataError
 
@@ -70,8 +70,8 @@ def test_an_unknown_schedule_names_the_nearest():
 
 
 def test_another_cell_size_sees_the_same_c_rates():
-    small = Bench(12.5, 1.0).drive("us06") / 12.5
-    large = Bench(30.0, 1.0).drive("us06") / 30.0
+    small = ProfileBuilder(12.5, 1.0).drive("us06") / 12.5
+    large = ProfileBuilder(30.0, 1.0).drive("us06") / 30.0
     np.testing.assert_allclose(small, large)
     assert Pack.for_capacity(30.0) == Pack()
 

@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from aesi.data.profiles.profile import Bench
+from aesi.data.profiles.profile import ProfileBuilder
 from aesi.data.virtual import DEFAULT_MIX, STRENGTHS, Laboratory, paper_experiment, voltage_window_v
 from aesi.errors import DataError
 
 pytestmark = pytest.mark.usefixtures("laboratory_cache")
 
-BENCH = Bench(30.0, 1.0)
+BUILDER = ProfileBuilder(30.0, 1.0)
 
 
 def profile(soc0=0.6, pulse=-1.0):
-    return BENCH.profile("short", [BENCH.rest(20), BENCH.pulse(pulse, 30), BENCH.rest(30)], soc0)
+    return BUILDER.profile("short", [BUILDER.rest(20), BUILDER.pulse(pulse, 30), BUILDER.rest(30)], soc0)
 
 
 def test_a_seed_gives_one_measurement(nmc):

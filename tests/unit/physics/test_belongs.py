@@ -8,7 +8,7 @@ import pytest
 
 import aesi
 from aesi.errors import DataError
-from aesi.physics.belongs import capacity_bounds, check_belongs, check_measured, unlike
+from aesi.physics.belongs import capacity_bounds, check_belongs, check_measured, other_materials_sentence
 from aesi.records import Measurement
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
@@ -253,7 +253,7 @@ def test_a_calibration_could_not_start_from_a_file_of_other_materials(of_mangane
     with pytest.raises(DataError, match="the cell file is another cell's"):
         check_measured(cell, [warm])
     check_measured(cell, [warm], known=[0])
-    assert "of other electrode materials" in unlike(cell, warm)
+    assert "of other electrode materials" in other_materials_sentence(cell, warm)
     again = replace(warm.between(3000.0, 9000.0), name="again")  # of the same cell, and no full discharge
     with pytest.raises(DataError, match="the cell file is another cell's"):
         check_measured(cell, [again])
@@ -275,4 +275,4 @@ def test_a_temperature_that_nobody_gave_is_asked_for_before_the_potentials_are_b
 
 
 def test_the_potentials_of_its_own_file_are_like_those_of_a_cell(m50, record):
-    assert unlike(m50, record) == ""
+    assert other_materials_sentence(m50, record) == ""

@@ -17,7 +17,7 @@ from aesi.physics.cell.relations import LookupTable
 from aesi.physics.effect import Effect, Record, as_cell_saw
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.rest.open_circuit import GOOD_READING_V, READING_V, OpenCircuit
-from aesi.physics.start.charge import told_by_charge
+from aesi.physics.start.charge import truncated_by_charge
 from aesi.physics.start.state import InitialState
 from aesi.records import Measurement
 
@@ -120,7 +120,7 @@ def test_what_a_voltage_leaves_open_the_charge_that_moves_tells():
     time = np.arange(0.0, 6901.0, 100.0)
     amperes = np.full(len(time), 0.5 * LFP.capacity_ah)
     read = InitialState(0.786, 0.168, "load", "It begins at 0.786 +/- 0.168.")
-    found = told_by_charge(read, record(time, amperes, np.zeros(len(time))), "backward", LFP.capacity_ah)
+    found = truncated_by_charge(read, record(time, amperes, np.zeros(len(time))), "backward", LFP.capacity_ah)
     drawn = np.random.default_rng(1).normal(read.soc, read.sd, 400_000)
     drawn = drawn[(drawn > 6900.0 / 7200.0 - SOC_MARGIN) & (drawn < 1.0 + SOC_MARGIN)]
     assert found.soc == pytest.approx(drawn.mean(), abs=2e-3)
@@ -129,7 +129,7 @@ def test_what_a_voltage_leaves_open_the_charge_that_moves_tells():
         "It begins at 0.786 +/- 0.168; as the record moves 0.958 of the capacity, "
     )
     wrong = replace(read, soc=0.3)
-    assert told_by_charge(wrong, record(time, amperes, amperes), "backward", LFP.capacity_ah) is wrong
+    assert truncated_by_charge(wrong, record(time, amperes, amperes), "backward", LFP.capacity_ah) is wrong
 
 
 def test_a_potential_that_rises_beyond_all_bounds_past_full_had_a_start_under_load_fail():

@@ -5,7 +5,7 @@ import pytest
 
 from aesi.physics import Cell, simulate
 from aesi.physics.effects import CATALOGUE
-from aesi.physics.simulation import _remembered, forget_solutions
+from aesi.physics.simulation import _cached_solution, forget_solutions
 
 TIME_S = np.arange(60.0)
 
@@ -17,7 +17,7 @@ def solved():
     before = [0]
 
     def since() -> int:
-        misses = _remembered.cache_info().misses
+        misses = _cached_solution.cache_info().misses
         before[0], found = misses, misses - before[0]
         return found
 
@@ -69,4 +69,4 @@ def test_what_is_timed_is_solved_anew(lg_m50: Cell, solved):
     simulate(lg_m50, TIME_S, np.ones(60), soc0=0.8)
     forget_solutions()
     simulate(lg_m50, TIME_S, np.ones(60), soc0=0.8)
-    assert _remembered.cache_info().misses == 1
+    assert _cached_solution.cache_info().misses == 1

@@ -11,7 +11,7 @@ import aesi
 from aesi.errors import DataError
 from aesi.physics.belongs import check_measured
 from aesi.physics.effects import CATALOGUE
-from aesi.pipeline.calibrate import scaled_to
+from aesi.pipeline.calibrate import start_at_size
 from aesi.pipeline.discovery import cold
 from aesi.pipeline.discovery.cases import case_of_files
 from aesi.pipeline.discovery.cold import with_cold_admitted
@@ -56,8 +56,10 @@ def test_a_discovery_refused_the_cold_records_whose_temperature_it_is_to_find(hg
 def test_a_calibration_refused_a_cold_record_whose_temperature_was_given(hg2):
     record = discharged(hg2, -40.0)
     with pytest.raises(DataError, match="Or it was far colder"):
-        scaled_to(hg2, [record], None)
-    assert scaled_to(hg2, [record], {"cold": -15.0}).capacity_ah == pytest.approx(record.charge_ah, rel=0.01)
+        start_at_size(hg2, [record], None)
+    assert start_at_size(hg2, [record], {"cold": -15.0}).capacity_ah == pytest.approx(
+        record.charge_ah, rel=0.01
+    )
 
 
 def refused(cell, record):

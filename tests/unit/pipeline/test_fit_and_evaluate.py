@@ -218,7 +218,7 @@ def test_two_seconds_ahead_were_called_one_second(record):
         one
     ) in loaded.split.test:  # rows of a second: the last of each step, 10 s or 5 steps after what is repeated
         last = one.own.error_v[np.searchsorted(one.own.time_s, one.time_s)]
-        held.append(last[5:] - one.as_known.error_v[:-5])
+        held.append(last[5:] - one.with_known_error.error_v[:-5])
     assert espm["k_step_persistence"]["10"] == pytest.approx(1e3 * np.sqrt(np.mean(np.square(held))))
 
 

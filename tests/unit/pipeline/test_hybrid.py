@@ -22,7 +22,13 @@ from aesi.pipeline.export import export
 from aesi.pipeline.product.error_series import error_series
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.product.model_folder import SCHEMA
-from aesi.pipeline.simulation import ProfileRequest, predict_file, reached, simulate_file, voltage_words
+from aesi.pipeline.simulation import (
+    ProfileRequest,
+    predict_file,
+    simulate_file,
+    simulated_record_sentences,
+    voltage_words,
+)
 from aesi.records import Run
 from aesi.sparse import SparseModel
 from aesi.sparse.fade import Fade
@@ -686,7 +692,7 @@ def test_what_a_model_without_a_correction_was_found_to_be_worth_is_told_of_its_
 def test_round_off_at_a_full_charge_was_told_as_rows_beyond_it(model, data):
     voltage = np.full(len(data), 3.9)
     for above, said in ((1e-12, False), (0.01, True)):
-        told = reached(model.cell, data, voltage, np.linspace(1.0 + above, 0.9, len(data)))
+        told = simulated_record_sentences(model.cell, data, voltage, np.linspace(1.0 + above, 0.9, len(data)))
         assert any("a state of charge outside 0 to 1" in note for note in told) == said
 
 
@@ -703,7 +709,7 @@ def test_a_correction_that_harms_a_record_was_told_by_its_csv_alone(model, data)
         (near, near, "at most 2.0 mV; the physics alone 2.00 mV RMSE."),
         (near, None, "at most 2.0 mV."),
     ):
-        assert reached(model.cell, data, ours, soc, alone)[1].endswith(end)
+        assert simulated_record_sentences(model.cell, data, ours, soc, alone)[1].endswith(end)
 
 
 def test_a_prediction_is_told_beside_the_physics_alone_where_the_two_know_the_same(model, record, tmp_path):
@@ -717,14 +723,14 @@ def test_a_prediction_is_told_beside_the_physics_alone_where_the_two_know_the_sa
 def test_a_voltage_of_no_cell_was_told_without_when_it_left_the_limits(model, data):
     voltage, low_v = np.full(len(data), 3.9), model.cell.lower_voltage_v
     voltage[10], voltage[12] = low_v - 0.1, -1.49
-    *_, last = reached(model.cell, data, voltage, np.linspace(0.9, 0.5, len(data)))
+    *_, last = simulated_record_sentences(model.cell, data, voltage, np.linspace(0.9, 0.5, len(data)))
     assert (
         f"below {low_v:g} V first at {data.time_s[10]:g} s, down to -1.490 V at {data.time_s[12]:g} s."
         in last
     )
     assert "above" not in last
     voltage[20] = 5.0
-    *_, last = reached(model.cell, data, voltage, np.linspace(0.9, 0.5, len(data)))
+    *_, last = simulated_record_sentences(model.cell, data, voltage, np.linspace(0.9, 0.5, len(data)))
     assert last.endswith(f"V first at {data.time_s[20]:g} s, up to 5.000 V at {data.time_s[20]:g} s.")
 
 
@@ -738,7 +744,10 @@ def test_by_how_much_a_record_emptied_or_overfilled_a_cell_was_not_told(model, d
         (np.linspace(0.5, 1.04, len(data)), "brings more charge than the cell can hold, by 4.0 %."),
         (np.linspace(1.02, 0.5, len(data)), "starts with more charge than the cell can hold, by 2.0 %."),
     ):
-        assert any(note.endswith(f": the record {words}") for note in reached(model.cell, data, voltage, soc))
+        assert any(
+            note.endswith(f": the record {words}")
+            for note in simulated_record_sentences(model.cell, data, voltage, soc)
+        )
 
 
 def test_the_voltages_of_no_cell_were_in_the_range_of_a_run_that_ran_out():

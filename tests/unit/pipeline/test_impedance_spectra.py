@@ -13,7 +13,7 @@ from aesi.physics.cell.relations import Constant
 from aesi.physics.effects import activated
 from aesi.physics.impedance import slowest_diffusion_hz
 from aesi.pipeline.distinct import check_distinct_spectra
-from aesi.pipeline.impedance import held_against, impedance_file, read_frequencies
+from aesi.pipeline.impedance import compared_spectra, impedance_file, read_frequencies
 from aesi.records import Spectrum
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
@@ -30,20 +30,20 @@ def spectrum(cell, hz=FREQUENCY_HZ, **state):
 
 
 def test_the_models_own_spectrum_is_not_off(cell):
-    (one,), told = held_against(cell, [spectrum(cell, soc=0.5, temperature_degc=25.0)])
-    assert one.off == pytest.approx(0.0, abs=1e-12)
+    (one,), told = compared_spectra(cell, [spectrum(cell, soc=0.5, temperature_degc=25.0)])
+    assert one.ratio_error == pytest.approx(0.0, abs=1e-12)
     assert told == ()
 
 
 def test_a_spectrum_beyond_100_hz_ended_a_calibration_without_its_report(cell):
-    (one,), _ = held_against(
+    (one,), _ = compared_spectra(
         cell, [spectrum(cell, np.array([200.0, 1000.0]), soc=0.5, temperature_degc=25.0)]
     )
-    assert one.off is None
+    assert one.ratio_error is None
 
 
 def test_a_spectrum_below_empty_was_left_out_in_silence(cell):
-    kept, told = held_against(cell, [spectrum(cell, soc=50.0), spectrum(cell, discharged_ah=9.0)])
+    kept, told = compared_spectra(cell, [spectrum(cell, soc=50.0), spectrum(cell, discharged_ah=9.0)])
     assert kept == ()
     assert [sentence.split(" is not between 0 and 1")[0] for sentence in told] == [
         "s: left out, since its state of charge of 50",
@@ -70,11 +70,11 @@ def test_a_calibration_went_on_to_its_end_where_no_spectrum_could_be_used(cell):
 
 
 def test_an_assumed_temperature_is_said_and_a_state_is_not_assumed(cell):
-    (one,), told = held_against(cell, [spectrum(cell, soc=0.5)])
+    (one,), told = compared_spectra(cell, [spectrum(cell, soc=0.5)])
     assert told == ("s: no temperature; the model is taken at 25 degC.",)
-    assert one.off == pytest.approx(0.0, abs=1e-12)
+    assert one.ratio_error == pytest.approx(0.0, abs=1e-12)
     with pytest.raises(DataError, match="s: the state of the cell is not known; give soc or discharged_ah"):
-        held_against(cell, [spectrum(cell)])
+        compared_spectra(cell, [spectrum(cell)])
 
 
 def test_a_spectrum_without_an_arc_was_written_without_a_word(tmp_path):

@@ -12,7 +12,7 @@ from aesi.pipeline.experiment.left_out import carried_over, slope_on
 from aesi.pipeline.experiment.load import load
 from aesi.pipeline.experiment.physics_models import DECLARED, FREE, RECALIBRATED, PhysicsModels
 from aesi.pipeline.experiment.recalibrate import MODEL_ERROR_V
-from aesi.pipeline.product.deviations import PRIORS, PhysicsStart
+from aesi.pipeline.product.deviations import PRIORS, PhysicsVariant
 
 
 def test_one_part_on_which_physics_runs_off_does_not_decide():
@@ -76,9 +76,9 @@ def test_the_error_that_a_fit_allowed_for_goes_with_its_physics(loaded):
     records = [*loaded.split.train, *loaded.split.test, *(part.series for part in loaded.left_out.parts)]
     assert {series.missed_v for series in records} == {MODEL_ERROR_V}
     cell = loaded.cell
-    missed = PhysicsStart(cell, cell, deviations=(1.0,) * len(PRIORS), missed_v=0.03)
-    models = PhysicsModels({DECLARED: PhysicsStart(cell, cell), RECALIBRATED: missed}, RECALIBRATED)
-    assert models.carried(0.5).chosen.missed_v == 0.03
+    missed = PhysicsVariant(cell, cell, deviations=(1.0,) * len(PRIORS), missed_v=0.03)
+    models = PhysicsModels({DECLARED: PhysicsVariant(cell, cell), RECALIBRATED: missed}, RECALIBRATED)
+    assert models.with_recalibration_share(0.5).chosen.missed_v == 0.03
 
 
 def test_the_slope_is_that_of_the_declared_error_on_what_the_recalibration_takes_off():

@@ -11,14 +11,14 @@ from aesi.physics.effects import CATALOGUE
 from aesi.physics.simulation import model_with, simulate
 from aesi.pipeline import notes
 from aesi.pipeline.notes import (
-    beyond_fitted,
-    of_another_model,
-    of_dry_collector,
-    of_fitted,
-    on_temperatures,
+    beyond_fitted_sentences,
+    dry_collector_sentences,
+    fitted_record_sentences,
+    missing_energy_sentences,
+    other_model_sentences,
+    temperature_range_sentences,
     temperature_sentence,
     together,
-    without_energies,
 )
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Measurement
@@ -50,9 +50,9 @@ def test_a_cold_record_of_a_cell_without_activation_energies_was_simulated_in_si
     cell = Cell.from_bpx(NMC)
     silent = cell.with_electrolyte(diffusivity_ea_j_mol=0.0)
     cold = np.full(3, 10.0)
-    assert without_energies(cell, [cold]) == ()
-    assert without_energies(silent, [None, np.full(3, 27.0)]) == ()
-    (sentence,) = without_energies(silent, [None, cold])
+    assert missing_energy_sentences(cell, [cold]) == ()
+    assert missing_energy_sentences(silent, [None, np.full(3, 27.0)]) == ()
+    (sentence,) = missing_energy_sentences(silent, [None, cold])
     assert sentence == (
         "the cell's file declares no activation energy for electrolyte diffusivity: their values at 25 degC are "
         "used at temperatures up to 15 K away."
@@ -61,15 +61,19 @@ def test_a_cold_record_of_a_cell_without_activation_energies_was_simulated_in_si
 
 def test_what_is_colder_or_warmer_than_all_that_a_file_was_fitted_to_is_said():
     fitted = replace(Cell.from_bpx(NMC), fitted_at_k=(("pulses", 265.25), ("drive", 299.0)))
-    assert beyond_fitted(fitted, [np.array([-20.0, 5.0, 12.0]), 25.0, 30.0]) == ()
-    assert beyond_fitted(fitted, [None]) == ()  # the file's own 25 degC
-    assert beyond_fitted(fitted, [np.full(3, -18.0), 25.0]) == (
+    assert beyond_fitted_sentences(fitted, [np.array([-20.0, 5.0, 12.0]), 25.0, 30.0]) == ()
+    assert beyond_fitted_sentences(fitted, [None]) == ()  # the file's own 25 degC
+    assert beyond_fitted_sentences(fitted, [np.full(3, -18.0), 25.0]) == (
         "-18.0 degC in the mean is 10 K colder than any record that the cell's file was fitted to (pulses, -7.9 degC): "
         "what the model says there is extrapolated.",
     )
-    (sentence,) = on_temperatures(fitted, [None], [CATALOGUE["ambient_temperature"].activate(shift_k=15.0)])
+    (sentence,) = temperature_range_sentences(
+        fitted, [None], [CATALOGUE["ambient_temperature"].activate(shift_k=15.0)]
+    )
     assert sentence.startswith("40.0 degC in the mean is 14 K warmer than any record ")
-    assert beyond_fitted(Cell.from_bpx(NMC), [-30.0]) == ()  # published: nobody says what it was fitted to
+    assert (
+        beyond_fitted_sentences(Cell.from_bpx(NMC), [-30.0]) == ()
+    )  # published: nobody says what it was fitted to
 
 
 def test_two_effects_that_change_the_temperature_were_one():
@@ -82,9 +86,11 @@ def test_two_effects_that_change_the_temperature_were_one():
 def test_a_shift_of_the_temperature_was_no_temperature_that_energies_are_missing_for():
     silent = Cell.from_bpx(NMC).with_electrolyte(diffusivity_ea_j_mol=0.0)
     shifted = [CATALOGUE["ambient_temperature"].activate(shift_k=-20.0)]
-    (sentence,) = on_temperatures(silent, [None], shifted)
+    (sentence,) = temperature_range_sentences(silent, [None], shifted)
     assert sentence.endswith("their values at 25 degC are used at temperatures up to 20 K away.")
-    assert on_temperatures(silent, [np.full(3, 25.0)], shifted) == ()  # a measured temperature is as it is
+    assert (
+        temperature_range_sentences(silent, [np.full(3, 25.0)], shifted) == ()
+    )  # a measured temperature is as it is
 
 
 def test_what_is_said_of_temperatures_activated_the_effects_once_for_each_sentence(monkeypatch):
@@ -92,7 +98,9 @@ def test_what_is_said_of_temperatures_activated_the_effects_once_for_each_senten
     monkeypatch.setattr(notes, "model_with", lambda *given: asked.append(given) or model_with(*given))
     silent = Cell.from_bpx(NMC).with_electrolyte(diffusivity_ea_j_mol=0.0)
     fitted = replace(silent, fitted_at_k=(("drive", 299.0),))
-    both = on_temperatures(fitted, [None], [CATALOGUE["ambient_temperature"].activate(shift_k=-20.0)])
+    both = temperature_range_sentences(
+        fitted, [None], [CATALOGUE["ambient_temperature"].activate(shift_k=-20.0)]
+    )
     assert len(both) == 2
     assert len(asked) == 1
 
@@ -100,16 +108,16 @@ def test_what_is_said_of_temperatures_activated_the_effects_once_for_each_senten
 def test_a_model_that_was_found_with_the_single_particle_was_simulated_with_the_other_without_a_word():
     cell = Cell.from_bpx(NMC)
     found = HybridModel(cell, (CATALOGUE["series_resistance"].activate(),))
-    (sentence,) = of_another_model(found, "dfn")
+    (sentence,) = other_model_sentences(found, "dfn")
     assert sentence.startswith(
         "what the saved model adds to its cell was found with the single particle (espm), and the porous electrode "
         "(dfn) is simulated, as asked"
     )
     fitted = HybridModel(replace(cell, fitted_with="dfn"), model="dfn")
-    (sentence,) = of_another_model(fitted, "espm")
+    (sentence,) = other_model_sentences(fitted, "espm")
     assert sentence.startswith("the cell's file was fitted with the porous electrode (dfn)")
     for as_it_is in ((found, None), (found, "espm"), (HybridModel(cell), "dfn")):
-        assert of_another_model(*as_it_is) == ()
+        assert other_model_sentences(*as_it_is) == ()
 
 
 def test_what_a_fit_took_out_of_the_current_of_a_slow_cycle_was_told_by_its_report_alone():
@@ -123,22 +131,24 @@ def test_what_a_fit_took_out_of_the_current_of_a_slow_cycle_was_told_by_its_repo
     cycle = Measurement(
         3600 * hours, read, run.voltage_v, np.full(len(hours), 25.0), name="c20", hold="backward"
     )
-    first, zero = of_fitted(cell, cycle, None)
+    first, zero = fitted_record_sentences(cell, cycle, None)
     assert first.endswith("in which the cell had 0.974 of its capacity (--soh 0.974 takes it).")
     assert zero.startswith("c20: nearly full at both ends")
     assert float(zero.rpartition("offset_a=")[2].removesuffix(" does.")) == pytest.approx(offset, rel=0.1)
     taken = CATALOGUE["current_sensor_offset"].activate(offset_a=offset)
-    assert of_fitted(cell, cycle, None, (taken,)) == (first,)
-    assert of_fitted(cell, replace(cycle, voltage_v=np.full(len(hours), np.nan)), None) == (first,)
-    assert of_fitted(cell, replace(cycle, name="another"), None) == ()
+    assert fitted_record_sentences(cell, cycle, None, (taken,)) == (first,)
+    assert fitted_record_sentences(cell, replace(cycle, voltage_v=np.full(len(hours), np.nan)), None) == (
+        first,
+    )
+    assert fitted_record_sentences(cell, replace(cycle, name="another"), None) == ()
 
 
 def test_a_collector_without_salt_is_told_with_when_and_which_model_sees_it():
     cell = Cell.from_bpx(NMC)
     time = np.arange(120.0)
     dry, wet = (simulate(cell, time, np.full(120, 90.0), 1.0, (), degc) for degc in (-20.0, 25.0))
-    (told,) = of_dry_collector("cold", dry, "espm")
+    (told,) = dry_collector_sentences("cold", dry, "espm")
     assert "cold: the salt" in told
     assert "from 47 s on" in told
     assert "`aesi simulate --model dfn`" in told  # in `aesi predict`, --model is another option
-    assert of_dry_collector("warm", wet, "espm") == of_dry_collector("cold", dry, "dfn") == ()
+    assert dry_collector_sentences("warm", wet, "espm") == dry_collector_sentences("cold", dry, "dfn") == ()

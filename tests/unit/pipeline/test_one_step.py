@@ -46,8 +46,8 @@ def test_every_row_is_predicted_from_rows_before_it_alone():
         ahead.error_v, [1.0, 2.0, 3.0, 5.0]
     )  # the last stands behind the last stamp
     np.testing.assert_array_equal(ahead.predicted_v, [1.0, 1.0, 2.0, 3.0])
-    np.testing.assert_array_equal(ahead.judged_v, [np.nan, 1.0, 1.0, np.nan])
-    np.testing.assert_array_equal(ahead.persistence_v, ahead.judged_v)
+    np.testing.assert_array_equal(ahead.scored_v, [np.nan, 1.0, 1.0, np.nan])
+    np.testing.assert_array_equal(ahead.persistence_v, ahead.scored_v)
     np.testing.assert_array_equal(ahead.of(slice(2, 4)), [False, True, True, False])
 
 
@@ -55,13 +55,13 @@ def test_of_rows_denser_than_a_step_the_last_is_predicted_from_the_mean_of_those
     error_v = np.array([1.0, 2.0, 4.0, 6.0, 9.0])
     ahead = rows_ahead(Held(), series_of(0.5 * np.arange(5), np.arange(3.0), error_v))
     np.testing.assert_array_equal(ahead.error_v, [1.0, 4.0, 9.0])
-    np.testing.assert_array_equal(ahead.judged_v, [np.nan, 3.0, 6.0])
+    np.testing.assert_array_equal(ahead.scored_v, [np.nan, 3.0, 6.0])
 
 
 def test_a_row_with_none_a_step_before_it_is_no_prediction_one_step_ahead():
     ahead = rows_ahead(Held(), series_of(np.array([0.0, 1.0, 4.0, 5.0]), np.arange(6.0), np.arange(4.0)))
-    np.testing.assert_array_equal(ahead.judged_v, [np.nan, 1.0, np.nan, 1.0])
-    np.testing.assert_array_equal(rows_ahead(Held(), SEVERAL, 2).judged_v, [np.nan, np.nan, 2.0, 2.0])
+    np.testing.assert_array_equal(ahead.scored_v, [np.nan, 1.0, np.nan, 1.0])
+    np.testing.assert_array_equal(rows_ahead(Held(), SEVERAL, 2).scored_v, [np.nan, np.nan, 2.0, 2.0])
 
 
 SEVERAL = replace(series_of(np.arange(4.0), np.arange(4.0), np.arange(4.0)), own=None)
@@ -71,8 +71,8 @@ def test_physics_alone_is_judged_at_its_own_current_of_the_row():
     series = series_of(np.array([0.0, 0.9, 1.8]), np.arange(2.0), np.array([1.0, 2.0, 4.0]))
     own = replace(series.own, physics={"other": np.array([3.7, 3.8, 3.9])})
     ahead = rows_ahead(Bare("other"), replace(series, own=own))
-    np.testing.assert_allclose(ahead.left_v[1:], own.left_by("other")[2:])
-    np.testing.assert_allclose(rows_ahead(Bare("another"), replace(series, own=own)).left_v[1:], [4.0])
+    np.testing.assert_allclose(ahead.residual_v[1:], own.left_by("other")[2:])
+    np.testing.assert_allclose(rows_ahead(Bare("another"), replace(series, own=own)).residual_v[1:], [4.0])
 
 
 @pytest.fixture(scope="module", params=[1.0, 1.2, 0.25])

@@ -18,8 +18,8 @@ from aesi.pipeline.experiment.physics_models import (
     PhysicsModels,
     no_rows,
 )
-from aesi.pipeline.experiment.recalibrate import Beginning
-from aesi.pipeline.product.deviations import PhysicsStart
+from aesi.pipeline.experiment.recalibrate import StateSource
+from aesi.pipeline.product.deviations import PhysicsVariant
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Measurement
 from aesi.sparse import Candidate, Genome, evaluate
@@ -55,7 +55,7 @@ def test_one_fitted_resistor_is_all_that_this_cell_lacks(loaded):
 
 def test_a_series_knows_from_when_on_a_physics_model_ran_out():
     cell = Cell.from_bpx(BPX)
-    whole = PhysicsStart(cell, cell, ())
+    whole = PhysicsVariant(cell, cell, ())
     models = PhysicsModels(dict.fromkeys((DECLARED, RECALIBRATED), whole), DECLARED)
     time_s = np.arange(1800.0)
     record = Measurement(time_s, np.full(1800, 30.0), np.full(1800, 3.5))
@@ -64,9 +64,9 @@ def test_a_series_knows_from_when_on_a_physics_model_ran_out():
     run = whole.simulate(record, 0.3, "linear")
     first = int(np.argmax(run.series["depleted"] > 0.0))
     assert series.ran_out_s == time_s[first] > 900.0
-    np.testing.assert_array_equal(series.runs, time_s < first)
-    assert series.take(slice(0, first)).runs.all()
-    assert not series.take(slice(first, None)).runs.any()
+    np.testing.assert_array_equal(series.before_depletion, time_s < first)
+    assert series.take(slice(0, first)).before_depletion.all()
+    assert not series.take(slice(first, None)).before_depletion.any()
     full, empty = models.series(no_rows(record, 0.9), 1.0, "linear")
     assert (empty, full.ran_out_s) == (False, None)
 
@@ -80,9 +80,9 @@ def test_a_model_that_is_exact_erred_where_rows_are_denser_than_steps(hold, spre
     run = simulate(cell, time_s, current_a, 0.6, hold=hold)
     rows = Measurement(time_s, current_a, run.voltage_v)
     even = to_even(rows, 1.0, hold)
-    exact = PhysicsStart(cell, cell, ())
+    exact = PhysicsVariant(cell, cell, ())
     models = PhysicsModels({DECLARED: exact, RECALIBRATED: exact}, DECLARED)
-    record = no_rows(even, 0.6, begins=Beginning(rows, 0.6, False))
+    record = no_rows(even, 0.6, state_source=StateSource(rows, 0.6, False))
     series, _ = models.series(record, 1.0, hold)
     np.testing.assert_allclose(series.error_v, 0.0, atol=1e-9)
     np.testing.assert_allclose(series.left_by(RECALIBRATED), 0.0, atol=1e-9)
@@ -90,7 +90,7 @@ def test_a_model_that_is_exact_erred_where_rows_are_denser_than_steps(hold, spre
     # At the stamps it says something else, and a fit allows for that.
     at_stamps_v = exact.simulate(even, 0.6, hold).voltage_v
     assert rms(even.voltage_v - at_stamps_v) > 1e-3
-    np.testing.assert_allclose(record.as_declared(exact, hold).voltage_v, at_stamps_v, atol=1e-9)
+    np.testing.assert_allclose(record.with_resampling_change(exact, hold).voltage_v, at_stamps_v, atol=1e-9)
 
 
 def test_the_saved_cell_is_the_one_that_is_corrected(loaded):

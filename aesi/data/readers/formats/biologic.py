@@ -14,7 +14,7 @@ FORMAT = Format(
         "voltage_v": (
             Name(r"<?ecell>?/(?P<unit>m?v)"),
             Name(r"<?ewe-ece>?/(?P<unit>m?v)"),
-            Name(r"<?ewe>?/(?P<unit>m?v)", less=r"<?ece>?/m?v"),
+            Name(r"<?ewe>?/(?P<unit>m?v)", reference=r"<?ece>?/m?v"),
         ),
         "temperature_degc": (Name(r"temperature/.{0,3}c", "degC"),),
         "cycle": (Name(r"cycle number|z cycle"),),

@@ -23,12 +23,13 @@ class Name:
 
     pattern : of the whole name as `plain` writes it; a group `unit` takes the unit that stands in the name.
     unit : where the name does not say it.
-    less : pattern of a column that has to be subtracted where it is there, both being against a reference.
+    reference : pattern of the column of the other electrode. Where that is there, both are potentials against a
+    reference electrode, and the quantity is their difference.
     """
 
     pattern: str
     unit: str = ""
-    less: str = ""
+    reference: str = ""
 
 
 @dataclass(frozen=True)
@@ -65,12 +66,16 @@ class Format:
                     return position, unit
         return None
 
-    def to_subtract(self, quantity: str, position: int, header: Sequence[str]) -> str | None:
-        """The column that the one at `position`, which is not the quantity by itself, has to be taken less by."""
+    def reference_column(self, quantity: str, position: int, header: Sequence[str]) -> str | None:
+        """Name of the column that has to be subtracted from that at `position` to give the quantity; None for none."""
         names = [plain(name) for name in header]
-        less = [c.less for c in self.columns[quantity] if c.less and re.fullmatch(c.pattern, names[position])]
+        reference = [
+            c.reference
+            for c in self.columns[quantity]
+            if c.reference and re.fullmatch(c.pattern, names[position])
+        ]
         return next(
-            (header[i] for i, name in enumerate(names) for one in less if re.fullmatch(one, name)), None
+            (header[i] for i, name in enumerate(names) for one in reference if re.fullmatch(one, name)), None
         )
 
 

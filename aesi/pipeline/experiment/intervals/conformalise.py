@@ -139,7 +139,7 @@ def _intervals(
     conformal = config.conformal
     ahead = [(rows_ahead(model, series), rows) for model, series, rows in pairs]
     return chosen.fit(
-        [each.left_v[each.of(rows)] for each, rows in ahead],
+        [each.residual_v[each.of(rows)] for each, rows in ahead],
         conformal.alpha,
         conformal.window,
         np.random.default_rng(config.seed),

@@ -95,7 +95,7 @@ def _judge(one: Fitted, series: ErrorSeries, role: Role) -> _Judged:
     free = one.model.free_run(series)
     free = replace(free, outside=outside_trained(free.outside, series, trained_on(one.model, one.bands)))
     ahead = rows_ahead(one.model, series)
-    residual = ahead.left_v
+    residual = ahead.residual_v
     residual[0] = np.nan  # the first sample cannot be predicted one step ahead
     return _Judged(
         series=series,
@@ -144,9 +144,9 @@ def _free_run(judged: Mapping[Role, Sequence[_Judged]]) -> dict[str, float]:
                 left_share = np.mean((error - predicted) ** 2) / np.mean(physics**2)
                 figures[f"{role}_{key}"] = 100.0 * (1.0 - float(left_share))
             figures[f"{role}_rmse_mv"] = MV_PER_V * rmse(error, predicted)
-            runs = _joined(r.series.runs for r in records)
-            if runs.any() and not runs.all():
-                figures[f"{role}_until_ran_out_rmse_mv"] = MV_PER_V * rms((error - predicted)[runs])
+            before = _joined(r.series.before_depletion for r in records)
+            if before.any() and not before.all():
+                figures[f"{role}_until_ran_out_rmse_mv"] = MV_PER_V * rms((error - predicted)[before])
     test = judged["test"]
     figures["diverged"] = sum(r.free.diverged_at is not None for r in test)
     figures["outside_pct"] = 100.0 * float(np.mean(_joined(r.free.outside for r in test)))
@@ -158,7 +158,7 @@ def _one_step(judged: Mapping[Role, Sequence[_Judged]]) -> dict[str, float]:
     figures = {}
     for role, records in judged.items():
         if records:
-            figures[f"{role}_rmse_mv"] = _rms_mv(r.one_step.judged_v for r in records)
+            figures[f"{role}_rmse_mv"] = _rms_mv(r.one_step.scored_v for r in records)
     figures["persistence_rmse_mv"] = _rms_mv(r.one_step.persistence_v for r in judged["test"])
     return figures
 
@@ -169,7 +169,7 @@ def _one_step_intervals(one: Fitted, test: Sequence[_Judged]) -> dict[str, Any]:
     if one.intervals is None:
         return {}
     rows = [r.one_step for r in test]
-    residuals = [each.judged_v for each in rows]
+    residuals = [each.scored_v for each in rows]
     return {
         "intervals": _interval_figures(rows, [r.intervals for r in test], residuals, one.intervals.alpha),
         "intervals_by_method": {
@@ -216,10 +216,10 @@ def _record_figures(one: Fitted, record: _Judged) -> dict[str, float | None]:
     series, model = record.series, one.model
     left, declared = series.error_v - record.free.error_v, series.left_by(DECLARED)
     kept = model.kept(series) if isinstance(model, SparseModel) else np.ones(len(series))
-    visited, runs = trained_on(model, one.bands), series.runs
-    ran_out = {} if runs.all() else {"ran_out_s": series.ran_out_s}
-    if ran_out and runs.any():
-        ran_out["until_ran_out_mv"] = MV_PER_V * rms(left[runs])
+    visited, before = trained_on(model, one.bands), series.before_depletion
+    ran_out = {} if before.all() else {"ran_out_s": series.ran_out_s}
+    if ran_out and before.any():
+        ran_out["until_ran_out_mv"] = MV_PER_V * rms(left[before])
     return {
         "rmse_mv": MV_PER_V * rms(left),
         **ran_out,
@@ -241,7 +241,7 @@ def _k_step(one: Fitted, test: Sequence[_Judged]) -> dict[str, dict[str, float]]
     ours, held = {}, {}
     for horizon in in_whole_steps(test[0].series.dt_s):
         rows = [rows_ahead(one.model, r.series, r.series.steps(horizon)) for r in test]
-        ours[_seconds(horizon)] = _rms_mv(each.judged_v for each in rows)
+        ours[_seconds(horizon)] = _rms_mv(each.scored_v for each in rows)
         held[_seconds(horizon)] = _rms_mv(each.persistence_v for each in rows)
     return {"k_step": ours, "k_step_persistence": held}
 

@@ -43,39 +43,41 @@ def validation_mser(loaded: Loaded, problem: Problem, candidates: Sequence[Candi
     """
     if len(problem.folds) < 2 or not problem.folds_are_drives:
         return {}
-    pieces = [*_parts(loaded, problem, candidates), *_drives(loaded, problem, candidates)]
+    pieces = [*_part_squares(loaded, problem, candidates), *_drive_squares(loaded, problem, candidates)]
     return {
         name: 100.0 * (1.0 - float(np.median([left[name] / left[DECLARED] for left in pieces])))
         for name in pieces[0]
     }
 
 
-def _parts(loaded: Loaded, problem: Problem, candidates: Sequence[Candidate]) -> Iterator[SquaresLeft]:
+def _part_squares(loaded: Loaded, problem: Problem, candidates: Sequence[Candidate]) -> Iterator[SquaresLeft]:
     """Squared errors on each fold of the search. The ensembles are fitted to the error of physics that saw the fold;
     the share of that error which they leave is applied to the error of physics that did not see it."""
     shares = [nested_shares(problem, candidates, number) for number in range(len(ENSEMBLES))]
     for d, ((a, b), out) in enumerate(zip(problem.folds, loaded.left_out.parts, strict=True)):
         rows = fold_samples(problem, a, b)[1]
         part = out.series.take(rows)
-        left = _by_physics(part)
+        left = _physics_squares(part)
         base = float(np.sum(part.error_v**2))
         left |= {name: base * float(share[d]) for name, share in zip(ENSEMBLES, shares, strict=True)}
         yield left
 
 
-def _drives(loaded: Loaded, problem: Problem, candidates: Sequence[Candidate]) -> Iterator[SquaresLeft]:
+def _drive_squares(
+    loaded: Loaded, problem: Problem, candidates: Sequence[Candidate]
+) -> Iterator[SquaresLeft]:
     """Squared errors on each whole left-out drive, if the folds are parts of drives."""
     for out, span in zip(loaded.left_out.drives, problem.spans, strict=False):
         rows = slice(1, len(out.series))
         part = out.series.take(rows)
-        left = _by_physics(part)
+        left = _physics_squares(part)
         for number, name in enumerate(ENSEMBLES):
-            given = _without(problem, candidates, number, out, span)
+            given = _left_out_correction_v(problem, candidates, number, out, span)
             left[name] = float(np.sum((part.error_v - given[rows]) ** 2))
         yield left
 
 
-def _without(
+def _left_out_correction_v(
     problem: Problem, candidates: Sequence[Candidate], ensemble: int, out: HeldOutDrive, span: Span
 ) -> Array:
     """Correction in free run of a left-out drive, (n,) V, by the model that the other drives choose and are fitted
@@ -96,6 +98,6 @@ def _without(
     return np.zeros(len(out.series))
 
 
-def _by_physics(part: ErrorSeries) -> SquaresLeft:
+def _physics_squares(part: ErrorSeries) -> SquaresLeft:
     """Squared errors of all physics models on a piece."""
     return {name: float(np.sum(part.left_by(name) ** 2)) for name in PHYSICS_NAMES}

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from aesi.calibration.ageing import LOADED_SD, SLOW_SD
-from aesi.calibration.fit import problem
+from aesi.calibration.fit import prepared_model
 from aesi.calibration.parameters import with_interfaces
 from aesi.calibration.records.conditions import Conditions
-from aesi.calibration.rewind import capacities, rewound
+from aesi.calibration.written_cell import capacities, written_cell
 from aesi.physics import simulate
 from aesi.records import Measurement
 
@@ -24,14 +24,14 @@ def discharge(cell, name: str, c_rate: float) -> Measurement:
 def model(start):
     whole = with_interfaces(start)
     records = [discharge(whole, "slow", 0.1), discharge(whole, "loaded", 0.5)]
-    return problem(whole, records, Conditions(same_cell=True))[0]
+    return prepared_model(whole, records, Conditions(same_cell=True))[0]
 
 
 def test_it_is_the_one_that_shares_are_deviations_from(model):
     x = np.zeros(model.layout.size)
-    alone = rewound(model, x)
+    alone = written_cell(model, x)
     x[[model.layout.age(0), model.layout.age(1)]] = 1.0, -1.0
-    assert rewound(model, x) == alone
+    assert written_cell(model, x) == alone
     shares = capacities(model, x)
     assert shares == pytest.approx({"slow": np.exp(SLOW_SD), "loaded": np.exp(-LOADED_SD)})
 

@@ -17,14 +17,17 @@ from aesi.physics.balance import aged_range, same_rest
 from aesi.physics.cell import Cell
 
 
-def rewound(model: Model, x: Array) -> Cell:
-    """The cell with full at the fitted start of its charged records, and empty at a rest voltage of its lower limit."""
+def written_cell(model: Model, x: Array) -> Cell:
+    """The cell of the file: full as in the fit, and empty at a rest voltage of its lower voltage limit.
+
+    x : working vector, as in the others.
+    """
     return _as_aged(model, x, 1.0, 1.0)
 
 
 def capacities(model: Model, x: Array) -> dict[str, float]:
-    """Record -> capacity of the cell then over that of the written cell."""
-    written_ah = rewound(model, x).capacity_ah
+    """Name of a record -> capacity of the cell in it, over that of the written cell."""
+    written_ah = written_cell(model, x).capacity_ah
     return {
         r.name: _as_aged(model, x, model.material(i, x), model.silicon(i, x)).capacity_ah / written_ah
         for i, r in enumerate(model.records)
