@@ -42,7 +42,7 @@ from flows.tracking.experiment_log import (
     coefficients,
     reduced,
 )
-from flows.tracking.store import KIND, PARENT, Store, without_login
+from flows.tracking.store import KIND, PARENT, Store, is_of_experiment, without_login
 
 COMMIT, COMMIT_SHOWN = "mlflow.source.git.commit", 10
 GENES = ("lambda1", "lambda2", "tau", "p_c", "d", "feedback")
@@ -186,7 +186,7 @@ class Differs(AesiError):
 def _candidate(store: Store, run_id: str) -> Any:
     """The tracked run of a candidate that did not fail."""
     run = store.run(run_id)
-    if run.data.tags.get(KIND) == "run":
+    if run.data.tags.get(KIND) == "run" and is_of_experiment(run):
         number = run.data.params.get("chosen_candidate")
         if number is None:
             raise InputError(

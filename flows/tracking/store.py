@@ -38,6 +38,10 @@ MEANT_OTHERWISE = re.compile(r"%[0-9A-Fa-f]{2}|[?]")
 PARENT = "mlflow.parentRunId"
 NUMBER = "aesi.number"
 KIND = "aesi.kind"
+JOB, EXPERIMENT = "aesi.job", "experiment"
+"""Tag of a whole run: experiment, discovery, batch or benchmark. Runs of earlier versions have none."""
+OTHER_JOBS = ("cases", "cells")
+"""Parameters of benchmarks and batches, and of no experiment, by which runs of earlier versions are told apart."""
 REACH_S = 5.0
 """Wait for the answer of a tracking server."""
 PASSING = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EAGAIN, errno.EMFILE)
@@ -52,6 +56,14 @@ PAGE = 1000
 def beginning(runs: Sequence[Any], begin: str) -> list[Any]:
     """Those of the runs whose id begins so; none where that is too short to stand for an id."""
     return [run for run in runs if run.info.run_id.startswith(begin)] if len(begin) >= SHORTEST_ID else []
+
+
+def is_of_experiment(run: Any) -> bool:
+    """Whether a whole run is that of an experiment, and no discovery, batch or benchmark of the same name."""
+    tags, params = run.data.tags, run.data.params
+    if JOB in tags:
+        return bool(tags[JOB] == EXPERIMENT)
+    return "verdict" not in tags and not any(name in params for name in OTHER_JOBS)
 
 
 class StoreAway(AesiError):
