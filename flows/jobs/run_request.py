@@ -35,7 +35,9 @@ class RunRequest:
         kind = self.runner or config.runner.kind
         if kind == "local" and self.address is not None:
             uses_none = ", and --runner local uses none" if self.runner else ""
-            advice = "leave one of the two out" if self.runner else "give --runner dask beside it, or leave it out"
+            advice = (
+                "leave one of the two out" if self.runner else "give --runner dask beside it, or leave it out"
+            )
             raise InputError(f"--address {self.address} names a Dask scheduler{uses_none}; {advice}.")
         address = (self.address or config.runner.address) if kind == "dask" else None
         runner = config.runner.model_copy(update={"kind": kind, "address": address})

@@ -32,6 +32,7 @@ from aesi.pipeline.written import CANDIDATE, EXPERIMENT, MODEL
 from aesi.records import Failed, LeftOutDrives
 from aesi.sparse import Candidate, Genome, Problem, evaluate
 from flows.base import codec
+from flows.base.store_address import without_login
 from flows.tracking.experiment_log import (
     DECLARED,
     INPUTS,
@@ -42,7 +43,7 @@ from flows.tracking.experiment_log import (
     coefficients,
     reduced,
 )
-from flows.tracking.store import KIND, PARENT, Store, is_of_experiment, without_login
+from flows.tracking.store import KIND, PARENT, Store, is_of_experiment
 
 COMMIT, COMMIT_SHOWN = "mlflow.source.git.commit", 10
 GENES = ("lambda1", "lambda2", "tau", "p_c", "d", "feedback")

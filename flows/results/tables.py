@@ -16,8 +16,9 @@ from typing import Any, Literal
 from aesi.errors import InputError
 from aesi.pipeline.report import tables
 from aesi.pipeline.written import FIGURES, REPORT, SUMMARY
+from flows.base.store_address import without_login
 from flows.tracking.experiment_log import CODE, SETTING, UNFITTED
-from flows.tracking.store import KIND, Store, is_of_experiment, without_login
+from flows.tracking.store import KIND, Store, is_of_experiment
 
 RANGED = ("test_mser_pct", "test_mser_recalibrated_pct", "coverage_pct")
 """Figures that tables show with their range over seeds."""

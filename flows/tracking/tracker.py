@@ -20,10 +20,11 @@ from typing import Any, Literal, Protocol
 from aesi.errors import AesiError
 from aesi.pipeline.experiment.sections import TrackingConfig
 from flows.base import environment
+from flows.base.store_address import without_login
 from flows.tracking.delivery import deliver
 from flows.tracking.outbox import FLUSH_S, Outbox
 from flows.tracking.provenance import source_tags
-from flows.tracking.store import EXPERIMENT, JOB, KIND, Store, now_ms, without_login
+from flows.tracking.store import EXPERIMENT, JOB, KIND, Store, now_ms
 
 PARAMETER_LIMIT = 6000  # MLflow cuts longer ones off
 CUT = "… sha256 "

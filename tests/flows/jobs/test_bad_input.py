@@ -133,7 +133,10 @@ def test_a_run_that_the_store_does_not_take_back_is_closed_as_failed(tracked, mo
         raise ConnectionError("no answer")
 
     monkeypatch.setattr(Tracker, "withdraw", away)
-    with pytest.raises(InputError, match="no"), tracked_job(Subject("job", 0, "key", "batch"), "title", Console()):
+    with (
+        pytest.raises(InputError, match="no"),
+        tracked_job(Subject("job", 0, "key", "batch"), "title", Console()),
+    ):
         raise InputError("no.")
     assert statuses("job") == ["FAILED"]
     (record,) = records("job")
@@ -200,7 +203,8 @@ def test_a_tracking_address_that_is_none_or_away_was_told_after_a_server_had_bee
 
 
 def test_a_workspace_with_an_escape_in_its_name_kept_its_runs_in_another_file(workspace, monkeypatch):
-    from flows.tracking.store import Store, checked_address
+    from flows.base.store_address import checked_address
+    from flows.tracking.store import Store
 
     for name in ("a%20b", "a?b"):
         monkeypatch.setenv("AESI_HOME", str(workspace / name))
