@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
-Item = TypeVar("Item")
-Result = TypeVar("Result")
+Argument = TypeVar("Argument")
+Returned = TypeVar("Returned")
 
 
-def side_by_side(function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+def side_by_side(function: Callable[[Argument], Returned], items: Iterable[Argument]) -> Iterator[Returned]:
     """Yield `function(item)` for each item, in the order given, so that results do not depend on the number of threads.
     Calls that have not begun are cancelled when the caller stops iterating."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
