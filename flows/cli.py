@@ -15,7 +15,7 @@ try:
     import typer
 
     from aesi.errors import AesiError, OwnEffectError
-    from aesi.numerics.files.first_use import tell_compiling
+    from aesi.numerics.files.first_use import on_first_compilation
     from flows.base import environment
     from flows.base.interrupt import INTERRUPTED, ending_soon_on_interrupt, tell_interrupted
     from flows.commands import batch, bench, cell, data, effects, experiment
@@ -65,7 +65,7 @@ def main() -> NoReturn:
     try:
         with ending_soon_on_interrupt():
             environment.prepare_process()
-            tell_compiling(_say_compiling)
+            on_first_compilation(_say_compiling)
             app(args=repeated(sys.argv[1:]))
     except (AesiError, OwnEffectError) as error:
         if isinstance(error, OwnEffectError) and os.environ.get("AESI_DEBUG"):

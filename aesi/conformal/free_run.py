@@ -19,7 +19,7 @@ as two. If the error of a drive were constant, the bands of three drives would t
 measured drives it is not: over the development splits of `aesi bench splits` that train on three
 parts of the NMC drive the bands of the declared model cover 92.7 % and score 93.7 mV, and 97.1 % and 112.3 mV with the
 number of drives for m. At short horizons the errors within a piece
-are independent over much shorter times: every FORGOTTEN horizons of a piece count as one.
+are independent over much shorter times: every CORRELATED_HORIZONS horizons of a piece count as one.
 
 Only rows inside the range that their model was trained on are counted: a model fitted without the first piece of a
 drive extrapolates there, the final model does not. Outside the trained range the inputs are held at its edge, and the
@@ -144,7 +144,7 @@ class FreeRunBands:
         do not contain, such as `thermal`.
         """
         elapsed = np.full(len(spread_v), horizon_s)
-        return self._around(elapsed, spread_v, excess, reach_v, open_v)
+        return self._bounds(elapsed, spread_v, excess, reach_v, open_v)
 
     def along(
         self,
@@ -160,7 +160,7 @@ class FreeRunBands:
         the whole drive.  spread_v, reach_v, open_v : as for `at`.
         """
         elapsed = dt_s * np.arange(len(spread_v), dtype=np.float64)
-        return self._around(elapsed, spread_v, excess, reach_v, open_v)
+        return self._bounds(elapsed, spread_v, excess, reach_v, open_v)
 
     def spread(self, series: ErrorSeries) -> Array:
         """(n,) V, standard deviation of the physics along a record given the fitted rows; 0 where that is not known.
@@ -185,12 +185,16 @@ class FreeRunBands:
     ) -> Intervals:
         """The band along a free run of a record, or of predictions `horizon_s` ahead, with their own `reach_v`;
         `warm` is False outside the trained range, of temperature too, where the band is not calibrated."""
-        begins_v = 0.0 if series.start_v is None else series.start_v
-        open_v = np.hypot(self.thermal(series), begins_v)
-        where = self.spread(series), free.excess, reach_v, open_v
-        low, high = self.along(series.dt_s, *where) if horizon_s is None else self.at(horizon_s, *where)
-        known = True if self.seen is None else self.seen.knows(series.degc_or_nan)
-        return Intervals(low, high, ~free.outside & known)
+        start_v = 0.0 if series.start_v is None else series.start_v
+        open_v = np.hypot(self.thermal(series), start_v)
+        uncertainties = self.spread(series), free.excess, reach_v, open_v
+        low, high = (
+            self.along(series.dt_s, *uncertainties)
+            if horizon_s is None
+            else self.at(horizon_s, *uncertainties)
+        )
+        temperature_known = True if self.seen is None else self.seen.knows(series.degc_or_nan)
+        return Intervals(low, high, ~free.outside & temperature_known)
 
     def to_dict(self) -> SavedState:
         """Plain values and numpy arrays only."""
@@ -219,7 +223,7 @@ class FreeRunBands:
         horizons = tuple(HorizonBand.from_state(item, alpha) for item in state["horizons"])
         return cls(alpha, horizons, seen, root, energies)
 
-    def _around(
+    def _bounds(
         self,
         elapsed_s: Array,
         spread_v: Array,
@@ -227,21 +231,26 @@ class FreeRunBands:
         reach_v: Array | float,
         open_v: Array | float,
     ) -> tuple[Array, Array]:
+        """(low, high), (n,) V, at times elapsed_s (n,) since the last measured voltage; see `at`."""
         columns = covariates(spread_v, excess)
-        halves = np.array([band.half_width(columns) for band in self.horizons])
+        half_widths = np.array([band.half_width(columns) for band in self.horizons])
         # A recent measurement reduces the independent error in the same ratio as the calibrated width.
-        beside_v, whole = ndtri(1 - self.alpha / 2) * open_v, halves[-1]
-        share = np.hypot(1.0, beside_v / np.where(whole > 0.0, whole, 1.0))
-        halves = np.where(whole > 0.0, halves * share, np.hypot(halves, beside_v))
-        half = _between(halves, [band.horizon_s for band in self.horizons], elapsed_s) + reach_v
-        return -half, half
+        independent_v, whole_drive_v = ndtri(1 - self.alpha / 2) * open_v, half_widths[-1]
+        share = np.hypot(1.0, independent_v / np.where(whole_drive_v > 0.0, whole_drive_v, 1.0))
+        half_widths = np.where(whole_drive_v > 0.0, half_widths * share, np.hypot(half_widths, independent_v))
+        half_width = (
+            _interpolated_half_widths(half_widths, [band.horizon_s for band in self.horizons], elapsed_s)
+            + reach_v
+        )
+        return -half_width, half_width
 
 
-def _check_lengths(lengths: Sequence[int], **given: Sequence[Array | BoolArray | None] | None) -> None:
-    for name, arrays in given.items():
+def _check_lengths(lengths: Sequence[int], **arguments: Sequence[Array | BoolArray | None] | None) -> None:
+    """Raises InputError where an argument, given by its name, has not one array a record of these lengths."""
+    for name, arrays in arguments.items():
         if arrays is None:
             continue
-        rows = [n if one is None else len(one) for n, one in zip(lengths, arrays, strict=False)]
+        rows = [n if array is None else len(array) for n, array in zip(lengths, arrays, strict=False)]
         if len(arrays) != len(lengths) or rows != list(lengths):
             raise InputError(
                 f"the errors and {name} differ in length; give one array a record, one row a sample."
@@ -257,16 +266,16 @@ def _slopes(series: ErrorSeries, count: int) -> Array:
     return series.slopes_v[:, :count]
 
 
-def _between(halves: Array, horizons: Sequence[float], elapsed_s: Array) -> Array:
-    """(n,) of (n_horizons, n), interpolated at each sample's own time since the measurement."""
+def _interpolated_half_widths(half_widths: Array, horizons: Sequence[float], elapsed_s: Array) -> Array:
+    """(n,) V, half-widths (n_horizons, n) interpolated at each sample's own time since the measurement (n,) s."""
     finite = [horizon for horizon in horizons if math.isfinite(horizon)]
     if not finite:
-        return np.asarray(halves[0])
+        return np.asarray(half_widths[0])
     # Position of each sample on the list of horizons: in log time between two of them; past the last finite
     # one, ten times its length takes it to the whole drive.
-    knots = np.log([*finite, *([10 * finite[-1]] if len(finite) < len(halves) else [])])
-    place = np.interp(np.log(np.maximum(elapsed_s, finite[0])), knots, np.arange(len(knots)))
-    below = np.minimum(place.astype(int), len(knots) - 1)
+    knots = np.log([*finite, *([10 * finite[-1]] if len(finite) < len(half_widths) else [])])
+    position = np.interp(np.log(np.maximum(elapsed_s, finite[0])), knots, np.arange(len(knots)))
+    below = np.minimum(position.astype(int), len(knots) - 1)
     above = np.minimum(below + 1, len(knots) - 1)
-    share, row = place - below, np.arange(len(elapsed_s))
-    return np.asarray((1 - share) * halves[below, row] + share * halves[above, row])
+    share, row = position - below, np.arange(len(elapsed_s))
+    return np.asarray((1 - share) * half_widths[below, row] + share * half_widths[above, row])

@@ -27,8 +27,8 @@ fewer, all rows are used and the band is marked `extrapolated`; where all rows g
 figure of `aesi bench bands --set layouts='["one"]' --set cells=2` changes, since none of its bands comes near it."""
 MIN_ROWS = 30
 """Fewest rows of a piece. With 10 or 100 no figure of those splits changes."""
-FORGOTTEN = 100
-"""Errors this many horizons apart count as independent. A convention."""
+CORRELATED_HORIZONS = 100
+"""Errors this many horizons apart count as independent; nearer ones as correlated. A convention."""
 N_LEVELS = 101
 """Quantiles that stand for the scores of a piece: coverage is kept to about one per cent."""
 HALVINGS = 14
@@ -58,16 +58,16 @@ class HorizonBand:
         """(n,) V; columns : (n, p) of `local_scale.covariates`."""
         scales = np.array([scale(columns) for scale in self.scales])
         levels = np.linspace(0, 1, self.scores.shape[1])
-        own = np.array([np.interp(1 - self.alpha, levels, scores) for scores in self.scores])
+        quantiles = np.array([np.interp(1 - self.alpha, levels, scores) for scores in self.scores])
         # The quantile of a mixture lies between the quantiles of its parts.
-        low, high = (own[:, None] * scales).min(axis=0), (own[:, None] * scales).max(axis=0)
+        low, high = (quantiles[:, None] * scales).min(axis=0), (quantiles[:, None] * scales).max(axis=0)
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
-            reached = sum(
+            rows_within = sum(
                 count * np.interp(middle / scale, scores, levels)
                 for count, scale, scores in zip(self.counts, scales, self.scores, strict=True)
             )
-            enough = reached >= (1 - self.alpha) * self.counts.sum()
+            enough = rows_within >= (1 - self.alpha) * self.counts.sum()
             low, high = np.where(enough, low, middle), np.where(enough, middle, high)
         return self.widening * high
 
@@ -145,10 +145,10 @@ def calibrated_band(
     scales = [_scale(_apart_from(piece, pieces, horizon), alpha) for piece in pieces]
     scores = [piece.sizes / scale(piece.columns) for piece, scale in zip(pieces, scales, strict=True)]
     counts = np.array([float(score.size) for score in scores])
-    independent = float(np.maximum(1, counts * dt_s // (FORGOTTEN * horizon)).sum())
+    independent = float(np.maximum(1, counts * dt_s // (CORRELATED_HORIZONS * horizon)).sum())
     if stretches is not None and stretches >= MIN_PIECES and horizon == WHOLE_DRIVE:
         independent = stretches
-    everywhere = np.quantile(np.concatenate(scores), 1 - alpha, method="higher")
+    pooled_quantile = np.quantile(np.concatenate(scores), 1 - alpha, method="higher")
     return HorizonBand(
         horizon,
         alpha,
@@ -156,7 +156,7 @@ def calibrated_band(
         np.array([np.quantile(score, np.linspace(0, 1, N_LEVELS)) for score in scores]),
         counts,
         _widening(independent, alpha),
-        tuple(float(np.mean(score <= everywhere)) for score in scores),
+        tuple(float(np.mean(score <= pooled_quantile)) for score in scores),
         extrapolated,
     )
 

@@ -3,9 +3,9 @@
     [Q_t(alpha / 2), Q_t(1 - alpha / 2)],    Q_t a quantile regression forest of the residual on the `window` before it
 
 In the paper the forest is refitted at every step, which at 10 Hz takes longer than the drive. Here it is refitted every
-`REFIT` steps, at most `MOST_FORESTS` times per record, on the `MEMORY` windows of residuals before the step, at first
-those of the calibration. Rows in between are predicted from their own past. There is no factor on the width and no
-adaptive step. The method is for comparison in the tables of a run only; no saved model uses it.
+`REFIT` steps, at most `MOST_FORESTS` times per record, on the `HISTORY_WINDOWS` windows of residuals before the step,
+at first those of the calibration. Rows in between are predicted from their own past. There is no factor on the width
+and no adaptive step. The method is for comparison in the tables of a run only; no saved model uses it.
 
 Xu & Xie, ICML 2023, doi:10.48550/arXiv.2212.03463; Meinshausen, J. Mach. Learn. Res. 7 (2006) 983.
 """
@@ -28,13 +28,13 @@ NAME = "spci_refitted"
 REFIT = 500
 """Steps of the record between two forests; with MOST_FORESTS it bounds the time that a long record takes."""
 MOST_FORESTS = 40
-MEMORY = 10
+HISTORY_WINDOWS = 10
 """Residuals that a forest is grown on, in windows."""
 TREES = 10
 """Trees, as in Xu and Xie's algorithm 1. Their depth of two is replaced by a least number of residuals in a leaf."""
-LEAF = 10
+MIN_LEAF_RESIDUALS = 10
 """Residuals in a leaf, at least: a convention."""
-FEATURES = 1 / 3
+FEATURE_SHARE = 1 / 3
 """Share of the lags that a split may choose from, the usual one for regression."""
 
 
@@ -63,7 +63,9 @@ class RefittedForest:
         """
         self.check(alpha, window)
         records = checked_records(residuals)
-        parts = [part for one in records for part in np.split(one, np.flatnonzero(~np.isfinite(one)))]
+        parts = [
+            part for record in records for part in np.split(record, np.flatnonzero(~np.isfinite(record)))
+        ]
         runs = [part[np.isfinite(part)] for part in parts]  # each but a record's first begins with its gap
         longest = max(runs, key=len, default=np.empty(0))
         if len(longest) < 2 * window:
@@ -72,7 +74,7 @@ class RefittedForest:
                 "shorter window."
             )
         seed = int((rng or np.random.default_rng(0)).integers(2**31))
-        tail = longest[-MEMORY * window :]
+        tail = longest[-HISTORY_WINDOWS * window :]
         return RefittedIntervals(alpha, window, self.refit, tail, marginal_interval(records, alpha), seed)
 
 
@@ -101,19 +103,19 @@ class RefittedIntervals:
             rows = np.arange(start, min(start + step, n))
             rows = rows[np.isfinite(lags[rows]).all(axis=1)]
             if len(rows):
-                low[rows], high[rows] = self._forest(residuals[:start], start).quantiles(lags[rows])
+                low[rows], high[rows] = self._forest_at(residuals[:start], start).quantiles(lags[rows])
                 ready[rows] = True
         return Intervals(low, high, ready)
 
-    def _forest(self, seen: Array, start: int) -> _Forest:
+    def _forest_at(self, seen: Array, start: int) -> _Forest:
         """A forest on the last residuals before a step that follow a window without a gap.
 
         Where the record is still short, it is extended to the front by the calibration residuals.
         """
         known = np.concatenate([self.before_v, seen])
         windows = sliding_window_view(known, self.window + 1)
-        whole = windows[np.isfinite(windows).all(axis=1)][-(MEMORY - 1) * self.window :]
-        return _Forest.grown(whole[:, :-1], whole[:, -1], self.alpha, self.seed + start)
+        without_gap = windows[np.isfinite(windows).all(axis=1)][-(HISTORY_WINDOWS - 1) * self.window :]
+        return _Forest.grown(without_gap[:, :-1], without_gap[:, -1], self.alpha, self.seed + start)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,8 +131,8 @@ class _Forest:
 
         forest = RandomForestQuantileRegressor(
             TREES,
-            min_samples_leaf=LEAF,
-            max_features=FEATURES,
+            min_samples_leaf=MIN_LEAF_RESIDUALS,
+            max_features=FEATURE_SHARE,
             max_samples_leaf=None,  # its default keeps one sample a leaf, and the bands cover far too little
             random_state=seed % 2**31,
         )

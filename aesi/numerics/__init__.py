@@ -1,6 +1,6 @@
-"""Arrays in, arrays out: numpy, scipy and numba only; nothing here knows a cell or a flow. `visited` is about states of
-charge and temperatures all the same, as more than one room asks where rows have been.
+"""Arrays in, arrays out: numpy, scipy and numba only; nothing here knows a cell or a flow. The exception is `visited`,
+states of charge and temperatures of fitted rows, which the sparse correction and its bands both need.
 
-`compiled` and `cache_folder` say where machine code and made data are kept, `files` writes and reads whole files;
-nothing else knows one. `cache_folder` takes the place of made data from pooch.
+Only `compiled` and `files` know files: where machine code and generated data are kept, and how a file is written whole.
+The folder of generated data is pooch's.
 """

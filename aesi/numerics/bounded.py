@@ -3,8 +3,8 @@
 A step is the minimum of the damped quadratic model within the box. Slopes by finite differences cost one simulation per
 coordinate, a step one: after each step the slopes are updated (Broyden, Math. Comp. 19 (1965) 577) as long as that
 reduces the cost, and only then computed again.
-A place where the residual jumps, or beyond which it has no value, is a wall: a coordinate that cannot pass it stays on
-its side, as at an end of the box, and the others continue. So is a place where a slope changes its sign.
+A point where the residual jumps, or beyond which it has no value, is a wall: a coordinate that cannot pass it stays on
+its side, as at an end of the box, and the others continue. So is a point where a slope changes its sign.
 Nocedal & Wright, Numerical Optimization, 2nd ed. (2006), chapters 10, 11 and 16.
 """
 
@@ -55,7 +55,7 @@ class Minimum:
 
 
 @dataclass(frozen=True, eq=False)
-class _Place:
+class _Point:
     """x (n,), and residual (m,) and slopes (m, n) there, computed or updated."""
 
     x: Array
@@ -88,54 +88,54 @@ def descend(
         return Minimum(x, np.inf, 0, False, x)
     damping = DAMPING
     if slopes is not None:
-        near = _Place(x, residual, slopes)
-        here, damping = _broyden_steps(model, near, low, high, tolerance, damping, fresh=False)
-        x, residual = here.x, here.residual
+        near = _Point(x, residual, slopes)
+        last, damping = _broyden_steps(model, near, low, high, tolerance, damping, fresh=False)
+        x, residual = last.x, last.residual
     for done in range(rounds):
-        taken = model.slopes(x, residual)
-        if taken is None or not np.isfinite(taken).all():
+        computed_slopes = model.slopes(x, residual)
+        if computed_slopes is None or not np.isfinite(computed_slopes).all():
             return Minimum(x, _half_square(residual), done, False, x)
-        start = _Place(x, residual, taken)
-        here, damping = _broyden_steps(model, start, low, high, tolerance, damping, fresh=True)
-        if start.cost - here.cost < tolerance:
-            walled = _within_walls(model, start, low, high, tolerance)
-            if walled is not None:
-                low, high = walled
-                here, damping = _broyden_steps(model, start, low, high, tolerance, DAMPING, fresh=True)
-        x, residual = here.x, here.residual
-        if start.cost - here.cost < tolerance:
-            return Minimum(x, here.cost, done + 1, True, start.x)
+        start = _Point(x, residual, computed_slopes)
+        last, damping = _broyden_steps(model, start, low, high, tolerance, damping, fresh=True)
+        if start.cost - last.cost < tolerance:
+            limited_box = _within_walls(model, start, low, high, tolerance)
+            if limited_box is not None:
+                low, high = limited_box
+                last, damping = _broyden_steps(model, start, low, high, tolerance, DAMPING, fresh=True)
+        x, residual = last.x, last.residual
+        if start.cost - last.cost < tolerance:
+            return Minimum(x, last.cost, done + 1, True, start.x)
     return Minimum(x, _half_square(residual), rounds, False, x)
 
 
 def foreseen_cost(x: Array, residual: Array, slopes: Array, low: Array, high: Array) -> float:
     """Half the sum of squares after one step within the box, with the residual to first order."""
-    here = _Place(x, residual, slopes)
+    here = _Point(x, residual, slopes)
     step = _step(here, low, high, DAMPING)
     return _half_square(residual + slopes @ step)
 
 
 def _broyden_steps(
-    model: Residual, here: _Place, low: Array, high: Array, tolerance: float, damping: float, fresh: bool
-) -> tuple[_Place, float]:
-    """(last place, damping) after steps with the slopes of a place and then with their updates, while the cost falls.
+    model: Residual, here: _Point, low: Array, high: Array, tolerance: float, damping: float, fresh: bool
+) -> tuple[_Point, float]:
+    """(last point, damping) after steps with the slopes of a point and then with their updates, while the cost falls.
 
-    fresh : True where the slopes were computed at this place.
+    fresh : True where the slopes were computed at this point.
     """
     for _ in range(1 + len(here.x)):
-        there, damping = _accepted_step(model, here, low, high, tolerance, damping, fresh)
-        if there is None:
+        accepted, damping = _accepted_step(model, here, low, high, tolerance, damping, fresh)
+        if accepted is None:
             return here, damping
-        gain, here, fresh = here.cost - there.cost, there, False
+        gain, here, fresh = here.cost - accepted.cost, accepted, False
         if gain < tolerance:
             break
     return here, damping
 
 
 def _accepted_step(
-    model: Residual, here: _Place, low: Array, high: Array, tolerance: float, damping: float, fresh: bool
-) -> tuple[_Place | None, float]:
-    """(place after one step that reduces the cost, with updated slopes, or None; damping for the next step).
+    model: Residual, here: _Point, low: Array, high: Array, tolerance: float, damping: float, fresh: bool
+) -> tuple[_Point | None, float]:
+    """(point after one step that reduces the cost, with updated slopes, or None; damping for the next step).
 
     A step that does not is repeated with a damping eight times as strong, until it promises less than the tolerance;
     such a step is tried once, and only with slopes computed here. Where those are right some step reduces the cost,
@@ -153,15 +153,15 @@ def _accepted_step(
         residual = model.residual(x)
         if residual is not None and _half_square(residual) < here.cost:
             slopes = here.slopes + np.outer(residual - foreseen, step / (step @ step))
-            return _Place(x, residual, slopes), max(damping / 5.0, 1e-6)
+            return _Point(x, residual, slopes), max(damping / 5.0, 1e-6)
         damping *= STRONGER
     return None, damping
 
 
 def _within_walls(
-    model: Residual, here: _Place, low: Array, high: Array, tolerance: float
+    model: Residual, here: _Point, low: Array, high: Array, tolerance: float
 ) -> tuple[Array, Array] | None:
-    """(low, high) of the box limited by walls at x, for a place where no step achieves the reduction that its slopes
+    """(low, high) of the box limited by walls at x, for a point where no step achieves the reduction that its slopes
     promise; None where they promise less than the tolerance, or there is no wall.
 
     A wall is found where a coordinate alone, in the shortest step that promises the tolerance, ends with a cost more
@@ -186,11 +186,11 @@ def _within_walls(
     return (low, high) if found else None
 
 
-def _step(here: _Place, low: Array, high: Array, damping: float) -> Array:
+def _step(here: _Point, low: Array, high: Array, damping: float) -> Array:
     """(n,) damped Gauss-Newton step: the minimum of the damped quadratic model within the box."""
     room = low < high  # False where a wall is at an end of the box
     if not room.all():
-        out, free = np.zeros(len(here.x)), _Place(here.x[room], here.residual, here.slopes[:, room])
+        out, free = np.zeros(len(here.x)), _Point(here.x[room], here.residual, here.slopes[:, room])
         out[room] = _step(free, low[room], high[room], damping) if room.any() else 0.0
         return out
     gradient = here.slopes.T @ here.residual
@@ -243,7 +243,7 @@ def slope_within(
     for h in (size, -size) if x[j] + size <= high else (-size, size):
         moved = x.copy()
         moved[j] += h
-        there = function(moved) if low <= moved[j] <= high else None
-        if there is not None:
-            return (there - here) / h
+        value = function(moved) if low <= moved[j] <= high else None
+        if value is not None:
+            return (value - here) / h
     return None

@@ -24,7 +24,7 @@ from numba import njit
 from numba.core import event
 
 from aesi.numerics.files.cache_folder import cache_folder
-from aesi.numerics.files.first_use import compiling
+from aesi.numerics.files.first_use import report_compilation
 
 SETTINGS: Any = numba.config
 CHOOSING = threading.Lock()
@@ -39,7 +39,7 @@ class _Compiling(event.Listener):
     """Listener for numba's compilations; code loaded from disk does not count as one."""
 
     def on_start(self, event: Any) -> None:
-        compiling()
+        report_compilation()
 
     def on_end(self, event: Any) -> None:
         pass
@@ -73,16 +73,16 @@ def sources(source: Path) -> set[Path]:
     """All files that determine the code compiled from `source`: itself, its imports from this package, recursively
     through files with compiled functions, and the layouts beside those, whose named tuples are in signatures."""
     found: set[Path] = set()
-    ahead = {source.resolve()}
-    while ahead:
-        file = ahead.pop()
+    pending = {source.resolve()}
+    while pending:
+        file = pending.pop()
         found.add(file)
-        ahead |= _asked_by(file) - found
+        pending |= _direct_sources(file) - found
     return found
 
 
 @cache
-def _asked_by(file: Path) -> frozenset[Path]:
+def _direct_sources(file: Path) -> frozenset[Path]:
     """Imports from this package of a file with compiled functions, and the layouts beside it; empty for other files."""
     text = _text(file)
     if not COMPILED.search(text):
@@ -97,6 +97,7 @@ def _text(file: Path) -> bytes:
 
 
 def _file_of(module: str) -> Path:
+    """The file of a module of this package, such as `aesi.numerics.blocks`."""
     path = ROOT.joinpath(*module.split("."))
     return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
 

@@ -33,6 +33,7 @@ def _smoothed_loss(residual: Array, tau: float, h: float) -> float:
 
 
 def _newton(x: Array, y: Array, tau: float, h: float, b: Array) -> Array:
+    """(p,) minimum of the smoothed loss, by Newton's method from b (p,)."""
     n = len(y)
     residual = y - x @ b
     loss = _smoothed_loss(residual, tau, h)
@@ -55,6 +56,8 @@ def _newton(x: Array, y: Array, tau: float, h: float, b: Array) -> Array:
 def _line_search(
     x: Array, y: Array, tau: float, h: float, b: Array, step: Array, loss: float, decrease: float
 ) -> tuple[Array, Array, float, bool]:
+    """(coefficients (p,), residual (n,), loss there, whether a step was taken): the step is halved until the loss falls
+    enough (Armijo).  decrease : of the loss along the whole step, to first order."""
     length = 1.0
     for _ in range(30):
         trial = b + length * step

@@ -7,12 +7,12 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
-Given = TypeVar("Given")
-Made = TypeVar("Made")
+Argument = TypeVar("Argument")
+Returned = TypeVar("Returned")
 
 
-def side_by_side(do: Callable[[Given], Made], items: Iterable[Given]) -> Iterator[Made]:
-    """Yield `do(item)` for each item, in the order given, so that results do not depend on the number of threads. Calls
-    that have not begun are cancelled when the caller stops iterating."""
+def side_by_side(function: Callable[[Argument], Returned], items: Iterable[Argument]) -> Iterator[Returned]:
+    """Yield `function(item)` for each item, in the order given, so that results do not depend on the number of threads.
+    Calls that have not begun are cancelled when the caller stops iterating."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        yield from pool.map(do, items)
+        yield from pool.map(function, items)

@@ -50,21 +50,23 @@ def weighted_grams(rows: Array, weights: CountArray) -> Array:
     for gram, weight, smallest in zip(grams, weights, by_cell, strict=True):
         extra = weight.copy()
         extra[:whole] -= np.repeat(smallest, CELL)
-        some = np.flatnonzero(extra)
-        if len(some):
-            scaled = rows[some]
-            scaled *= np.sqrt(extra[some].astype(float))[:, None]
+        extra_rows = np.flatnonzero(extra)
+        if len(extra_rows):
+            scaled = rows[extra_rows]
+            scaled *= np.sqrt(extra[extra_rows].astype(float))[:, None]
             gram += np.triu(dsyrk(1.0, scaled.T, lower=0))  # dsyrk leaves memory below the diagonal undefined
         gram[lower] = gram.T[lower]
     return grams
 
 
 def _upper_columns(cells: Array, by_cell: Array, start: int, stop: int) -> Array:
+    """(resamples, stop, stop - start): these columns, down to row stop, of the Gram matrices of the cells,
+    (n_cells, CELL, m), summed with the weights by_cell (resamples, n_cells)."""
     total = np.zeros((len(by_cell), stop * (stop - start)))
     for a in range(0, len(cells), _CELLS_AT_ONCE):
-        some = cells[a : a + _CELLS_AT_ONCE]
-        products = np.matmul(some[:, :, :stop].transpose(0, 2, 1), some[:, :, start:stop])
-        total += by_cell[:, a : a + _CELLS_AT_ONCE] @ products.reshape(len(some), -1)
+        block = cells[a : a + _CELLS_AT_ONCE]
+        products = np.matmul(block[:, :, :stop].transpose(0, 2, 1), block[:, :, start:stop])
+        total += by_cell[:, a : a + _CELLS_AT_ONCE] @ products.reshape(len(block), -1)
     return total.reshape(len(by_cell), stop, stop - start)
 
 

@@ -29,6 +29,8 @@ ROW, CALIBRATED = "row.json", "calibrated.bpx.json"
 """Further files for a cell of a batch: its row of the summary, and the cell of a check-up."""
 SUMMARY_TABLE, SUMMARY_PAGE = "summary.csv", "index.html"
 """Files of a batch."""
+BATCH_SUMMARIES = (SUMMARY_TABLE, SUMMARY, SUMMARY_PAGE)
+"""Files of a batch beside the folders of its cells, which are called by their names."""
 CANDIDATE = "candidate.json"
 """File of a rebuilt candidate, beside its model: its genome and its figures, then and now."""
 EXPERIMENT, COMPARISON, COEFFICIENTS = "experiment.json", "comparison.json", "coefficients.json"
@@ -55,4 +57,4 @@ def batch_files(out: Path, names: Iterable[str]) -> tuple[Path, ...]:
         for folder in (out / name for name in names)
         for file in (folder / ROW, *discovery_files(folder), *calibration_files(folder / CALIBRATED))
     )
-    return out / SUMMARY_TABLE, out / SUMMARY, out / SUMMARY_PAGE, *of_cells
+    return *(out / name for name in BATCH_SUMMARIES), *of_cells

@@ -38,8 +38,11 @@ from aesi.numerics.typing import Array, IntArray
 from aesi.sparse.trained_region import TrainedRegion
 
 KAPPA = 0.1
+"""Weight of the excess leverage in (1)."""
 SE = 1.0
+"""Standard errors of a normal distribution that are subtracted from the slope, the level of t in (2)."""
 DOUBT = 0.03
+"""Ridge on the slope in (2), as a share of the squared error of a drive."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,10 +87,10 @@ def amplitude(
         (w @ e**2, w @ (e * c), w @ c**2)
         for e, c, w in ((error[a:b], correction[a:b], weights[a:b]) for a, b in folds)
     ]
-    return shrunken(np.array(sums), drives)
+    return shrunken_slope(np.array(sums), drives)
 
 
-def shrunken(sums: Array, drives: IntArray) -> float:
+def shrunken_slope(sums: Array, drives: IntArray) -> float:
     """a of (2) from (n_folds, 3) sums of e**2, e n c and (n c)**2; 0 where these do not determine it.
 
     drives : (n_folds,) number of the drive of each fold; with a single drive its folds count as drives. A single fold
@@ -95,16 +98,19 @@ def shrunken(sums: Array, drives: IntArray) -> float:
     """
     if not np.isfinite(sums).all() or not sums[:, 2].sum() > 0.0:
         return 0.0
-    names = np.unique(drives)
-    each = sums if len(names) == 1 else np.array([sums[drives == name].sum(axis=0) for name in names])
-    n, total = len(each), each.sum(axis=0)
+    numbers = np.unique(drives)
+    by_drive = (
+        sums if len(numbers) == 1 else np.array([sums[drives == number].sum(axis=0) for number in numbers])
+    )
+    n_drives, total = len(by_drive), by_drive.sum(axis=0)
     slope = _slope(total[None, :])[0]
-    if n == 1:
+    if n_drives == 1:
         return float(np.clip(slope, 0.0, 1.0))
-    slopes = _slope(total - each)
-    scatter = float(np.sqrt((n - 1) / n * np.sum((slopes - slopes.mean()) ** 2)))
-    return float(np.clip(slope - stdtrit(n - 1, ndtr(SE)) * scatter, 0.0, 1.0))
+    slopes = _slope(total - by_drive)
+    scatter = float(np.sqrt((n_drives - 1) / n_drives * np.sum((slopes - slopes.mean()) ** 2)))
+    return float(np.clip(slope - stdtrit(n_drives - 1, ndtr(SE)) * scatter, 0.0, 1.0))
 
 
 def _slope(sums: Array) -> Array:
+    """(n,) b of (2) from (n, 3) sums of e**2, e n c and (n c)**2."""
     return np.asarray(sums[:, 1] / (sums[:, 2] + DOUBT * sums[:, 0]))

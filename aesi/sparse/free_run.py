@@ -18,7 +18,9 @@ LIMIT = 10.0
 
 
 @kept_njit()
-def run_one(drive: Array, functions: IntArray, start: float, clip: bool, limit: float) -> tuple[Array, int]:
+def run_with_feedback(
+    drive: Array, functions: IntArray, start: float, clip: bool, limit: float
+) -> tuple[Array, int]:
     """One model along one record, in scaled error.
 
     drive : (n_functions, n), g_q at each sample.  Returns (n,) predictions of samples 1 to n, and the index
@@ -29,19 +31,19 @@ def run_one(drive: Array, functions: IntArray, start: float, clip: bool, limit: 
     x = start
     for k in range(n):
         inside = min(1.0, max(-1.0, x)) if clip else x
-        following = 0.0
+        predicted = 0.0
         for q in range(len(functions)):
-            following += value(functions[q], inside) * drive[q, k]
-        if not abs(following) <= limit:
+            predicted += value(functions[q], inside) * drive[q, k]
+        if not abs(predicted) <= limit:
             out[k:] = x
             return out, k
-        x = following
+        x = predicted
         out[k] = x
     return out, -1
 
 
 @kept_njit()
-def run_many(
+def run_ensemble(
     drive: Array, functions: IntArray, measured: Array, restart: BoolArray, state: Array, clip: bool
 ) -> Array:
     """Several models along the same rows, each piece started from its measured error.
@@ -65,21 +67,23 @@ def run_many(
             for q in functions:
                 for j in range(models):
                     at[q, j] = value(q, state[j])
-        following = out[k]
-        following[:] = 0.0
+        predicted = out[k]
+        predicted[:] = 0.0
         for i in range(len(functions)):
             values, weights = at[functions[i]], drive[i, k]
             for j in range(models):
-                following[j] += values[j] * weights[j]
+                predicted[j] += values[j] * weights[j]
         for j in range(models):
-            if not (abs(state[j]) <= LIMIT and abs(following[j]) <= LIMIT):
-                following[j] = np.inf
-            state[j] = following[j]
+            if not (abs(state[j]) <= LIMIT and abs(predicted[j]) <= LIMIT):
+                predicted[j] = np.inf
+            state[j] = predicted[j]
     return out
 
 
 @kept_njit()
-def ahead(drive: Array, functions: IntArray, measured: Array, steps: int, clip: bool, limit: float) -> Array:
+def ahead_with_feedback(
+    drive: Array, functions: IntArray, measured: Array, steps: int, clip: bool, limit: float
+) -> Array:
     """Predictions `steps` samples ahead of each measured error.
 
     Returns (n,): entry k predicts sample k + 1 from the measured sample max(0, k + 1 - steps).
@@ -91,34 +95,38 @@ def ahead(drive: Array, functions: IntArray, measured: Array, steps: int, clip: 
         x = measured[first]
         for i in range(first, k + 1):
             inside = min(1.0, max(-1.0, x)) if clip else x
-            following = 0.0
+            predicted = 0.0
             for q in range(len(functions)):
-                following += value(functions[q], inside) * drive[q, i]
-            if not abs(following) <= limit:
+                predicted += value(functions[q], inside) * drive[q, i]
+            if not abs(predicted) <= limit:
                 break
-            x = following
+            x = predicted
         out[k] = x
     return out
 
 
-def remember(given: Array, memory: float, start: float) -> Array:
-    """(n,) free run of a model without feedback: the prediction by the inputs plus the decaying first error.
+def autoregressive_run(by_inputs: Array, memory: float, start: float) -> Array:
+    """(n,) free run of a model without feedback: the prediction by the inputs, and the first residual, which decays.
 
-    given : (n,) g(U[k]), the prediction of sample k + 1 by the inputs alone.  start : the error at sample 0.
+    by_inputs : (n,) scaled g(U[k]), the prediction of sample k + 1 by the inputs alone.  memory : share of a residual
+    that is left after a step, 0 to 1.  start : scaled error at sample 0.
     """
-    return np.asarray(given + memory ** np.arange(1, len(given) + 1) * (start - given[:1]))
+    return np.asarray(by_inputs + memory ** np.arange(1, len(by_inputs) + 1) * (start - by_inputs[:1]))
 
 
-def remember_ahead(given: Array, memory: float, measured: Array, steps: int) -> Array:
-    """(n,) as `ahead`, for a model without feedback."""
-    n = len(given)
-    left = measured[:n] - np.append(given[:1], given[:-1])
+def autoregressive_ahead(by_inputs: Array, memory: float, measured: Array, steps: int) -> Array:
+    """(n,) as `ahead_with_feedback`, for a model without feedback.
+
+    by_inputs, memory : as for `autoregressive_run`.  measured : (n or more,) scaled errors from sample 0 on.
+    """
+    n = len(by_inputs)
+    residual = measured[:n] - np.append(by_inputs[:1], by_inputs[:-1])
     samples = np.arange(1, n + 1)
-    known = np.maximum(samples - steps, 0)
-    return np.asarray(given + memory ** (samples - known) * left[known])
+    start = np.maximum(samples - steps, 0)
+    return np.asarray(by_inputs + memory ** (samples - start) * residual[start])
 
 
-def held(scaled: Array, start: float) -> tuple[Array, int]:
+def held_at_divergence(scaled: Array, start: float) -> tuple[Array, int]:
     """(series with the last value within LIMIT held from the first value beyond it on, index of that one or -1).
 
     start : the value before the series.

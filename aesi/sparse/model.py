@@ -84,7 +84,7 @@ class SparseModel:
     @property
     def has_feedback(self) -> bool:
         """Whether any term holds the error."""
-        return bool(self._functions.any())
+        return bool(self._error_functions.any())
 
     def one_step(self, series: ErrorSeries) -> Array:
         """(n,) V: the prediction of error_v[k] given error_v[k - 1]; the first is the measured error_v[0]."""
@@ -97,20 +97,20 @@ class SparseModel:
         """
         start_v = float(series.error_v[0]) if error0_v is None else error0_v
         variables = self._variables(series)
-        error_v, diverged = self._freely(self._drive(variables, series), start_v)
+        error_v, diverged = self._free_run_from(self._drive(variables, series), start_v)
         variables[:, 0] = error_v
         return FreeRun(
             error_v,
             None if diverged < 0 else diverged + 1,
             self.scaling.is_outside(variables),
-            self._excess(variables),
+            self._leverage_excess(variables),
         )
 
     def k_step(self, series: ErrorSeries, steps: int) -> Array:
         """(n,) V: the prediction of error_v[k] given error_v[k - steps]; the first ones from error_v[0]."""
         if steps < 1:
             raise DataError(f"{self.name}: a prediction {steps} steps ahead is none; give at least 1.")
-        return self._ahead(self._drive(self._variables(series), series), series.error_v, steps)
+        return self._predicted_ahead(self._drive(self._variables(series), series), series.error_v, steps)
 
     def reach(self, series: ErrorSeries, steps: int | None = None, error0_v: float | None = None) -> Array:
         """(n,) V, >= 0: change of the prediction if inputs were not held at the edge of their trained range, but the
@@ -119,15 +119,17 @@ class SparseModel:
         steps : for a prediction so many samples ahead (`k_step`); None for a `free_run`.  error0_v : as there.
         """
         variables = self._variables(series)
-        further = self.scaling.cut_off(variables)
-        if not further[:, 1:].any():
+        overshoot = self.scaling.cut_off(variables)
+        if not overshoot[:, 1:].any():
             return np.zeros(len(series))
         start_v = float(series.error_v[0]) if error0_v is None else error0_v
-        held, gone_on = (
-            self._freely(drive, start_v)[0] if steps is None else self._ahead(drive, series.error_v, steps)
-            for drive in (self._drive(variables, series), self._drive(variables, series, further))
+        held, extrapolated = (
+            self._free_run_from(drive, start_v)[0]
+            if steps is None
+            else self._predicted_ahead(drive, series.error_v, steps)
+            for drive in (self._drive(variables, series), self._drive(variables, series, overshoot))
         )
-        return np.abs(gone_on - held)
+        return np.abs(extrapolated - held)
 
     def outside(self, series: ErrorSeries) -> BoolArray:
         """(n,) True where an input or the measured error lies outside the trained range."""
@@ -137,7 +139,7 @@ class SparseModel:
         """(n,) share of the correction that is applied along a record, w of fade.py; 1 where it does not fade."""
         if self.fade is None:
             return np.ones(len(series))
-        return self.fade.kept(*self._place(self._variables(series), series))
+        return self.fade.kept(*self._fade_inputs(self._variables(series), series))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, and an array in the leverage. Terms are given by their factors (variable, function) and, for
@@ -189,7 +191,7 @@ class SparseModel:
         return self.scaling.outside == "clip"
 
     @cached_property
-    def _functions(self) -> IntArray:
+    def _error_functions(self) -> IntArray:
         return np.unique(self.library.feedbacks)
 
     def _variables(self, series: ErrorSeries) -> Array:
@@ -200,61 +202,64 @@ class SparseModel:
             )
         return np.column_stack([series.error_v, with_inputs(series, self.input_names).inputs])
 
-    def _excess(self, variables: Array) -> Array | None:
+    def _leverage_excess(self, variables: Array) -> Array | None:
         if self.leverage is None:
             return None
         return self.leverage.excess(evaluate_terms(self.library.terms, self.scaling.apply(variables)))
 
-    def _freely(self, drive: Array, start_v: float) -> tuple[Array, int]:
+    def _free_run_from(self, drive: Array, start_v: float) -> tuple[Array, int]:
         """(free run (n,) V, index at which the scaled run diverged or -1).  start_v : initial error, V; NaN where it is
         not known."""
-        start = self._unmeasured_v(drive) if np.isnan(start_v) else start_v
+        start = self._start_by_inputs_v(drive) if np.isnan(start_v) else start_v
         scaled0 = float(self.scaling.error_to_scaled(np.array(start)))
         if self.has_feedback:
-            scaled, diverged = free_run.run_one(
-                drive[:, :-1], self._functions, scaled0, self._clip, free_run.LIMIT
+            scaled, diverged = free_run.run_with_feedback(
+                drive[:, :-1], self._error_functions, scaled0, self._clip, free_run.LIMIT
             )
         else:
-            scaled, diverged = free_run.held(free_run.remember(drive[0, :-1], self.memory, scaled0), scaled0)
+            scaled, diverged = free_run.held_at_divergence(
+                free_run.autoregressive_run(drive[0, :-1], self.memory, scaled0), scaled0
+            )
         return np.append(start, self.scaling.error_to_volts(scaled)), diverged
 
-    def _unmeasured_v(self, drive: Array) -> float:
+    def _start_by_inputs_v(self, drive: Array) -> float:
         """The error at the first sample of a record without a measured error, V."""
         return 0.0 if self.has_feedback else float(self.scaling.error_to_volts(drive[0, :1])[0])
 
-    def _ahead(self, drive: Array, error_v: Array, steps: int) -> Array:
-        """(n,) V, each from the measured error `steps` samples earlier."""
+    def _predicted_ahead(self, drive: Array, error_v: Array, steps: int) -> Array:
+        """(n,) V, each predicted from the measured error `steps` samples earlier."""
         measured = self.scaling.error_to_scaled(error_v)
         if self.has_feedback:
-            scaled = free_run.ahead(
-                drive[:, :-1], self._functions, measured, steps, self._clip, free_run.LIMIT
+            scaled = free_run.ahead_with_feedback(
+                drive[:, :-1], self._error_functions, measured, steps, self._clip, free_run.LIMIT
             )
         else:
-            scaled = free_run.remember_ahead(drive[0, :-1], self.memory, measured, steps)
+            scaled = free_run.autoregressive_ahead(drive[0, :-1], self.memory, measured, steps)
         return np.append(error_v[:1], self.scaling.error_to_volts(scaled))
 
-    def _drive(self, variables: Array, series: ErrorSeries, further: Array | None = None) -> Array:
-        """(n_functions, n): for each function of the error, the sum of its terms' input parts.  further : (n,
-        n_variables) distance by which the functions are continued along their slopes."""
+    def _drive(self, variables: Array, series: ErrorSeries, overshoot: Array | None = None) -> Array:
+        """(n_functions, n): for each function of the error, the sum of its terms' input parts.  overshoot : as for
+        `evaluate_terms`."""
         products = evaluate_terms(
-            [term.without_error() for term in self.library.terms], self.scaling.apply(variables), further
+            [term.without_error() for term in self.library.terms], self.scaling.apply(variables), overshoot
         )
         drive = np.stack(
             [
-                self.coefficients[mine] @ products[mine]
-                for mine in (self.library.feedbacks == q for q in self._functions)
+                self.coefficients[of_function] @ products[of_function]
+                for of_function in (self.library.feedbacks == q for q in self._error_functions)
             ]
         )
-        return drive if self.fade is None else self._weight(variables, series) * drive
+        return drive if self.fade is None else self._fade_weight(variables, series) * drive
 
-    def _weight(self, variables: Array, series: ErrorSeries) -> Array:
+    def _fade_weight(self, variables: Array, series: ErrorSeries) -> Array:
         """(n,) weight of the correction, a w of fade.py."""
         assert self.fade is not None
-        return self.fade.weight(*self._place(variables, series))
+        return self.fade.weight(*self._fade_inputs(variables, series))
 
-    def _place(
+    def _fade_inputs(
         self, variables: Array, series: ErrorSeries
     ) -> tuple[Array, Array, Array | None, Array | None]:
-        """The arguments of `Fade.weight` for each row."""
-        unheld = self.scaling.apply(variables) + self.scaling.cut_off(variables)
-        return unheld[:, 1:], series.soc, series.temperature_degc, self._excess(variables)
+        """The arguments of `Fade.weight` for each row: inputs that are not clipped, state of charge, temperature in
+        degC, and excess leverage."""
+        not_clipped = self.scaling.apply(variables) + self.scaling.cut_off(variables)
+        return not_clipped[:, 1:], series.soc, series.temperature_degc, self._leverage_excess(variables)

@@ -22,11 +22,12 @@ class Bare:
 
     def free_run(self, series: ErrorSeries, error0_v: float | None = None) -> FreeRun:
         """The difference of its voltage to that of the series; without a trained range no sample is outside."""
-        return FreeRun(self._beyond(series), None, np.zeros(len(series), dtype=bool))
+        return FreeRun(self._voltage_difference_v(series), None, np.zeros(len(series), dtype=bool))
 
     def k_step(self, series: ErrorSeries, steps: int) -> Array:
         """(n,) V, as `one_step`."""
-        return np.append(series.error_v[:1], self._beyond(series)[1:])
+        return np.append(series.error_v[:1], self._voltage_difference_v(series)[1:])
 
-    def _beyond(self, series: ErrorSeries) -> Array:
+    def _voltage_difference_v(self, series: ErrorSeries) -> Array:
+        """(n,) V, voltage of this model minus that of the series' own."""
         return series.error_v - series.left_by(self.name)

@@ -64,7 +64,8 @@ def tracked(cases: Cases, workers: int = 1, address: str | None = None) -> Itera
     environment.prepare_process()
     digest = sha256(repr(cases.specs).encode()).hexdigest()[:16]
     quiet = TrackingConfig(system_metrics=False, log_model=False)
-    subject, title = Subject(cases.name, cases.seed, digest, quiet), f"{cases.name}, seed {cases.seed}"
+    subject = Subject(cases.name, cases.seed, digest, "benchmark", quiet)
+    title = f"{cases.name}, seed {cases.seed}"
     rows = []
     with tracked_job(subject, title, Console()) as tracker:
         if tracker is not None:

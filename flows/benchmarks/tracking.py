@@ -140,7 +140,7 @@ def _tracker() -> Iterator[Any]:
 
     settings = TrackingConfig(system_metrics=False, log_model=False)
     store = Store(f"sqlite:///{Path(os.environ['AESI_HOME']) / 'mlflow.db'}")
-    tracker = Tracker(store, Subject("benchmark", 0, "benchmark", settings), lambda text: None)
+    tracker = Tracker(store, Subject("benchmark", 0, "benchmark", "benchmark", settings), lambda text: None)
     try:
         yield tracker
     finally:

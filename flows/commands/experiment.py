@@ -33,8 +33,8 @@ def run(
     address: Annotated[
         str | None,
         typer.Option(
-            help="Address of the Dask scheduler, such as tcp://HOST:8786. Default: that of the experiment file, else a "
-            "cluster on this machine."
+            help="Address of the Dask scheduler, such as tcp://HOST:8786, with --runner dask or with runner.kind: dask "
+            "in the experiment file. Default: that of the experiment file, else a cluster on this machine."
         ),
     ] = None,
     resume: Annotated[

@@ -12,7 +12,7 @@ from pathlib import Path
 from aesi.errors import InputError
 from aesi.numerics.files.whole import check_writable
 from aesi.pipeline.product.contents import effect_files
-from aesi.pipeline.written import ARRAYS, HEAD, MODEL, SUMMARY
+from aesi.pipeline.written import ARRAYS, HEAD, MODEL, SUMMARY, SUMMARY_TABLE
 
 PAGES = (".html", ".htm")
 OTHER_FORMATS = (
@@ -84,7 +84,8 @@ def check_folder(
                 f"{option} {out}: {lost}, which is written there, is a file that is read, and would be lost; name "
                 "another folder."
             )
-        if (out / SUMMARY).is_file() and (out / MODEL).is_dir():
+        of_batch = (out / SUMMARY_TABLE).is_file()  # there `model` is the folder of a cell of that name
+        if (out / SUMMARY).is_file() and (out / MODEL).is_dir() and not of_batch:
             raise InputError(
                 f"{option} {out} holds the results of a run ({SUMMARY}), whose model would be lost; name another "
                 "folder."

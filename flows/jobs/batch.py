@@ -93,7 +93,8 @@ def _tracked(
 
     key = sha256("".join(job.name for job in jobs).encode()).hexdigest()[:16]
     quiet = TrackingConfig(system_metrics=False, log_model=False)
-    with tracked_job(Subject("batch", settings.seed, key, quiet), source.name, console) as tracker:
+    subject = Subject("batch", settings.seed, key, "batch", quiet)
+    with tracked_job(subject, source.name, console) as tracker:
         if tracker is not None:
             tracker.parameters({"source": source.name, "cells": len(jobs), "holdout": settings.holdout})
         yield tracker

@@ -159,7 +159,7 @@ def _subject(case: Case, under: TrackedUnder) -> Subject:
 
     fitted = (*case.measurements, *case.good)
     key = digest(*(m.time_s for m in fitted), *(m.voltage_v for m in fitted))
-    return Subject(under.name, case.seed, key, under.tracking)
+    return Subject(under.name, case.seed, key, "discovery", under.tracking)
 
 
 def _run_id(tracker: Tracker | None) -> str:

@@ -45,7 +45,7 @@ def run_experiment(request: RunRequest, run: Stages, console: Console) -> Path:
 
 def _uri_option(uri: str | None) -> str:
     """What finds the store of an experiment that names one, as a shell takes it; without the login in it."""
-    from flows.tracking.store import without_login
+    from flows.base.store_address import without_login
 
     return f" --uri {shlex.quote(without_login(uri))}" if uri else ""
 

@@ -32,12 +32,13 @@ class RunRequest:
         config = read_experiment(self.path, self.overrides)
         if self.runner is None and self.address is None:
             return config
-        if self.runner == "local" and self.address is not None:
-            raise InputError(
-                f"--address {self.address} names a Dask scheduler, and --runner local uses none; leave one of the two "
-                "out."
+        kind = self.runner or config.runner.kind
+        if kind == "local" and self.address is not None:
+            uses_none = ", and --runner local uses none" if self.runner else ""
+            advice = (
+                "leave one of the two out" if self.runner else "give --runner dask beside it, or leave it out"
             )
-        kind = self.runner or "dask"
+            raise InputError(f"--address {self.address} names a Dask scheduler{uses_none}; {advice}.")
         address = (self.address or config.runner.address) if kind == "dask" else None
         runner = config.runner.model_copy(update={"kind": kind, "address": address})
         return config.model_copy(update={"runner": runner})

@@ -109,7 +109,7 @@ def _ended_as_it_ends(record: RunRecord, tracker: Tracker, console: Console) -> 
     left = tracker.end("FINISHED")
     replace(record, status="finished").write()
     if left:
-        from flows.tracking.store import without_login
+        from flows.base.store_address import without_login
 
         place = without_login(record.uri)
         console.say(f"tracking: {left} items could not be delivered to {place}; the next run delivers them.")

@@ -85,7 +85,7 @@ def discover(
     Raises AesiError, one sentence, for what cannot be used; nothing is started then.
     """
     environment.prepare_process()
-    from flows.tracking.store import checked_address
+    from flows.base.store_address import checked_address
 
     under = under or TrackedUnder()
     checked_address(under.tracking.uri)

@@ -32,6 +32,7 @@ from aesi.pipeline.written import CANDIDATE, EXPERIMENT, MODEL
 from aesi.records import Failed, LeftOutDrives
 from aesi.sparse import Candidate, Genome, Problem, evaluate
 from flows.base import codec
+from flows.base.store_address import without_login
 from flows.tracking.experiment_log import (
     DECLARED,
     INPUTS,
@@ -42,7 +43,7 @@ from flows.tracking.experiment_log import (
     coefficients,
     reduced,
 )
-from flows.tracking.store import KIND, PARENT, Store, without_login
+from flows.tracking.store import KIND, PARENT, Store, is_of_experiment
 
 COMMIT, COMMIT_SHOWN = "mlflow.source.git.commit", 10
 GENES = ("lambda1", "lambda2", "tau", "p_c", "d", "feedback")
@@ -186,7 +187,7 @@ class Differs(AesiError):
 def _candidate(store: Store, run_id: str) -> Any:
     """The tracked run of a candidate that did not fail."""
     run = store.run(run_id)
-    if run.data.tags.get(KIND) == "run":
+    if run.data.tags.get(KIND) == "run" and is_of_experiment(run):
         number = run.data.params.get("chosen_candidate")
         if number is None:
             raise InputError(

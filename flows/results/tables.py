@@ -16,8 +16,9 @@ from typing import Any, Literal
 from aesi.errors import InputError
 from aesi.pipeline.report import tables
 from aesi.pipeline.written import FIGURES, REPORT, SUMMARY
+from flows.base.store_address import without_login
 from flows.tracking.experiment_log import CODE, SETTING, UNFITTED
-from flows.tracking.store import KIND, Store, without_login
+from flows.tracking.store import KIND, Store, is_of_experiment
 
 RANGED = ("test_mser_pct", "test_mser_recalibrated_pct", "coverage_pct")
 """Figures that tables show with their range over seeds."""
@@ -135,14 +136,15 @@ def _chosen(store: Store, name: str, run_ids: Sequence[str]) -> tuple[list[Any],
 
 
 def _finished(store: Store, name: str) -> list[Any]:
-    """The finished runs of an experiment, newest first, without its discoveries, which have a verdict and no tables."""
+    """The finished runs of an experiment, newest first. Discoveries, batches and benchmarks that are tracked under the
+    same name have no tables, and are left out."""
     experiment_id = store.find_experiment(name)
     if experiment_id is None:
         known = sorted(e.name for e in store.client.search_experiments() if e.name != "Default")
         there = f" Tracked so far: {', '.join(known)}." if known else " Nothing is tracked there yet."
         raise InputError(f"no experiment {name!r} is tracked in {without_login(store.uri)}.{there}")
     condition = f"tags.`{KIND}` = 'run' and attributes.status = 'FINISHED'"
-    return [run for run in store.runs(experiment_id, condition) if "verdict" not in run.data.tags]
+    return [run for run in store.runs(experiment_id, condition) if is_of_experiment(run)]
 
 
 def _by_seed(runs: Mapping[str, Any]) -> list[Any]:

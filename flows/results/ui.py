@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 from aesi.errors import InputError
 from flows.base import environment
 from flows.base.console import first_line
-from flows.tracking.store import PLACE, Store, checked_address, without_login
+from flows.base.store_address import PLACE, checked_address, without_login
+from flows.tracking.store import Store
 from flows.tracking.view import VIEW, view_of
 
 if TYPE_CHECKING:

@@ -21,8 +21,8 @@ from aesi.pipeline.written import COEFFICIENTS, EXPERIMENT, FIGURES, MODEL, REPO
 from aesi.records import ROLES, Failed
 from aesi.sparse import Candidate, Genome, Problem, SparseModel
 from flows.base import codec
+from flows.base.store_address import without_login
 from flows.tracking.provenance import versions
-from flows.tracking.store import without_login
 from flows.tracking.tracker import Tracker, flat
 from flows.tracking.view import HOW_TO_READ, NOTE, RUN_COLUMNS, experiment_tags
 

@@ -1,15 +1,14 @@
 """The tracking store, spoken to through MLflow's client with explicit run ids.
 
-Nothing here decides what is tracked (`flows.tracking.tracker`) or how an item gets there (`flows.tracking.delivery`):
-this makes experiments and runs, finds them, and knows whether a failure passes.
+Nothing here decides what is tracked (`flows.tracking.tracker`), how an item gets there (`flows.tracking.delivery`) or
+what may be an address (`flows.base.store_address`): this opens a store, makes experiments and runs, finds them, and
+knows whether a failure passes.
 """
 
 from __future__ import annotations
 
 import errno
 import logging
-import os
-import re
 import sqlite3
 import time
 import urllib.error
@@ -18,31 +17,34 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
 from aesi.errors import AesiError, InputError
 from aesi.numerics.files.whole import check_writable
 from flows.base import environment
 from flows.base.console import first_line
-from flows.base.databases import limits, with_driver
+from flows.base.databases import limits
 from flows.base.locks import ProcessLock
+from flows.base.store_address import (
+    DATABRICKS,
+    PLACE,
+    SQLITE,
+    checked_address,
+    database_file,
+    without_login,
+)
 from flows.tracking.relocation import artifact_folder, follow
 from flows.tracking.whole_run import read_runs
 
-SQLITE = "sqlite:///"
-SERVERS, DATABASES = ("http", "https"), ("sqlite", "postgresql", "mysql", "mssql")
-DATABRICKS = ("databricks", "databricks-uc", "uc")
-"""Admissible schemes of an address. Any other is a folder of files for MLflow, which takes no new runs."""
-MEANT_OTHERWISE = re.compile(r"%[0-9A-Fa-f]{2}|[?]")
-"""Parts of a path that the address of a database has for other things: the file would be another."""
 PARENT = "mlflow.parentRunId"
 NUMBER = "aesi.number"
 KIND = "aesi.kind"
+JOB, EXPERIMENT = "aesi.job", "experiment"
+"""Tag of a whole run: experiment, discovery, batch or benchmark. Runs of earlier versions have none."""
+OTHER_JOBS = ("cases", "cells")
+"""Parameters of benchmarks and batches, and of no experiment, by which runs of earlier versions are told apart."""
 REACH_S = 5.0
 """Wait for the answer of a tracking server."""
 PASSING = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EAGAIN, errno.EMFILE)
-PLACE = "runs are tracked in the current folder, or in the one that AESI_HOME names"
-"""Where runs are to be found that are not in the store that was opened."""
 SHORTEST_ID = 4
 """Letters of a run's id that may stand for it."""
 PAGE = 1000
@@ -54,44 +56,16 @@ def beginning(runs: Sequence[Any], begin: str) -> list[Any]:
     return [run for run in runs if run.info.run_id.startswith(begin)] if len(begin) >= SHORTEST_ID else []
 
 
+def is_of_experiment(run: Any) -> bool:
+    """Whether a whole run is that of an experiment, and no discovery, batch or benchmark of the same name."""
+    tags, params = run.data.tags, run.data.params
+    if JOB in tags:
+        return bool(tags[JOB] == EXPERIMENT)
+    return "verdict" not in tags and not any(name in params for name in OTHER_JOBS)
+
+
 class StoreAway(AesiError):
     """The tracking store does not answer."""
-
-
-def default_uri() -> str:
-    """MLFLOW_TRACKING_URI, or the SQLite file in the workspace."""
-    return os.environ.get("MLFLOW_TRACKING_URI") or f"{SQLITE}{environment.workspace() / 'mlflow.db'}"
-
-
-def checked_address(uri: str | None = None) -> str:
-    """The address of a store as MLflow takes it; that of the workspace's where none is given.
-
-    Raises InputError for what is no address of one.
-    """
-    uri = with_driver(uri or default_uri())
-    scheme, _, rest = uri.partition("://")
-    kind = scheme.partition("+")[0]
-    if scheme in DATABRICKS or (kind in DATABASES[1:] and rest):
-        return uri
-    if not (uri.startswith(SQLITE) or (kind in SERVERS and _has_host(uri))):
-        raise InputError(
-            f"{without_login(uri)!r} is no address of a tracking store; give http://HOST:PORT, sqlite:///FILE or "
-            "postgresql://USER@HOST/DATABASE as tracking.uri, --uri or MLFLOW_TRACKING_URI, or leave it out."
-        )
-    if kind == "sqlite" and MEANT_OTHERWISE.search(rest):
-        raise InputError(
-            f"{rest.removeprefix('/')} cannot hold a tracking store, since ? and % with two digits mean something else "
-            f"in an address; give a path without them ({PLACE})."
-        )
-    return uri
-
-
-def _has_host(uri: str) -> bool:
-    try:
-        split = urlsplit(uri)
-        return bool(split.hostname) and (split.port is None or split.port > 0)
-    except ValueError:  # a port that is no number
-        return False
 
 
 def check_reached(uri: str | None = None) -> None:
@@ -137,7 +111,7 @@ class Store:
         uri = checked_address(uri)
         if not uri.startswith(SQLITE):
             return cls(uri)
-        database = _database(uri)
+        database = database_file(uri)
         if not database.is_file():
             raise InputError(f"nothing is tracked in {database}: there is no such file; {PLACE}.")
         try:
@@ -173,7 +147,7 @@ class Store:
 
     @property
     def _path(self) -> Path:
-        return _database(self.uri)
+        return database_file(self.uri)
 
     def run(self, run_id: str) -> Any:
         """A run by its id; one that is a whole job also by its beginning. Raises InputError where there is none."""
@@ -291,11 +265,6 @@ class Store:
         return True
 
 
-def _database(uri: str) -> Path:
-    """The file of a SQLite store."""
-    return Path(uri.removeprefix(SQLITE)).expanduser().resolve()
-
-
 def now_ms() -> int:
     """Milliseconds since the epoch, as MLflow counts."""
     return int(time.time() * 1000)
@@ -384,13 +353,6 @@ def _unusable(uri: str, error: BaseException) -> StoreAway:
             "check the address (sqlite:///FILE or http://HOST:PORT), or move the file away to start a new one"
         )
     return StoreAway(f"the tracking store {without_login(uri)} cannot be used ({reason}); {advice}.")
-
-
-def without_login(uri: str) -> str:
-    """The address without the user and the password that may be in it, as it may be shown and written."""
-    place = re.split("[/?#]", uri.partition("//")[2], maxsplit=1)[0]
-    login, at, _ = place.rpartition("@")
-    return uri.replace(f"{login}{at}", "", 1)
 
 
 def _passes(error: BaseException | None) -> bool:

@@ -15,15 +15,16 @@ from dataclasses import dataclass, field
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 from aesi.errors import AesiError
 from aesi.pipeline.experiment.sections import TrackingConfig
 from flows.base import environment
+from flows.base.store_address import without_login
 from flows.tracking.delivery import deliver
 from flows.tracking.outbox import FLUSH_S, Outbox
 from flows.tracking.provenance import source_tags
-from flows.tracking.store import KIND, Store, now_ms, without_login
+from flows.tracking.store import EXPERIMENT, JOB, KIND, Store, now_ms
 
 PARAMETER_LIMIT = 6000  # MLflow cuts longer ones off
 CUT = "… sha256 "
@@ -60,11 +61,15 @@ class Trackable(Protocol):
 
 @dataclass(frozen=True)
 class Subject:
-    """A `Trackable` that is no experiment file."""
+    """A `Trackable` that is no experiment file.
+
+    job : what it is. Jobs are tracked under names that experiment files may have too, such as `batch`.
+    """
 
     name: str
     seed: int
     digest: str
+    job: Literal["discovery", "batch", "benchmark"]
     tracking: TrackingConfig = field(default_factory=TrackingConfig)
 
 
@@ -91,7 +96,8 @@ class Tracker:
         self._began: dict[str, str] = {}
         self.resumed = run_id is not None
         if run_id is None:
-            tags = {KIND: "run", "aesi.config_digest": config.digest, **source_tags()}
+            job = config.job if isinstance(config, Subject) else EXPERIMENT
+            tags = {KIND: "run", JOB: job, "aesi.config_digest": config.digest, **source_tags()}
             name = title or f"{config.name}, seed {config.seed}"
             self.run_id = store.create_run(self._experiment_id, _short(name), tags)
         else:

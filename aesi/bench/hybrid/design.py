@@ -75,15 +75,15 @@ def run(
     for name in settings:
         options = replace(BASE, **SETTINGS[name])
         started = process_time()
-        reached = [
-            _reached(split, replace(options, seed=k), candidates, sindy) for k, split in enumerate(splits)
+        reductions = [
+            _reductions(split, replace(options, seed=k), candidates, sindy) for k, split in enumerate(splits)
         ]
         spent = process_time() - started
         line = {"setting": name, "cells": cells, "candidates": candidates, "cpu_s": round(spent, 1)}
-        yield line | _summary(reached)
+        yield line | _summary(reductions)
 
 
-def _reached(split: Split, options: Options, candidates: int, sindy: bool) -> dict[str, float]:
+def _reductions(split: Split, options: Options, candidates: int, sindy: bool) -> dict[str, float]:
     """Model -> reduction of the mean squared error on the test cycles of one cell, per cent; empty if no candidate can
     be evaluated."""
     problem = Problem.build(split, options)
@@ -107,12 +107,12 @@ def _reduction(model: ErrorModel, split: Split) -> float:
     return float(mser(truth, predicted))
 
 
-def _summary(reached: Sequence[Mapping[str, float]]) -> dict[str, Any]:
-    line: dict[str, Any] = {"failed": sum(not cell for cell in reached)}
+def _summary(reductions: Sequence[Mapping[str, float]]) -> dict[str, Any]:
+    line: dict[str, Any] = {"failed": sum(not cell for cell in reductions)}
     for name in (*ENSEMBLES, "SINDy-C"):
-        if not any(name in cell for cell in reached):
+        if not any(name in cell for cell in reductions):
             continue
-        values = np.array([cell.get(name, 0.0) for cell in reached])
+        values = np.array([cell.get(name, 0.0) for cell in reductions])
         key = name.lower().replace(" ", "_").replace("-", "_")
         line |= {
             f"{key}_mean_pct": round(float(np.maximum(values, 0.0).mean()), 2),

@@ -193,9 +193,3 @@ class _PeakMemory:
             self.peak_mb = max(self.peak_mb, self._process.memory_info().rss / 2**20)
             if self._done.wait(0.02):
                 return
-
-
-def condition(theta: Array) -> float:
-    """Condition number of a library matrix (n, m), from the singular values of its triangular factor."""
-    values = np.linalg.svd(np.linalg.qr(theta, mode="r"), compute_uv=False)
-    return float(values[0] / values[-1])

@@ -41,35 +41,38 @@ def summary(rows: Sequence[CaseRow]) -> dict[str, Any]:
         "runs": len(ran),
         "not_run": [row["case"] for row in rows if row.get("verdict") == NOT_RUN],
         "failed": sum("error" in row for row in ran),
-        "all": {cell: _of(mine) for cell, mine in _by_cell(ran).items()},
+        "all": {cell: _cell_figures(of_cell) for cell, of_cell in _by_cell(ran).items()},
         "judging": {
-            cell: _of(mine) for cell, mine in _by_cell([r for r in ran if not r["development"]]).items()
+            cell: _cell_figures(of_cell)
+            for cell, of_cell in _by_cell([r for r in ran if not r["development"]]).items()
         },
     }
 
 
 def _by_cell(rows: Sequence[CaseRow]) -> dict[str, list[CaseRow]]:
     by_cell = {cell: [row for row in rows if row["cell"] == cell] for cell in EXPERIMENTS}
-    return {cell: mine for cell, mine in by_cell.items() if mine} | ({"every cell": [*rows]} if rows else {})
+    return {cell: of_cell for cell, of_cell in by_cell.items() if of_cell} | (
+        {"every cell": [*rows]} if rows else {}
+    )
 
 
-def _of(rows: Sequence[CaseRow]) -> dict[str, Any]:
+def _cell_figures(rows: Sequence[CaseRow]) -> dict[str, Any]:
     """The figures of the runs of one cell: of each model, of the best model in hindsight, and the absolute difference
     of the validation figure and the test figure, in percentage points."""
     good = [row for row in rows if "error" not in row]
-    out: dict[str, Any] = {"splits": len({row["split"] for row in rows}), "runs": len(rows)}
+    figures: dict[str, Any] = {"splits": len({row["split"] for row in rows}), "runs": len(rows)}
     if not good:
-        return out
-    nothing = [0.0] * (len(rows) - len(good))
+        return figures
+    of_failed = [0.0] * (len(rows) - len(good))
     home = [row["models"] for row in good]
     abroad = [test for row in good for test in row.get("abroad", {}).values()]
     for name in home[0]:
-        mine = [models[name] for models in home if name in models]
-        out[name] = (
-            _spread("mser_pct", [m["mser_pct"] for m in mine], nothing)
-            | _spread("mser_recalibrated_pct", _gains(name, home), nothing)
-            | _spread("abroad_mser_recalibrated_pct", _gains(name, abroad))
-            | _of_bands(mine)
+        of_model = [models[name] for models in home if name in models]
+        figures[name] = (
+            _mean_and_worst("mser_pct", [m["mser_pct"] for m in of_model], of_failed)
+            | _mean_and_worst("mser_recalibrated_pct", _gains(name, home), of_failed)
+            | _mean_and_worst("abroad_mser_recalibrated_pct", _gains(name, abroad))
+            | _band_figures(of_model)
         )
     best = [
         max(against(models[name], models[RECALIBRATED]) for name in models)
@@ -77,14 +80,14 @@ def _of(rows: Sequence[CaseRow]) -> dict[str, Any]:
         if RECALIBRATED in models
     ]
     if best:
-        out["best_in_hindsight"] = _spread("mser_recalibrated_pct", best, nothing)
+        figures["best_in_hindsight"] = _mean_and_worst("mser_recalibrated_pct", best, of_failed)
     if BEST in home[0]:
         gaps = [abs(r["validation_mser_pct"][BEST] - r["models"][BEST]["mser_pct"]) for r in good]
-        out["validation_minus_test"] = {"median": float(np.median(gaps)), "worst": max(gaps)}
-    return out
+        figures["validation_minus_test"] = {"median": float(np.median(gaps)), "worst": max(gaps)}
+    return figures
 
 
-def _of_bands(models: Sequence[Mapping[str, Any]]) -> dict[str, float]:
+def _band_figures(models: Sequence[Mapping[str, Any]]) -> dict[str, float]:
     """Coverage (per cent) and Winkler score (mV) over the rows of all splits, and the lowest coverage of a drive. Empty
     if the model has no band in one of the splits."""
     if not all("coverage_pct" in m for m in models):
@@ -102,7 +105,7 @@ def _gains(name: str, tests: Sequence[Mapping[str, Any]]) -> list[float]:
     return [against(test[name], test[RECALIBRATED]) for test in tests if RECALIBRATED in test]
 
 
-def _spread(name: str, values: Sequence[float], failed: Sequence[float] = ()) -> dict[str, float]:
+def _mean_and_worst(name: str, values: Sequence[float], failed: Sequence[float] = ()) -> dict[str, float]:
     """Mean and worst (lowest) value; empty if there are no values.  failed : values at which failed runs count."""
     if not values:
         return {}
@@ -133,18 +136,18 @@ def table(rows: Sequence[CaseRow]) -> list[str]:
     ran = [row for row in rows if row.get("verdict") != NOT_RUN]
     lines, each = list(HEAD), list(EACH)
     for cell, title in TITLES.items():
-        mine = list(_by("split", [row for row in ran if row["cell"] == cell]))
-        splits = [_over_seeds(runs) for runs in mine if not all("error" in run for run in runs)]
-        lines += _summed(title, splits, len(mine) - len(splits))
+        by_split = list(_grouped_by("split", [row for row in ran if row["cell"] == cell]))
+        splits = [_over_seeds(runs) for runs in by_split if not all("error" in run for run in runs)]
+        lines += _cell_rows(title, splits, len(by_split) - len(splits))
         for split in splits:
-            each += _told(split)
+            each += _split_lines(split)
     failed = [
         f"{row['case']} {row.get('verdict', 'failed')}: {row['error']}" for row in rows if "error" in row
     ]
     return [*lines, "", *failed, '??? note "Each split"', "", *(f"    {line}" for line in each)]
 
 
-def _by(key: str, rows: Sequence[CaseRow]) -> Iterator[list[CaseRow]]:
+def _grouped_by(key: str, rows: Sequence[CaseRow]) -> Iterator[list[CaseRow]]:
     for name in dict.fromkeys(row[key] for row in rows):
         yield [row for row in rows if row[key] == name]
 
@@ -153,21 +156,25 @@ def _over_seeds(rows: Sequence[CaseRow]) -> dict[str, Any]:
     """The figures of one split, averaged over its seeds; at least one run has not failed.
 
     `home` and, for each test record at another temperature, `abroad` : model -> mean figures; `against` in them is the
-    reduction of the recalibrated model's squared error, per cent. `validation` and `off` : the validation figure and
+    reduction of the recalibrated model's squared error, per cent. `validation` and `gap` : the validation figure and
     its absolute difference from the test figure, both of AESI I, percentage points.
     """
     good = [row for row in rows if "error" not in row]
     first, share = good[0], len(good) / len(rows)
-    told = [row["validation_mser_pct"].get(BEST) for row in good]
+    validation_pct = [row["validation_mser_pct"].get(BEST) for row in good]
     return {
         "split": first["split"],
         "seeds": len(rows),
-        "alone": first["cell"] in ("hg2", "panasonic"),
-        "home": _mean([row["models"] for row in good], share),
-        "abroad": {n: _mean([row["abroad"][n] for row in good], share) for n in first.get("abroad", {})},
-        "validation": float(np.mean(told)),
-        "off": float(
-            np.mean([abs(v - r["models"][BEST]["mser_pct"]) for v, r in zip(told, good, strict=True)])
+        "one_drive": first["cell"] in ("hg2", "panasonic"),
+        "home": _mean_figures([row["models"] for row in good], share),
+        "abroad": {
+            n: _mean_figures([row["abroad"][n] for row in good], share) for n in first.get("abroad", {})
+        },
+        "validation": float(np.mean(validation_pct)),
+        "gap": float(
+            np.mean(
+                [abs(v - r["models"][BEST]["mser_pct"]) for v, r in zip(validation_pct, good, strict=True)]
+            )
         ),
     }
 
@@ -175,7 +182,7 @@ def _over_seeds(rows: Sequence[CaseRow]) -> dict[str, Any]:
 FIGURES = ("mser_pct", "coverage_pct", "worst_drive_coverage_pct", "winkler_mv", "rows")
 
 
-def _mean(models: Sequence[Mapping[str, Any]], share: float) -> dict[str, dict[str, float]]:
+def _mean_figures(models: Sequence[Mapping[str, Any]], share: float) -> dict[str, dict[str, float]]:
     """Model -> mean figures over the runs that did not fail.  share : share of these runs among all; reductions are
     multiplied by it, since a failed run counts as a reduction of 0."""
     out = {
@@ -190,26 +197,28 @@ def _mean(models: Sequence[Mapping[str, Any]], share: float) -> dict[str, dict[s
     return out
 
 
-def _summed(title: str, splits: Sequence[Mapping[str, Any]], failed: int) -> Iterator[str]:
-    """The lines of one cell in the first table.  failed : number of splits of which all runs failed; they count as
-    reductions of 0."""
+def _cell_rows(title: str, splits: Sequence[Mapping[str, Any]], failed: int) -> Iterator[str]:
+    """The lines of one cell in the first table, one for each temperature that it is tested at.
+
+    failed : number of splits of which all runs failed; they count as reductions of 0.
+    """
     if not splits:
         return
-    off = [split["off"] for split in splits]
-    off_told = f"{np.median(off):.1f} / {max(off):.1f}"
-    yield _line(title, splits, [s["home"] for s in splits], failed, off_told)
+    gaps = [split["gap"] for split in splits]
+    gap_words = f"{np.median(gaps):.1f} / {max(gaps):.1f}"
+    yield _cell_row(title, splits, [s["home"] for s in splits], failed, gap_words)
     for name in dict.fromkeys(name for split in splits for name in split["abroad"]):
-        there = [split for split in splits if name in split["abroad"]]
-        models = [split["abroad"][name] for split in there]
-        yield _line(f"{title.split(',')[0]}, {name}", there, models, failed, "")
+        tested = [split for split in splits if name in split["abroad"]]
+        models = [split["abroad"][name] for split in tested]
+        yield _cell_row(f"{title.split(',')[0]}, {name}", tested, models, failed, "")
 
 
-def _line(
+def _cell_row(
     title: str,
     splits: Sequence[Mapping[str, Any]],
     models: Sequence[Mapping[str, Any]],
     failed: int,
-    off: str,
+    gap: str,
 ) -> str:
     def spread(name: str, key: str) -> str:
         values = [*(m[name][key] for m in models), *[0.0] * failed]
@@ -226,21 +235,21 @@ def _line(
         spread(RECALIBRATED, "mser_pct"),
         spread(BEST, "mser_pct"),
         spread(BEST, "against"),
-        off,
+        gap,
         f"{pooled(BEST, 'coverage_pct'):.1f} / {worst:.1f}",
         f"{pooled(RECALIBRATED, 'winkler_mv'):.1f} / {pooled(BEST, 'winkler_mv'):.1f}",
     )
     return f"| {' | '.join(cells)} |"
 
 
-def _told(split: Mapping[str, Any]) -> Iterator[str]:
-    where = "that drive" if split["alone"] else "the others"
-    yield _of_one(split["split"], where, split["home"], f"{split['validation']:.1f}")
+def _split_lines(split: Mapping[str, Any]) -> Iterator[str]:
+    where = "that drive" if split["one_drive"] else "the others"
+    yield _split_row(split["split"], where, split["home"], f"{split['validation']:.1f}")
     for name, models in split["abroad"].items():
-        yield _of_one("", name, models, "")
+        yield _split_row("", name, models, "")
 
 
-def _of_one(split: str, where: str, models: Mapping[str, Any], validation: str) -> str:
+def _split_row(split: str, where: str, models: Mapping[str, Any], validation: str) -> str:
     best, physics = models[BEST], models[RECALIBRATED]
     figures = (physics["mser_pct"], best["mser_pct"], models["AESI II"]["mser_pct"], best["against"])
     cells = (

@@ -24,6 +24,7 @@ import numpy as np
 
 from aesi.bench import some_chosen
 from aesi.conformal import FreeRunBands
+from aesi.conformal.scores import interval_score
 from aesi.constants import MV_PER_V
 from aesi.errors import InputError
 from aesi.numerics.metrics import rms
@@ -118,11 +119,11 @@ def chosen_splits(
         )
     kept: list[SplitCase] = []
     for cell in cells:
-        mine = [s for s in all_splits() if s.cell == cell and (only is None or only in s.name)]
-        mine = [s for s in mine if development is None or s.development == development]
-        if a_cell is not None and a_cell < len(mine):
-            mine = [mine[i] for i in np.linspace(0, len(mine) - 1, a_cell).round().astype(int)]
-        kept += mine
+        of_cell = [s for s in all_splits() if s.cell == cell and (only is None or only in s.name)]
+        of_cell = [s for s in of_cell if development is None or s.development == development]
+        if a_cell is not None and a_cell < len(of_cell):
+            of_cell = [of_cell[i] for i in np.linspace(0, len(of_cell) - 1, a_cell).round().astype(int)]
+        kept += of_cell
     return tuple(some_chosen("splits", kept, (s.name for s in all_splits() if s.cell in cells)))
 
 
@@ -133,7 +134,7 @@ def judged(fitted: Sequence[Fitted], tests: Sequence[ErrorSeries]) -> dict[str, 
     squared error (`mser_pct`, per cent), the number of runs that diverged, and of a model with bands their coverage
     (per cent), mean width and Winkler score (mV).
     """
-    return {one.model.name: _figures(one, tests) for one in fitted}
+    return {each.model.name: _figures(each, tests) for each in fitted}
 
 
 def against(mine: Mapping[str, Any], other: Mapping[str, Any]) -> float:
@@ -142,33 +143,34 @@ def against(mine: Mapping[str, Any], other: Mapping[str, Any]) -> float:
     return float(100.0 * (1.0 - (mine["rmse_mv"] / other["rmse_mv"]) ** 2))
 
 
-def _figures(one: Fitted, tests: Sequence[ErrorSeries]) -> dict[str, Any]:
-    runs = [one.model.free_run(series) for series in tests]
+def _figures(fitted: Fitted, tests: Sequence[ErrorSeries]) -> dict[str, Any]:
+    """The entry of `judged` of one model."""
+    runs = [fitted.model.free_run(series) for series in tests]
     truth = np.concatenate([series.error_v for series in tests])
     declared = np.concatenate([series.left_by(DECLARED) for series in tests])
-    left = truth - np.concatenate([run.error_v for run in runs])
+    errors_v = truth - np.concatenate([run.error_v for run in runs])
     figures: dict[str, Any] = {
-        "rmse_mv": MV_PER_V * rms(left),
-        "mser_pct": float(100.0 * (1.0 - np.mean(left**2) / np.mean(declared**2))),
+        "rmse_mv": MV_PER_V * rms(errors_v),
+        "mser_pct": float(100.0 * (1.0 - np.mean(errors_v**2) / np.mean(declared**2))),
         "diverged": sum(run.diverged_at is not None for run in runs),
     }
     drives = {
         series.name: {"rmse_mv": MV_PER_V * rms(part)}
-        for series, part in zip(tests, _by_record(left, tests), strict=True)
+        for series, part in zip(tests, _by_record(errors_v, tests), strict=True)
     }
     figures["drives"] = drives
-    if one.bands is None:
+    if fitted.bands is None:
         return figures
-    low, high = _band(one.bands, one.model, tests, runs)
-    covered = (low <= left) & (left <= high)
+    low, high = _band(fitted.bands, fitted.model, tests, runs)
+    covered = (low <= errors_v) & (errors_v <= high)
     for drive, part in zip(drives.values(), _by_record(covered, tests), strict=True):
         drive["coverage_pct"] = 100.0 * float(part.mean())
     return figures | {
-        "rows": len(left),
+        "rows": len(errors_v),
         "coverage_pct": 100.0 * float(covered.mean()),
         "worst_drive_coverage_pct": min(drive["coverage_pct"] for drive in drives.values()),
         "width_mv": MV_PER_V * float(np.mean(high - low)),
-        "winkler_mv": MV_PER_V * float(np.mean(_winkler(left, low, high, one.bands.alpha))),
+        "winkler_mv": MV_PER_V * interval_score(low, high, errors_v, fitted.bands.alpha),
     }
 
 
@@ -185,13 +187,6 @@ def _band(
 def _by_record(column: Array | BoolArray, tests: Sequence[ErrorSeries]) -> list[Array]:
     """A column (n,) over all rows of all records, cut into one array per record."""
     return np.split(column, np.cumsum([len(series) for series in tests])[:-1])
-
-
-def _winkler(left: Array, low: Array, high: Array, alpha: float) -> Array:
-    """Winkler score of each row, (n,) V.  left : errors of the free run.  low, high : bounds of the band. (n,) V
-    each."""
-    outside = np.maximum(low - left, 0.0) + np.maximum(left - high, 0.0)
-    return np.asarray(high - low + 2.0 / alpha * outside)
 
 
 def _drive_parts() -> list[tuple[tuple[int, ...], tuple[int, ...]]]:

@@ -10,7 +10,7 @@ from aesi.conformal.bands.band import Band
 from aesi.conformal.intervals import Intervals
 from aesi.conformal.online.records import checked_current, checked_record
 from aesi.conformal.online.scale import Scale
-from aesi.conformal.online.tracker import begun, move, replay, scaled_band
+from aesi.conformal.online.tracker import adapt_log_ratio, initial_log_ratio, replay, scaled_band
 from aesi.errors import InputError
 from aesi.numerics.drive import N_RECENT
 from aesi.numerics.typing import Array, SavedState
@@ -104,9 +104,9 @@ class Stream:
 
     def __init__(self, calibrated: Calibrated) -> None:
         self._calibrated = calibrated
-        self._past = _Tail(calibrated.window)
-        self._currents = _Tail(N_RECENT - 1)
-        self._log_ratio = begun(calibrated.scale.log_ratio)
+        self._past = _RecentValues(calibrated.window)
+        self._currents = _RecentValues(N_RECENT - 1)
+        self._log_ratio = initial_log_ratio(calibrated.scale.log_ratio)
         self._pending: _Pending | None = None
 
     def interval(self, current_a: float | None = None) -> tuple[float, float]:
@@ -117,7 +117,7 @@ class Stream:
         """
         pending = self._pending
         if pending is None or pending.current_a != current_a:
-            pending = self._pending = self._make(current_a)
+            pending = self._pending = self._make_interval(current_a)
         return pending.low, pending.high
 
     @property
@@ -141,7 +141,9 @@ class Stream:
             return
         if pending.warm and calibrated.rate > 0:
             missed = error_v < low or error_v > high
-            move(self._log_ratio, pending.group, missed, pending.held, calibrated.rate, calibrated.alpha)
+            adapt_log_ratio(
+                self._log_ratio, pending.group, missed, pending.held, calibrated.rate, calibrated.alpha
+            )
         self._past.append(error_v)
 
     def gap(self) -> None:
@@ -150,7 +152,7 @@ class Stream:
         self._currents.clear()
         self._pending = None
 
-    def _make(self, current_a: float | None) -> _Pending:
+    def _make_interval(self, current_a: float | None) -> _Pending:
         calibrated, group = self._calibrated, 0
         recent = np.empty(0)
         if calibrated.needs_current:
@@ -182,7 +184,7 @@ class _Pending:
     warm: bool
 
 
-class _Tail:
+class _RecentValues:
     """The last `size` values, contiguous, in fixed memory."""
 
     def __init__(self, size: int) -> None:

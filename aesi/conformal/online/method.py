@@ -67,7 +67,7 @@ class Method(ABC):
         records = checked_records(residuals)
         marginal = marginal_interval(records, alpha)
         floor = width_floor(records, marginal)
-        marginal = _at_least(floor, marginal)
+        marginal = _widened(floor, marginal)
         currents = checked_currents(current_a, records)
         rng = rng or np.random.default_rng(0)
         band, scale = self.band(CalibrationData(records, currents, alpha, window, marginal, floor, rng))
@@ -116,7 +116,7 @@ def width_floor(records: Sequence[Array], marginal_v: tuple[float, float]) -> fl
     return max(RELATIVE_FLOOR * (marginal_v[1] - marginal_v[0]), resolution)
 
 
-def _at_least(width_v: float, interval_v: tuple[float, float]) -> tuple[float, float]:
+def _widened(width_v: float, interval_v: tuple[float, float]) -> tuple[float, float]:
     """(low, high) V: the interval, widened about its middle to at least `width_v` (most residuals may be equal)."""
     low, high = interval_v
     if high - low >= width_v:

@@ -12,7 +12,7 @@ from aesi.numerics.typing import Array, IntArray, SavedState
 
 GROUP_LEVELS = (0.05, 0.2, 0.4, 0.6, 0.8, 0.95)
 """Quantiles of the calibration currents that separate the groups: rest, mild and hard use either way."""
-HELD_SHARE = 0.05
+CONSTANT_SHARE = 0.05
 """Share of the rows, as of the smallest group, from which a single current is a group of its own, such as rest. All
 but constant there, a voltage that is written in millivolts is hit nearly always, and in one group with charging it pays
 for the misses of that. Records of which 20, 10 and 5 % are driven by currents of either sign alike, under errors that
@@ -38,11 +38,11 @@ class Scale:
     def fit(cls, scores: Array, alpha: float, current_a: Array | None) -> Self:
         """scores : (n,) |e - middle| / half-width of held-out samples.  current_a : (n,) A, or None for one
         group. The factor is the conformal quantile of the scores."""
-        everywhere = float(np.log(conformal_quantile(scores, alpha)))
+        log_ratio_of_all = float(np.log(conformal_quantile(scores, alpha)))
         if current_a is None:
-            return cls(np.empty(0), np.array([everywhere]))
+            return cls(np.empty(0), np.array([log_ratio_of_all]))
         edges = _edges(current_a)
-        scale = cls(edges, np.full(len(edges) + 1, everywhere))
+        scale = cls(edges, np.full(len(edges) + 1, log_ratio_of_all))
         groups = scale.groups(current_a)
         for g in range(len(edges) + 1):
             own = scores[groups == g]
@@ -70,8 +70,9 @@ class Scale:
 
 
 def _edges(current_a: Array) -> Array:
-    """(n_edges,) A, increasing, between the groups of these currents, with one on either side of each that is held."""
+    """(n_edges,) A, increasing, between the groups of these currents, with one on either side of each that is that of
+    CONSTANT_SHARE of the rows or more."""
     values, rows = np.unique(current_a, return_counts=True)
-    held = values[rows >= HELD_SHARE * len(current_a)]
+    constant = values[rows >= CONSTANT_SHARE * len(current_a)]
     # A current at an edge is in the group below it.
-    return np.unique([*np.quantile(current_a, GROUP_LEVELS), *held, *np.nextafter(held, -np.inf)])
+    return np.unique([*np.quantile(current_a, GROUP_LEVELS), *constant, *np.nextafter(constant, -np.inf)])

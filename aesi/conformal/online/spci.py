@@ -56,14 +56,15 @@ class SPCI(Method):
         self._check_enough(rows, history)
         levels = level_pairs(data.alpha, self.n_betas)
         task = FitTask(rows, targets, levels, history.n_history, data.floor_v, data.rng)
-        held_out = folds(len(rows))
-        of_folds = [RegressionBand(history, self.fitter(task.only(~held))) for held in held_out]
-        served = of_folds[0] if len(of_folds) == 1 else RegressionBand(history, self.fitter(task))
-        scores = cross_scores(of_folds, held_out, task)
+        held_out = held_out_folds(len(rows))
+        fold_bands = [RegressionBand(history, self.fitter(task.only(~held))) for held in held_out]
+        final_band = fold_bands[0] if len(fold_bands) == 1 else RegressionBand(history, self.fitter(task))
+        scores = cross_scores(fold_bands, held_out, task)
         known = np.isfinite(scores)
-        return served, Scale.fit(scores[known], data.alpha, None if current is None else current[known])
+        return final_band, Scale.fit(scores[known], data.alpha, None if current is None else current[known])
 
     def _check_enough(self, rows: Array, history: History) -> None:
+        """Raises FitError for fewer feature rows (n, p) than the regressor needs."""
         n, p = rows.shape
         needed = self.rows_a_column * p
         if n < needed:
@@ -78,7 +79,7 @@ def stacked(
 ) -> tuple[Array, Array, Array | None]:
     """Feature rows (n, p), targets (n,) V and currents (n,) A of all records, at least one, where history and residual
     exist; no row spans two records."""
-    rows, targets, at = [], [], []
+    rows, targets, currents_at_rows = [], [], []
     for i, record in enumerate(records):
         current = None if currents is None else currents[i]
         features, ready = history.rows(record, current)
@@ -86,17 +87,21 @@ def stacked(
         rows.append(features[use])
         targets.append(record[use])
         if current is not None:
-            at.append(current[use])
-    return np.concatenate(rows), np.concatenate(targets), None if currents is None else np.concatenate(at)
+            currents_at_rows.append(current[use])
+    return (
+        np.concatenate(rows),
+        np.concatenate(targets),
+        None if currents is None else np.concatenate(currents_at_rows),
+    )
 
 
-def cross_scores(of_folds: list[RegressionBand], held_out: list[BoolArray], task: FitTask) -> Array:
+def cross_scores(fold_bands: list[RegressionBand], held_out: list[BoolArray], task: FitTask) -> Array:
     """(n,) `half_width_scores` of each row by the band that was fitted without it; NaN for a row in all fits.
 
     held_out : (n,) for each band, True for the rows that it was fitted without; no row twice.
     """
     scores = np.full(len(task.targets), np.nan)
-    for band, held in zip(of_folds, held_out, strict=True):
+    for band, held in zip(fold_bands, held_out, strict=True):
         scores[held] = half_width_scores(band, task.only(held))
     return scores
 
@@ -108,7 +113,7 @@ def half_width_scores(band: RegressionBand, task: FitTask) -> Array:
     return np.asarray(np.abs(task.targets - 0.5 * (low + high)) / half)
 
 
-def folds(n: int) -> list[BoolArray]:
+def held_out_folds(n: int) -> list[BoolArray]:
     """Rows to hold out in turn, (n,) each: of N_BLOCKS contiguous runs, every fifth. One fold where that
     holds enough rows; all five, together every row once, where calibration data are short."""
     fold = dealt_folds(n, N_BLOCKS, N_FOLDS)

@@ -49,7 +49,9 @@ more."""
 
 
 @kept_njit()
-def move(log_ratio: Array, group: int, missed: bool, held: bool, rate: float, alpha: float) -> None:
+def adapt_log_ratio(
+    log_ratio: Array, group: int, missed: bool, held: bool, rate: float, alpha: float
+) -> None:
     """Equation (1), one step, in place; log_ratio : (n_groups,).
 
     held : whether the sample's band was held at its floor.
@@ -64,7 +66,7 @@ def move(log_ratio: Array, group: int, missed: bool, held: bool, rate: float, al
 
 
 @kept_njit()
-def begun(start: Array) -> Array:
+def initial_log_ratio(start: Array) -> Array:
     """(n_groups,) log r at the first sample, from that of the calibration, which is the log of zero where held-out
     residuals lay in the middle of their bands: no step would lead back from there."""
     return np.maximum(start, -LOG_RATIO_LIMIT)
@@ -96,11 +98,11 @@ def replay(
 
     low, high, residuals : (n,) V.  groups : (n,).  start : (n_groups,) log r of the calibration.
     """
-    log_ratio = begun(start)
+    log_ratio = initial_log_ratio(start)
     for k in range(low.size):
         if not ready[k]:
             continue
         low[k], high[k], held = scaled_band(low[k], high[k], log_ratio[groups[k]], floor)
         if rate > 0 and np.isfinite(residuals[k]):
             missed = residuals[k] < low[k] or residuals[k] > high[k]
-            move(log_ratio, groups[k], missed, held, rate, alpha)
+            adapt_log_ratio(log_ratio, groups[k], missed, held, rate, alpha)

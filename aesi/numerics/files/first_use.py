@@ -1,21 +1,21 @@
-"""What is told when machine code is not on disk and is made, which takes a minute: nothing, unless somebody asks.
+"""A listener to the first compilation of machine code that is not on disk, which takes a minute.
 
-A module of its own, so that a command can ask before numba is imported.
+A module of its own, so that a command can listen before numba is imported.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-_asked: list[Callable[[], None]] = []
+_listeners: list[Callable[[], None]] = []
 
 
-def tell_compiling(tell: Callable[[], None]) -> None:
-    """Call `tell` the first time that something is compiled, in this process."""
-    _asked[:] = [tell]
+def on_first_compilation(listener: Callable[[], None]) -> None:
+    """Call `listener` once, at the first compilation in this process; it replaces an earlier one."""
+    _listeners[:] = [listener]
 
 
-def compiling() -> None:
-    """Something is compiled now."""
-    while _asked:
-        _asked.pop()()
+def report_compilation() -> None:
+    """Call the listener, if any, as code is compiled now."""
+    while _listeners:
+        _listeners.pop()()

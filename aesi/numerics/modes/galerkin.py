@@ -133,21 +133,49 @@ def stack_modes(
     order : polynomial degree of a layer.  regions : equal parts of each electrode that carry currents of
     their own.
     """
+    mass, stiff, integral = _stack_matrices(thickness, porosity, efficiency, order)
+    lam, v = eigh(stiff, mass)
+    lam[0] = 0.0
+    source, gauss = _region_matrices(order, regions)
+    return StackModes(
+        lam=_locked(lam),
+        gain=_locked(source @ v),
+        to_nodes=_locked(v),
+        project=_locked(v.T @ mass),
+        gauss=_locked(gauss),
+        mean=_locked(integral / sum(thickness)),
+        salt=_locked(mass.sum(axis=0)),
+    )
+
+
+def _stack_matrices(
+    thickness: tuple[float, float, float],
+    porosity: tuple[float, float, float],
+    efficiency: tuple[float, float, float],
+    order: int,
+) -> tuple[Array, Array, Array]:
+    """(mass (m, m), stiffness (m, m), integral over the thickness (m,)) of the values at the nodes of the stack."""
     m = 3 * order + 1
     x, w = legendre.leggauss(order + 2)
-    to_coefficients = np.linalg.inv(legendre.legvander(gauss_lobatto(order + 1)[0], order))
+    to_coefficients = _layer_coefficients(order)
     value = legendre.legvander(x, order) @ to_coefficients
     derivative = np.array([legendre.legval(x, legendre.legder(c)) for c in np.eye(order + 1)]).T
     slope = derivative @ to_coefficients
-    mass, stiff, mean = np.zeros((m, m)), np.zeros((m, m)), np.zeros(m)
+    mass, stiff, integral = np.zeros((m, m)), np.zeros((m, m)), np.zeros(m)
     for layer in range(3):
         rows = slice(layer * order, layer * order + order + 1)
         half = 0.5 * thickness[layer]
         mass[rows, rows] += porosity[layer] * half * (value.T * w) @ value
         stiff[rows, rows] += efficiency[layer] / half * (slope.T * w) @ slope
-        mean[rows] += half * w @ value
-    lam, v = eigh(stiff, mass)
-    lam[0] = 0.0
+        integral[rows] += half * w @ value
+    return mass, stiff, integral
+
+
+def _region_matrices(order: int, regions: int) -> tuple[Array, Array]:
+    """(source (2 regions, m) of a source spread over each region, gauss as in `StackModes`) at the nodes."""
+    m = 3 * order + 1
+    x, w = legendre.leggauss(order + 2)
+    to_coefficients = _layer_coefficients(order)
     source, gauss = np.zeros((2 * regions, m)), np.zeros((6 * regions + 3, m))
     gauss[6 * regions :, order : 2 * order + 1] = (
         legendre.legvander(2.0 * GAUSS_3 - 1.0, order) @ to_coefficients
@@ -160,15 +188,12 @@ def stack_modes(
             source[row, rows] = 0.5 * w @ (legendre.legvander(points, order) @ to_coefficients)
             points = 2.0 * (at + GAUSS_3) / regions - 1.0
             gauss[3 * row : 3 * row + 3, rows] = legendre.legvander(points, order) @ to_coefficients
-    return StackModes(
-        lam=_locked(lam),
-        gain=_locked(source @ v),
-        to_nodes=_locked(v),
-        project=_locked(v.T @ mass),
-        gauss=_locked(gauss),
-        mean=_locked(mean / sum(thickness)),
-        salt=_locked(mass.sum(axis=0)),
-    )
+    return source, gauss
+
+
+def _layer_coefficients(order: int) -> Array:
+    """(order + 1, order + 1) Legendre coefficients over a layer from values at its Gauss-Lobatto points."""
+    return np.asarray(np.linalg.inv(legendre.legvander(gauss_lobatto(order + 1)[0], order)))
 
 
 def ohmic_shares(regions: int) -> tuple[Array, Array]:

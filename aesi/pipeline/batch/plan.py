@@ -19,6 +19,7 @@ from aesi.data.reading import SUFFIXES
 from aesi.errors import CellError, InputError
 from aesi.physics.cell import Soh, checked_soh, read_soh
 from aesi.pipeline.product.contents import contents
+from aesi.pipeline.written import BATCH_SUMMARIES
 
 CELL_FILES = ("*.bpx.json", "*.json")
 LAID_BESIDE = (".", "~$")
@@ -88,7 +89,8 @@ def read_plan(source: Path, cell: Path | None = None, soh: Soh | None = None) ->
 
 
 def _check_names(source: Path, names: list[str]) -> None:
-    """Raises InputError for a name that is there twice, and for one that is no name of a folder."""
+    """Raises InputError for a name that is there twice, for one that is no name of a folder, and for that of a file of
+    the batch, in capitals too: some file systems do not tell them apart."""
     for name in names:
         if names.count(name) > 1:
             raise InputError(
@@ -97,6 +99,11 @@ def _check_names(source: Path, names: list[str]) -> None:
         if Path(name).name != name or name.startswith("."):
             raise InputError(
                 f"{source}: {name!r} names a folder of results; give a name without slashes that starts with no dot."
+            )
+        if name.lower() in BATCH_SUMMARIES:
+            raise InputError(
+                f"{source}: {name!r} names a folder of results, and is the name of a file beside these; give another "
+                "name."
             )
 
 

@@ -115,7 +115,9 @@ def final_models(
 def _fit(name: str, problem: Problem, chosen: Candidate, config: ExperimentConfig) -> Fitted:
     started = time.monotonic()
     trials: list[Mapping[str, Any]] = []
-    model, terms = _model(name, problem, chosen, replace(_tuning(problem, config), told=trials.append))
+    model, terms = _model(
+        name, problem, chosen, replace(_tuning(problem, config), on_candidate=trials.append)
+    )
     return Fitted(model, terms, time.monotonic() - started, trials=tuple(trials))
 
 

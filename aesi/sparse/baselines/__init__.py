@@ -27,7 +27,8 @@ class Tuning:
     """Budget and judgement of a baseline, the same as of the search.
 
     candidates : number of evaluations.  population : size of a generation.  space : ranges of the genes; None takes the
-    widest.  judge : weights of the fitness, and constraints.  told : called with each candidate, a row of plain values.
+    widest.  judge : weights of the fitness, and constraints.  on_candidate : called with each candidate, a row of plain
+    values.
     """
 
     seed: int = 0
@@ -35,13 +36,19 @@ class Tuning:
     population: int = 20
     space: GenomeSpace | None = None
     judge: Judge = field(default_factory=Judge)
-    told: Callable[[dict[str, Any]], None] | None = None
+    on_candidate: Callable[[dict[str, Any]], None] | None = None
 
 
 BASELINES: dict[str, Callable[[Problem, Tuning], ErrorModel]] = {
     "constant": lambda problem, _: constant(problem),
     "SINDy-C": lambda problem, tuning: tuned_sindy_c(
-        problem, tuning.seed, tuning.candidates, tuning.population, tuning.space, tuning.judge, tuning.told
+        problem,
+        tuning.seed,
+        tuning.candidates,
+        tuning.population,
+        tuning.space,
+        tuning.judge,
+        tuning.on_candidate,
     ),
     "PySINDy ensemble": lambda problem, tuning: pysindy_ensemble(problem, tuning.seed, tuning.judge),
     "DMD with control": lambda problem, _: dmd_with_control(problem),

@@ -23,7 +23,7 @@ from aesi.sparse import free_run
 from aesi.sparse.baselines.single import Judge
 from aesi.sparse.fade import Fade
 from aesi.sparse.search.evaluate import fitness
-from aesi.sparse.search.judge import Fit, Judged, on_validation, runs_without_feedback
+from aesi.sparse.search.judge import Fit, Judged, judged_on_validation, runs_without_feedback
 from aesi.sparse.search.problem import Problem
 from aesi.sparse.terms.inputs import with_inputs
 from aesi.sparse.terms.scaling import Scaling
@@ -53,7 +53,7 @@ class BoostedErrorModel:
         start = float(series.error_v[0]) if error0_v is None else error0_v
         variables = self._variables(series)
         scaled0 = float(self.scaling.error_to_scaled(np.array(start)))
-        scaled = free_run.remember(self._given(variables, series), self.memory, scaled0)
+        scaled = free_run.autoregressive_run(self._by_inputs(variables, series), self.memory, scaled0)
         error_v = np.append(start, self.scaling.error_to_volts(scaled))
         variables[:, 0] = error_v
         return FreeRun(error_v, None, self.scaling.is_outside(variables))
@@ -61,20 +61,20 @@ class BoostedErrorModel:
     def k_step(self, series: ErrorSeries, steps: int) -> Array:
         """(n,) V: the prediction of error_v[k] given error_v[k - steps]; the first ones from error_v[0]."""
         measured = self.scaling.error_to_scaled(series.error_v)
-        given = self._given(self._variables(series), series)
-        scaled = free_run.remember_ahead(given, self.memory, measured, steps)
+        by_inputs = self._by_inputs(self._variables(series), series)
+        scaled = free_run.autoregressive_ahead(by_inputs, self.memory, measured, steps)
         return np.append(series.error_v[:1], self.scaling.error_to_volts(scaled))
 
     def _variables(self, series: ErrorSeries) -> Array:
         return np.column_stack([series.error_v, with_inputs(series, self.input_names).inputs])
 
-    def _given(self, variables: Array, series: ErrorSeries) -> Array:
+    def _by_inputs(self, variables: Array, series: ErrorSeries) -> Array:
         scaled = self.scaling.apply(variables)[:, 1:]
-        given = np.asarray(self.regressor.predict(scaled), dtype=float)
+        by_inputs = np.asarray(self.regressor.predict(scaled), dtype=float)
         if self.fade is not None:
-            unheld = scaled + self.scaling.cut_off(variables)[:, 1:]
-            given = given * self.fade.weight(unheld, series.soc, series.temperature_degc, None)
-        return given[:-1]
+            not_clipped = scaled + self.scaling.cut_off(variables)[:, 1:]
+            by_inputs = by_inputs * self.fade.weight(not_clipped, series.soc, series.temperature_degc, None)
+        return by_inputs[:-1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,15 +88,15 @@ class _Boosted:
 def gradient_boosting(problem: Problem, seed: int = 0, judge: Judge | None = None) -> BoostedErrorModel:
     """The best of the grid, fitted to all training rows."""
     judge = judge or Judge()
-    return judge.best(one for leaves in LEAVES for one in _tried(problem, leaves, seed, judge)).model
+    return judge.best(one for leaves in LEAVES for one in _judged_models(problem, leaves, seed, judge)).model
 
 
-def _tried(problem: Problem, leaves: int, seed: int, judge: Judge) -> Iterator[_Boosted]:
+def _judged_models(problem: Problem, leaves: int, seed: int, judge: Judge) -> Iterator[_Boosted]:
     """The models with these leaves, judged, one for each number of trees."""
-    left_out = [_left_out(problem, fold, leaves, seed) for fold in range(len(problem.folds))]
-    for number, trees in enumerate(TREES):
-        given = np.concatenate([each[number] for each in left_out])
-        runs, memory = runs_without_feedback(problem, np.column_stack([given] * 2))
+    left_out = [_left_out_predictions(problem, fold, leaves, seed) for fold in range(len(problem.folds))]
+    for place, trees in enumerate(TREES):
+        predictions = np.concatenate([by_trees[place] for by_trees in left_out])
+        runs, memory = runs_without_feedback(problem, np.column_stack([predictions] * 2))
         regressor = _regressor(leaves, trees, seed)
         model = BoostedErrorModel(
             regressor.fit(problem.inputs, problem.target, problem.row_weights),
@@ -105,13 +105,13 @@ def _tried(problem: Problem, leaves: int, seed: int, judge: Judge) -> Iterator[_
             memory,
             Fade(runs.amplitudes[0], problem.region) if problem.options.fade else None,
         )
-        (valid,) = on_validation(problem, runs, (model,))
+        (valid,) = judged_on_validation(problem, runs, (model,))
         folds = runs.judge(problem, Fit.FOLD)
         losses = folds.loss, valid.loss, 0.0
         yield _Boosted(fitness(losses, len(problem.library), judge.weights), model, valid, folds.pearson)
 
 
-def _left_out(problem: Problem, fold: int, leaves: int, seed: int) -> list[Array]:
+def _left_out_predictions(problem: Problem, fold: int, leaves: int, seed: int) -> list[Array]:
     """Predictions of a left-out piece by a fit to the rest, for each number of trees."""
     a, b = problem.folds[fold]
     others = np.r_[0:a, b : len(problem.target)]
@@ -119,7 +119,7 @@ def _left_out(problem: Problem, fold: int, leaves: int, seed: int) -> list[Array
         problem.inputs[others], problem.fold_targets[fold, others], problem.row_weights[others]
     )
     stages = enumerate(regressor.staged_predict(problem.inputs[a:b]), start=1)
-    return [np.asarray(given, dtype=float) for trees, given in stages if trees in TREES]
+    return [np.asarray(predictions, dtype=float) for trees, predictions in stages if trees in TREES]
 
 
 def _regressor(leaves: int, trees: int, seed: int) -> Any:

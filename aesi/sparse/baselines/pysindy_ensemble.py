@@ -25,6 +25,7 @@ NAME = "PySINDy ensemble"
 MEMBERS = 20
 """Models of the ensemble: the default of PySINDy."""
 MOST_ROWS = 20_000
+"""Rows that the ensemble is fitted to, at most."""
 THRESHOLD = 1e-3
 """Coefficients below are dropped."""
 _RIDGES = (1.0, 10.0, 100.0, 1000.0)
@@ -33,18 +34,21 @@ _RIDGES = (1.0, 10.0, 100.0, 1000.0)
 
 def pysindy_ensemble(problem: Problem, seed: int = 0, judge: Judge | None = None) -> SparseModel:
     """The median of the ensemble. Raises FitError where no setting of the grid runs freely."""
-    best = _setting(problem, judge or Judge())
+    best = _best_genome(problem, judge or Judge())
     active = np.flatnonzero(best.active(problem.library))
-    every = -(-len(problem.target) // MOST_ROWS)
-    root = np.sqrt(problem.row_weights[::every])[:, None]
-    theta = problem.theta(active).T[::every] * root
-    coefficients = _median(theta, problem.target[::every, None] * root, best.lambda1 / every, seed)
+    thinning = -(-len(problem.target) // MOST_ROWS)
+    root_weights = np.sqrt(problem.row_weights[::thinning])[:, None]
+    theta = problem.theta(active).T[::thinning] * root_weights
+    coefficients = _median_coefficients(
+        theta, problem.target[::thinning, None] * root_weights, best.lambda1 / thinning, seed
+    )
     if not coefficients.any():
         raise FitError(f"{NAME}: every coefficient is below the threshold of {THRESHOLD:g}.")
     return sparse_model(problem, active, coefficients, 0.0, NAME)
 
 
-def _median(theta: np.ndarray, target: np.ndarray, ridge: float, seed: int) -> np.ndarray:
+def _median_coefficients(theta: np.ndarray, target: np.ndarray, ridge: float, seed: int) -> np.ndarray:
+    """(m,) median over the members.  theta : (n, m).  target : (n, 1)."""
     import pysindy
 
     np.random.seed(seed)  # PySINDy draws its rows by the global generator  # noqa: NPY002
@@ -57,7 +61,8 @@ def _median(theta: np.ndarray, target: np.ndarray, ridge: float, seed: int) -> n
     return np.asarray(np.median([member[0] for member in ensemble.coef_list], axis=0), dtype=float)
 
 
-def _setting(problem: Problem, judge: Judge) -> Genome:
+def _best_genome(problem: Problem, judge: Judge) -> Genome:
+    """The best setting of the grid, judged by a single fit.  Raises FitError where none runs freely."""
     singles = []
     top = int(problem.library.degrees.max())
     for d, ridge in product(range(1, min(2, top) + 1), _RIDGES):

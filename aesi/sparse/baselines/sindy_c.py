@@ -38,19 +38,19 @@ def tuned_sindy_c(
     population: int = 20,
     space: GenomeSpace | None = None,
     judge: Judge | None = None,
-    told: Callable[[dict[str, Any]], None] | None = None,
+    on_candidate: Callable[[dict[str, Any]], None] | None = None,
 ) -> SparseModel:
     """The fittest of `candidates` models that keep to the constraints, or of all where none does.
 
-    told : hears of each candidate, as a row of plain values. Raises FitError where none survives.
+    on_candidate : called with each candidate, a row of plain values. Raises FitError where none survives.
     """
     space, judge = space or GenomeSpace.of(problem.library), judge or Judge()
     rng = np.random.default_rng([seed, 1])
 
     def evaluate(genome: Genome) -> Single | Failed:
         outcome = evaluate_sindy_c(problem, genome, judge.weights)
-        if told is not None:
-            told(_row(genome, outcome, judge))
+        if on_candidate is not None:
+            on_candidate(_row(genome, outcome, judge))
         return outcome
 
     return fittest(space, evaluate, candidates, population, rng, judge.admits).model

@@ -14,7 +14,7 @@ from aesi.sparse.model import SparseModel
 from aesi.sparse.search.evaluate import FitnessWeights, faded, fitness, sparse_model
 from aesi.sparse.search.evolution import HasFitness, ranked
 from aesi.sparse.search.genome import Genome
-from aesi.sparse.search.judge import Fit, Judged, fold_runs, on_validation
+from aesi.sparse.search.judge import Fit, Judged, fold_runs, judged_on_validation
 from aesi.sparse.search.problem import Problem
 
 FactorFit = Callable[[Array], Array]
@@ -46,9 +46,9 @@ class Judge:
     pearson_train: float = 0.5
     pearson_valid: float = 0.5
 
-    def admits(self, one: Tried) -> bool:
+    def admits(self, tried: Tried) -> bool:
         """Whether a candidate meets the constraints."""
-        return one.pearson_train > self.pearson_train and one.valid.pearson > self.pearson_valid
+        return tried.pearson_train > self.pearson_train and tried.valid.pearson > self.pearson_valid
 
     def best(self, tried: Iterable[T]) -> T:
         """The fittest of those that meet the constraints, or of all where none does; of equal ones the first."""
@@ -86,7 +86,7 @@ def evaluate_single(
     fits = np.stack([fit(factor[:, columns]) for factor in problem.fold_factors])
     runs, memory = fold_runs(problem, active, fits, fits)
     model = faded(sparse_model(problem, active, coefficients, memory, name), problem, runs.amplitudes[0])
-    folds, (valid,) = runs.judge(problem, Fit.FOLD), on_validation(problem, runs, (model,))
+    folds, (valid,) = runs.judge(problem, Fit.FOLD), judged_on_validation(problem, runs, (model,))
     if not np.isfinite(folds.loss + valid.loss):
         return Failed("the model diverges in free run")
     losses = (folds.loss, valid.loss, int(np.count_nonzero(coefficients)))

@@ -13,7 +13,7 @@ from aesi.sparse.ensemble import Ensemble, best_members, combine
 from aesi.sparse.fade import Fade
 from aesi.sparse.model import SparseModel
 from aesi.sparse.search.genome import Genome
-from aesi.sparse.search.judge import Fit, FoldRuns, Judged, fold_runs, on_validation
+from aesi.sparse.search.judge import Fit, FoldRuns, Judged, fold_runs, judged_on_validation
 from aesi.sparse.search.out_of_bag import out_of_bag
 from aesi.sparse.search.problem import Problem
 from aesi.sparse.stridge import STRidge
@@ -145,7 +145,7 @@ def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = 
             ENSEMBLES, (ensemble.bagging, ensemble.stability), runs.amplitudes, strict=True
         )
     )
-    judged = on_validation(problem, runs, (bagging, stability))
+    judged = judged_on_validation(problem, runs, (bagging, stability))
     valid = judged[0]
     valid_losses = _with_left_out(problem, runs, judged)
     loss_valid = float(np.mean(valid_losses))
@@ -223,16 +223,17 @@ def _with_left_out(problem: Problem, runs: FoldRuns, judged: Sequence[Judged]) -
     candidates that fit it by chance. On ten virtual cells (40 candidates of one search each) the candidate that is
     picked with the pieces takes 78.8 % off the test's squared error, 76.6 without, the mean of five 80.3 and 78.6.
     """
-    one, stable = (
-        0.5 * (each.loss + runs.judge(problem, Fit(column)).loss) for column, each in enumerate(judged)
+    bagging, stable = (
+        0.5 * (scores.loss + runs.judge(problem, Fit(column)).loss) for column, scores in enumerate(judged)
     )
-    return one, stable
+    return bagging, stable
 
 
 def _out_of_fold(problem: Problem, runs: FoldRuns) -> tuple[OutOfFoldResiduals, ...]:
-    left = problem.scaling.error_volts_per_unit * (problem.unseen_target[:, None] - runs.one_step)
+    """The one-step residuals of each training record by the fits of its folds."""
+    residuals_v = problem.scaling.error_volts_per_unit * (problem.unseen_target[:, None] - runs.one_step)
     return tuple(
-        OutOfFoldResiduals(record.name, left[a:b, 0], left[a:b, 1])
+        OutOfFoldResiduals(record.name, residuals_v[a:b, 0], residuals_v[a:b, 1])
         for record, (a, b) in zip(problem.split.train, problem.spans, strict=True)
     )
 

@@ -22,7 +22,7 @@ class HasFitness(Protocol):
         ...
 
 
-class Bred(HasFitness, Protocol):
+class Evaluated(HasFitness, Protocol):
     """Result of an evaluation: genome and fitness."""
 
     @property
@@ -32,12 +32,12 @@ class Bred(HasFitness, Protocol):
 
 
 R = TypeVar("R", bound=HasFitness)
-T = TypeVar("T", bound=Bred)
+T = TypeVar("T", bound=Evaluated)
 
 
 def ranked(tried: Iterable[R], admitted: Callable[[R], bool]) -> list[R]:
     """The results, fittest first; those that are not `admitted` come last, equally fit ones stay in their order."""
-    return sorted(tried, key=lambda one: (not admitted(one), -one.fitness))
+    return sorted(tried, key=lambda result: (not admitted(result), -result.fitness))
 
 
 def fittest(
@@ -53,25 +53,28 @@ def fittest(
     The first ones are the plain starts of the space. Those that are not `admitted` rank below all that are.
     Raises FitError where none survives.
     """
-    alive: list[T] = []
+    survivors: list[T] = []
     starts = list(space.plain_starts())
     reason = ""
-    for begun in range(0, candidates, population):
-        for _ in range(min(population, candidates - begun)):
-            outcome = evaluate(starts.pop(0) if starts else _proposal(space, alive, population, rng))
+    for first in range(0, candidates, population):
+        for _ in range(min(population, candidates - first)):
+            outcome = evaluate(starts.pop(0) if starts else _proposal(space, survivors, population, rng))
             if isinstance(outcome, Failed):
                 reason = outcome.reason
             else:
-                alive.append(outcome)
-        alive = ranked(alive, admitted)
-    if not alive:
+                survivors.append(outcome)
+        survivors = ranked(survivors, admitted)
+    if not survivors:
         raise FitError(f"none of {candidates} candidates survives (the last one: {reason}).")
-    return alive[0]
+    return survivors[0]
 
 
-def _proposal(space: GenomeSpace, alive: Sequence[Bred], population: int, rng: np.random.Generator) -> Genome:
-    parents = alive[: population // 2]
+def _proposal(
+    space: GenomeSpace, survivors: Sequence[Evaluated], population: int, rng: np.random.Generator
+) -> Genome:
+    """A child of two of the fittest, at random; a random genome while there are not two.  survivors : fittest first."""
+    parents = survivors[: population // 2]
     if len(parents) < 2:
         return space.random(rng)
-    one, other = rng.choice(len(parents), size=2, replace=False)
-    return space.child(parents[one].genome, parents[other].genome, rng)
+    mother, father = rng.choice(len(parents), size=2, replace=False)
+    return space.child(parents[mother].genome, parents[father].genome, rng)

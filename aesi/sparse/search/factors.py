@@ -49,11 +49,11 @@ def factored(
     columns = _columns(rows, (rows.target, *own_targets))
     columns *= np.sqrt(row_weights)[:, None]
     q_rows, r = orthonormal(columns)
-    held = np.vstack([counts, leave_out_weights(folds, len(rows.target))])
-    every = triangular_factors(weighted_grams(q_rows, held), r)
+    weights = np.vstack([counts, leave_out_weights(folds, len(rows.target))])
+    all_factors = triangular_factors(weighted_grams(q_rows, weights), r)
     return Factors(
-        factors=every[: len(counts), :, : m + 1],
-        fold_factors=_of_own_target(every[len(counts) :], m, len(own_targets)),
+        factors=all_factors[: len(counts), :, : m + 1],
+        fold_factors=_of_own_target(all_factors[len(counts) :], m, len(own_targets)),
         full_factor=r[:, : m + 1],
     )
 
@@ -65,7 +65,7 @@ def _columns(rows: TrainingRows, targets: Sequence[Array]) -> Array:
     """
     m = len(rows.library)
     columns = np.empty((rows.products.shape[1], m + len(targets)), order="F")
-    for j, (product, q) in enumerate(zip(rows.which, rows.library.feedbacks, strict=True)):
+    for j, (product, q) in enumerate(zip(rows.product_of_term, rows.library.feedbacks, strict=True)):
         columns[:, j] = rows.products[product] * rows.error_functions[q]
     for j, target in enumerate(targets, start=m):
         columns[:, j] = target

@@ -97,9 +97,9 @@ class _Member:
     def coefficients(self, factor: Array) -> Array:
         """(m,) of the problem that the factor (any, m + 1) poses, times its share."""
         m = factor.shape[1] - 1
-        given = np.zeros(m)
-        given[self.places] = self.share * self.solver.fit_factor(factor[:, np.append(self.places, m)])
-        return given
+        shared = np.zeros(m)
+        shared[self.places] = self.share * self.solver.fit_factor(factor[:, np.append(self.places, m)])
+        return shared
 
 
 def _members(
@@ -109,12 +109,14 @@ def _members(
     candidates = candidate.members or (candidate,)
     stable = judged.name == candidate.stability.name
     terms = [_terms(problem, one, stable) for one in candidates]
-    every = np.unique(np.concatenate(terms))
-    return every, tuple(
+    all_terms = np.unique(np.concatenate(terms))
+    return all_terms, tuple(
         _Member(
-            STRidge(one.genome.lambda1, one.genome.lambda2), np.searchsorted(every, mine), 1 / len(candidates)
+            STRidge(one.genome.lambda1, one.genome.lambda2),
+            np.searchsorted(all_terms, own_terms),
+            1 / len(candidates),
         )
-        for one, mine in zip(candidates, terms, strict=True)
+        for one, own_terms in zip(candidates, terms, strict=True)
     )
 
 
@@ -130,8 +132,10 @@ def _terms(problem: Problem, candidate: Candidate, stable: bool) -> IntArray:
 def with_leverage(model: SparseModel, problem: Problem, lambda1: float) -> SparseModel:
     """The model with the leverage of a fit of its terms to all training rows, which its fade then uses too."""
     number = {term: j for j, term in enumerate(problem.library.terms)}
-    which: IntArray = np.array([number[term] for term in model.library.terms])
-    return replace(model, leverage=Leverage.of(problem.full_factor[:, which], lambda1, problem.theta(which)))
+    own_terms: IntArray = np.array([number[term] for term in model.library.terms])
+    return replace(
+        model, leverage=Leverage.of(problem.full_factor[:, own_terms], lambda1, problem.theta(own_terms))
+    )
 
 
 def fold_samples(problem: Problem, a: int, b: int) -> tuple[ErrorSeries, slice]:

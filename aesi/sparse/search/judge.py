@@ -16,7 +16,7 @@ from aesi.sparse.fade import amplitude
 from aesi.sparse.search.problem import Problem
 from aesi.sparse.search.rows import balanced_weights, spans_of
 
-_MOST_MEMORY = 0.9999
+_MAX_MEMORY = 0.9999
 """Largest share of an error that is left after a step; at 1 the first error would never be forgotten."""
 
 
@@ -39,12 +39,12 @@ class Judged:
 def drive_of(problem: Problem, active: IntArray, fits: Array, rows: slice) -> tuple[Array, IntArray]:
     """(sums of the input parts of the terms by function of e (n_functions, rows, models), these functions)."""
     feedbacks = problem.library.feedbacks[active]
-    products = problem.which[active]
+    products = problem.product_of_term[active]
     functions = np.unique(feedbacks)
     drive = np.empty((len(functions), rows.stop - rows.start, len(fits)))
     for part, q in zip(drive, functions, strict=True):
-        mine = feedbacks == q
-        np.matmul(problem.products[products[mine], rows].T, fits[:, mine].T, out=part)
+        of_function = feedbacks == q
+        np.matmul(problem.products[products[of_function], rows].T, fits[:, of_function].T, out=part)
     return drive, functions
 
 
@@ -55,7 +55,7 @@ def free_predictions(
     if not functions.any():
         return np.asarray(drive[0])
     clip = problem.options.outside == "clip"
-    return np.asarray(free_run.run_many(drive, functions, problem.error[rows], restart, state, clip))
+    return np.asarray(free_run.run_ensemble(drive, functions, problem.error[rows], restart, state, clip))
 
 
 def one_step_predictions(problem: Problem, drive: Array, functions: IntArray, rows: slice) -> Array:
@@ -77,15 +77,15 @@ class Fit(IntEnum):
 class FoldRuns:
     """Scaled predictions (n, 2) along the training rows in each regime, one column per `Fit`.
 
-    from_none : free run without a measured error at its start; equal to `free_run` for models with feedback.
+    from_unmeasured : free run without a measured error at its start; equal to `free_run` for models with feedback.
     Corrections fade in all of them by nearness and amplitude, not by leverage (fade.py).
     amplitudes : (2,) a of (2) there.  sums : (2, n_folds, 3) for each fit and fold the scaled sums of e**2, e p and
-    p**2, with p the prediction `from_none` before the amplitude.
+    p**2, with p the prediction `from_unmeasured` before the amplitude.
     """
 
     one_step: Array
     free_run: Array
-    from_none: Array
+    from_unmeasured: Array
     sums: Array
     amplitudes: tuple[float, float] = (1.0, 1.0)
 
@@ -94,7 +94,7 @@ class FoldRuns:
         run = self.free_run if problem.options.regime == "free_run" else self.one_step
         truth = problem.unseen_target
         with np.errstate(invalid="ignore"):
-            runs = (run, self.from_none) if problem.options.regime == "free_run" else (run,)
+            runs = (run, self.from_unmeasured) if problem.options.regime == "free_run" else (run,)
             squares = [problem.row_weights @ (truth - each[:, column]) ** 2 for each in runs]
             loss = float(np.mean(squares) / (problem.row_weights @ truth**2))
             loss_free = mse(truth, self.free_run[:, column]) / float(np.mean(truth**2))
@@ -118,60 +118,64 @@ def fold_runs(problem: Problem, active: IntArray, fits: Array, refits: Array) ->
     parts = []
     for (a, b), (drive, functions) in zip(problem.folds, drives, strict=True):
         rows = slice(a, b)
-        one = one_step_predictions(problem, drive, functions, rows)
+        one_step = one_step_predictions(problem, drive, functions, rows)
         restart = np.zeros(b - a, dtype=bool)
         restart[0] = True
-        free = free_predictions(problem, drive, functions, rows, restart, np.zeros(2))
-        parts.append((one, free))
-    free_run_ = np.vstack([free for _, free in parts])
-    sums = _sums(problem, free_run_)
-    return FoldRuns(np.vstack([one for one, _ in parts]), free_run_, free_run_, sums), 0.0
+        free_runs = free_predictions(problem, drive, functions, rows, restart, np.zeros(2))
+        parts.append((one_step, free_runs))
+    all_free_runs = np.vstack([free_runs for _, free_runs in parts])
+    sums = _fold_sums(problem, all_free_runs)
+    return FoldRuns(np.vstack([one_step for one_step, _ in parts]), all_free_runs, all_free_runs, sums), 0.0
 
 
-def _sums(problem: Problem, given: Array) -> Array:
+def _fold_sums(problem: Problem, predictions: Array) -> Array:
+    """`FoldRuns.sums` of scaled predictions (n, 2)."""
     error = problem.unseen_target[:, None]
     with np.errstate(invalid="ignore", over="ignore"):
-        products = np.stack([np.broadcast_to(error**2, given.shape), error * given, given**2], axis=-1)
+        products = np.stack(
+            [np.broadcast_to(error**2, predictions.shape), error * predictions, predictions**2], axis=-1
+        )
         return np.stack([products[a:b].sum(axis=0) for a, b in problem.folds], axis=1)
 
 
-def runs_without_feedback(problem: Problem, given: Array) -> tuple[FoldRuns, float]:
+def runs_without_feedback(problem: Problem, predictions: Array) -> tuple[FoldRuns, float]:
     """`fold_runs` of models without feedback.
 
-    given : (n, 2) scaled predictions by the inputs alone, of rows that the models have not seen."""
-    amplitudes = [1.0] * given.shape[1]
-    sums = _sums(problem, given)
+    predictions : (n, 2) scaled predictions by the inputs alone, of rows that the models have not seen."""
+    amplitudes = [1.0] * predictions.shape[1]
+    sums = _fold_sums(problem, predictions)
     if problem.options.fade:
-        given = problem.nearness[:, None] * given
-        sums = _sums(problem, given)
+        predictions = problem.nearness[:, None] * predictions
+        sums = _fold_sums(problem, predictions)
         amplitudes = [
             amplitude(problem.unseen_target, column, problem.folds, problem.fold_drives, problem.row_weights)
-            for column in given.T
+            for column in predictions.T
         ]
-        given = given * amplitudes
-    memory = memory_of(problem, [given[a:b, Fit.FOLD] for a, b in problem.folds])
-    one, free = np.empty_like(given), np.empty_like(given)
+        predictions = predictions * amplitudes
+    memory = memory_of(problem, [predictions[a:b, Fit.FOLD] for a, b in problem.folds])
+    one_step, free_runs = np.empty_like(predictions), np.empty_like(predictions)
     for a, b in problem.folds:
-        for j, column in enumerate(given[a:b].T):
-            one[a:b, j] = free_run.remember_ahead(column, memory, problem.unseen_error[a:b], 1)
-            free[a:b, j] = free_run.remember(column, memory, problem.unseen_error[a])
-    return FoldRuns(one, free, given, sums, (amplitudes[0], amplitudes[1])), memory
+        for j, column in enumerate(predictions[a:b].T):
+            one_step[a:b, j] = free_run.autoregressive_ahead(column, memory, problem.unseen_error[a:b], 1)
+            free_runs[a:b, j] = free_run.autoregressive_run(column, memory, problem.unseen_error[a])
+    return FoldRuns(one_step, free_runs, predictions, sums, (amplitudes[0], amplitudes[1])), memory
 
 
-def memory_of(problem: Problem, given: Sequence[Array]) -> float:
+def memory_of(problem: Problem, predictions: Sequence[Array]) -> float:
     """Lag-one autoregression coefficient of a residual on unseen rows, within [0, 1).
 
-    It is the median over the folds: a single fold in which the physics drifts away by volts would dominate a mean.
+    predictions : one array per fold, scaled. The result is the median over the folds: a single fold in which the
+    physics drifts away by volts would dominate a mean.
     """
-    each = []
-    for (a, b), prediction in zip(problem.folds, given, strict=True):
-        left = problem.unseen_target[a:b] - prediction
-        square = float(left[:-1] @ left[:-1])
-        each.append(float(left[1:] @ left[:-1]) / square if square > 0 else 0.0)
-    return float(np.clip(np.median(each), 0.0, _MOST_MEMORY))
+    by_fold = []
+    for (a, b), predicted in zip(problem.folds, predictions, strict=True):
+        residual = problem.unseen_target[a:b] - predicted
+        square = float(residual[:-1] @ residual[:-1])
+        by_fold.append(float(residual[1:] @ residual[:-1]) / square if square > 0 else 0.0)
+    return float(np.clip(np.median(by_fold), 0.0, _MAX_MEMORY))
 
 
-def on_records(model: ErrorModel, records: Sequence[ErrorSeries], problem: Problem) -> Judged:
+def judged_on_records(model: ErrorModel, records: Sequence[ErrorSeries], problem: Problem) -> Judged:
     """The scores of a model on whole records, each started from its first measured error."""
     truth = [record.error_v[1:] for record in records]
     one_step = [model.one_step(record)[1:] for record in records]
@@ -193,15 +197,17 @@ def _relative_loss(truth: Sequence[Array], predictions: Sequence[Array], balance
     spans = spans_of([len(record) for record in truth])
     joined = np.concatenate(truth)
     weights = balanced_weights(spans, joined) if balance else np.ones(len(joined))
-    left = joined - np.concatenate(predictions)
-    return float((weights @ left**2) / (weights @ joined**2))
+    residual = joined - np.concatenate(predictions)
+    return float((weights @ residual**2) / (weights @ joined**2))
 
 
-def on_validation(problem: Problem, runs: FoldRuns, models: Sequence[ErrorModel]) -> tuple[Judged, ...]:
+def judged_on_validation(
+    problem: Problem, runs: FoldRuns, models: Sequence[ErrorModel]
+) -> tuple[Judged, ...]:
     """The scores of each model on the validation records, or on left-out pieces where there are none.
 
     models : AESI I and II, or a single one; on pieces they are represented by the fold's fits.
     """
     if problem.split.valid:
-        return tuple(on_records(model, problem.split.valid, problem) for model in models)
+        return tuple(judged_on_records(model, problem.split.valid, problem) for model in models)
     return tuple(runs.judge(problem, Fit(column)) for column in range(len(models)))

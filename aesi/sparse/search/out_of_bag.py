@@ -26,36 +26,36 @@ _ROWS_AT_ONCE = 1024
 
 def out_of_bag(problem: Problem, active: IntArray, fits: Array, resamples: IntArray) -> Array:
     """(models,) equation (1) of the fits (models, m) of these resamples; infinite where one diverges."""
-    unseen_rows = problem.unseen_rows[:, resamples]
+    out_of_bag_counts = problem.out_of_bag_counts[:, resamples]
     squares = _squares(problem, active, fits, resamples)
     bare = float(problem.row_weights @ problem.target**2) / len(problem.target)
-    return comparable(squares, unseen_rows, problem.unseen_sizes) / bare
+    return comparable_losses(squares, out_of_bag_counts, problem.piece_sizes) / bare
 
 
-def comparable(squares: Array, rows: Array, sizes: Array) -> Array:
+def comparable_losses(squares: Array, rows: Array, sizes: Array) -> Array:
     """(models,) mean squared error of each model on all rows, as estimated from those it was judged on.
 
     squares : (pieces, models) summed over the `rows` (pieces, models) on which a model is judged; `sizes`
     (pieces,) are all rows of a piece. Pieces on which no model with finite errors is judged are left out.
     """
     judged = (rows > 0) & np.isfinite(squares)
-    mean = np.full(squares.shape, np.nan)
-    np.divide(squares, rows, out=mean, where=judged)
-    some = judged.any(axis=1)
-    if not some.any():
+    piece_means = np.full(squares.shape, np.nan)
+    np.divide(squares, rows, out=piece_means, where=judged)
+    judged_pieces = judged.any(axis=1)
+    if not judged_pieces.any():
         return np.full(squares.shape[1], np.inf)
-    typical = np.nanmedian(mean[some], axis=1)
+    typical = np.nanmedian(piece_means[judged_pieces], axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
-        ratio = squares[some].sum(axis=0) / (typical @ rows[some])
-    losses = ratio * float(typical @ sizes[some]) / float(sizes[some].sum())
+        ratio = squares[judged_pieces].sum(axis=0) / (typical @ rows[judged_pieces])
+    losses = ratio * float(typical @ sizes[judged_pieces]) / float(sizes[judged_pieces].sum())
     return np.where(np.isfinite(squares).all(axis=0) & np.isfinite(losses), losses, np.inf)
 
 
 def _squares(problem: Problem, active: IntArray, fits: Array, resamples: IntArray) -> Array:
     """(pieces, models) squared error on the rows that each model has not seen, weighted as in the fits."""
-    squares = np.zeros((len(problem.unseen_sizes), len(fits)))
+    squares = np.zeros((len(problem.piece_sizes), len(fits)))
     state = np.zeros(len(fits))
-    every = len(resamples) == problem.unseen.shape[1]
+    all_resamples = len(resamples) == problem.out_of_bag_rows.shape[1]
     for a in range(0, len(problem.target), _ROWS_AT_ONCE):
         rows = slice(a, min(a + _ROWS_AT_ONCE, len(problem.target)))
         drive, functions = drive_of(problem, active, fits, rows)
@@ -63,19 +63,26 @@ def _squares(problem: Problem, active: IntArray, fits: Array, resamples: IntArra
             prediction = free_predictions(problem, drive, functions, rows, problem.restart[rows], state)
         else:
             prediction = one_step_predictions(problem, drive, functions, rows)
-        unseen = problem.unseen[rows] if every else problem.unseen[rows][:, resamples]
+        out_of_bag_rows = (
+            problem.out_of_bag_rows[rows] if all_resamples else problem.out_of_bag_rows[rows][:, resamples]
+        )
         weights, pieces = problem.row_weights[rows], problem.piece_of_row[rows]
-        _add_squares(problem.target[rows], prediction, weights, unseen, pieces, squares)
+        _add_squares(problem.target[rows], prediction, weights, out_of_bag_rows, pieces, squares)
     return squares
 
 
 @kept_njit()
 def _add_squares(
-    target: Array, prediction: Array, weights: Array, unseen: BoolArray, pieces: IntArray, squares: Array
+    target: Array,
+    prediction: Array,
+    weights: Array,
+    out_of_bag_rows: BoolArray,
+    pieces: IntArray,
+    squares: Array,
 ) -> None:
-    """Add weights * (target - prediction)**2 of the unseen rows to the pieces they belong to."""
+    """Add weights * (target - prediction)**2 of the out-of-bag rows to the pieces they belong to."""
     for k in range(len(target)):
-        at = squares[pieces[k]]
+        of_piece = squares[pieces[k]]
         for j in range(prediction.shape[1]):
-            if unseen[k, j]:
-                at[j] += weights[k] * (target[k] - prediction[k, j]) ** 2
+            if out_of_bag_rows[k, j]:
+                of_piece[j] += weights[k] * (target[k] - prediction[k, j]) ** 2

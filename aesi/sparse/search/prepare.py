@@ -31,14 +31,14 @@ def prepared_series(
         names = library.variables[1:]
     train = [with_inputs(record, names) for record in split.train]
     for record in train:
-        _check(record, train[0].dt_s)
+        _check_record(record, train[0].dt_s)
     if np.ptp(np.concatenate([record.error_v for record in train])) == 0:
         raise DataError("the voltage error is constant over the training records: there is nothing to learn.")
     if library is None:
         names, notes = _useful_inputs(train)
     valid = [with_inputs(record, names) for record in split.valid]
     for record in valid:
-        _check(record, train[0].dt_s)
+        _check_record(record, train[0].dt_s)
     # The first sample is given; the loss is a share of the squares of the others, so that these must not be zero.
     if valid and not any(record.error_v[1:].any() for record in valid):
         raise DataError(
@@ -48,7 +48,8 @@ def prepared_series(
     return tuple(with_inputs(record, names) for record in train), tuple(valid), notes
 
 
-def _check(record: ErrorSeries, dt_s: float) -> None:
+def _check_record(record: ErrorSeries, dt_s: float) -> None:
+    """Raises DataError for a record that is too short, sampled otherwise, or not finite."""
     if len(record) < 3:
         raise DataError(f"{record.name}: {len(record)} samples are too few; a record needs at least 3.")
     if abs(record.dt_s / dt_s - 1.0) > 0.01:

@@ -126,21 +126,21 @@ class Problem(TrainingRows, Factors):
         drives = options.fold is None and len(rows.spans) > 1
         if not refits_physics_per_fold(drives, options.feedback, len(left_out), len(folds)):
             left_out = ()
-        unseen = unseen_errors(left_out, rows.scaling, rows.error, rows.target, folds)
+        left_out_errors = unseen_errors(left_out, rows.scaling, rows.error, rows.target, folds)
         row_weights = balanced_weights(rows.spans, rows.target) if options.balance else np.ones(n)
         counts = moving_block_weights(
             rows.spans, block, options.resamples, np.random.default_rng(options.seed)
         )
         return cls(
             **vars(rows),
-            **vars(factored(rows, unseen.targets, row_weights, counts, folds)),
+            **vars(factored(rows, left_out_errors.targets, row_weights, counts, folds)),
             options=options,
             split=replace(split, train=train, valid=valid),
             dt_s=train[0].dt_s,
-            unseen_error=unseen.error,
-            unseen_target=unseen.target,
-            fold_targets=unseen.targets
-            if len(unseen.targets)
+            unseen_error=left_out_errors.error,
+            unseen_target=left_out_errors.target,
+            fold_targets=left_out_errors.targets
+            if len(left_out_errors.targets)
             else np.broadcast_to(rows.target, (len(folds), n)),
             counts=counts,
             row_weights=row_weights,
@@ -167,7 +167,7 @@ class Problem(TrainingRows, Factors):
         return self.options.block or default_block(len(self.target))
 
     @cached_property
-    def unseen(self) -> BoolArray:
+    def out_of_bag_rows(self) -> BoolArray:
         """(n, resamples) the out-of-bag rows of each resample."""
         return np.ascontiguousarray(self.counts.T == 0)
 
@@ -178,15 +178,15 @@ class Problem(TrainingRows, Factors):
         return np.repeat(np.arange(len(lengths)), lengths)
 
     @cached_property
-    def unseen_sizes(self) -> Array:
+    def piece_sizes(self) -> Array:
         """(pieces,) rows of each piece."""
         return np.bincount(self.piece_of_row).astype(float)
 
     @cached_property
-    def unseen_rows(self) -> Array:
+    def out_of_bag_counts(self) -> Array:
         """(pieces, resamples) how many rows of each piece are out of bag."""
         first = np.flatnonzero(np.diff(self.piece_of_row, prepend=-1))
-        return np.add.reduceat(self.unseen, first, axis=0, dtype=float)
+        return np.add.reduceat(self.out_of_bag_rows, first, axis=0, dtype=float)
 
     def weights(self, resample: int) -> Array:
         """(n,) weight of each row in a resample."""

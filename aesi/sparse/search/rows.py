@@ -24,7 +24,7 @@ class TrainingRows:
     """Training rows k -> k + 1 of all records, and the library along them.
 
     spans : row range of each record.
-    products : (n_products, n) distinct input parts of the terms.  which : (m,) number of each term's input part.
+    products : (n_products, n) distinct input parts of the terms.  product_of_term : (m,) number of each term's.
     error_functions : (12, n) the functions of the fed-back error.  inputs : (n, n_inputs) scaled.
     error, target : (n,) scaled e[k] and e[k + 1].  soc : (n,).  temperature_degc : (n,) degC, NaN where it
     was not measured.  region : range of all rows.
@@ -34,7 +34,7 @@ class TrainingRows:
     scaling: Scaling
     spans: tuple[Span, ...]
     products: Array
-    which: IntArray
+    product_of_term: IntArray
     error_functions: Array
     error: Array
     inputs: Array
@@ -46,7 +46,7 @@ class TrainingRows:
     def theta(self, which: IntArray) -> Array:
         """(n_terms, n) the given terms along the training rows."""
         return np.asarray(
-            self.products[self.which[which]] * self.error_functions[self.library.feedbacks[which]]
+            self.products[self.product_of_term[which]] * self.error_functions[self.library.feedbacks[which]]
         )
 
 
@@ -60,7 +60,7 @@ def training_rows(train: Sequence[ErrorSeries], library: Library, outside: Outsi
             f"a library of {len(library)} terms needs more than the {len(rows)} training samples there are; "
             "lower p_c and d, leave out mixed terms, or give more data."
         )
-    parts, which = library.input_products
+    parts, product_of_term = library.input_products
     soc = np.concatenate([record.soc[:-1] for record in train])
     temperature_degc = np.concatenate([record.degc_or_nan[:-1] for record in train])
     return TrainingRows(
@@ -68,7 +68,7 @@ def training_rows(train: Sequence[ErrorSeries], library: Library, outside: Outsi
         scaling,
         spans=spans_of([len(block) for block in scaled]),
         products=evaluate_terms(parts, rows),
-        which=which,
+        product_of_term=product_of_term,
         error_functions=np.stack(
             [values(q, np.ascontiguousarray(rows[:, 0])) for q in range(len(FUNCTIONS))]
         ),
@@ -110,10 +110,10 @@ def nearness_of_left_out(inputs: Array, soc: Array, temperature_degc: Array, fol
     parts = []
     for a, b in folds:
         fold = np.s_[a:b]
-        others = TrainedRegion.of(
+        region_of_others = TrainedRegion.of(
             np.delete(inputs, fold, axis=0), np.delete(soc, fold), np.delete(temperature_degc, fold)
         )
-        parts.append(others.nearness(inputs[fold], soc[fold], temperature_degc[fold]))
+        parts.append(region_of_others.nearness(inputs[fold], soc[fold], temperature_degc[fold]))
     return np.concatenate(parts)
 
 
@@ -126,7 +126,7 @@ def balanced_weights(spans: Sequence[Span], bare: Array) -> Array:
     """(n,) weights of the rows, mean 1, with which the bare error (n,) of every record adds the same sum of squares."""
     sizes = np.array([b - a for a, b in spans])
     rows = np.maximum(sizes, 1)  # a record of a single sample has no row to judge
-    squares = np.array([np.sum(bare[a:b] ** 2) for a, b in spans]) / rows
-    each = 1.0 / np.maximum(squares, LEAST_SHARE * squares.mean())
-    weights: Array = np.repeat(each / rows, sizes)
+    mean_squares = np.array([np.sum(bare[a:b] ** 2) for a, b in spans]) / rows
+    record_weights = 1.0 / np.maximum(mean_squares, LEAST_SHARE * mean_squares.mean())
+    weights: Array = np.repeat(record_weights / rows, sizes)
     return weights / weights.mean()

@@ -62,6 +62,6 @@ def unseen_errors(
         )
         for which in (slice(None, -1), slice(1, None))
     )
-    own = np.repeat(np.arange(len(folds)), [b - a for a, b in folds])
+    fold_of_row = np.repeat(np.arange(len(folds)), [b - a for a, b in folds])
     rows = np.arange(len(target))
-    return UnseenErrors(after, before[own, rows], after[own, rows])
+    return UnseenErrors(after, before[fold_of_row, rows], after[fold_of_row, rows])

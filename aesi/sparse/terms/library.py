@@ -152,10 +152,10 @@ class Library:
         return evaluate_terms(self.terms, scaled).T
 
 
-def evaluate_terms(terms: Sequence[Term], scaled: Array, further: Array | None = None) -> Array:
+def evaluate_terms(terms: Sequence[Term], scaled: Array, overshoot: Array | None = None) -> Array:
     """(m, n): each term along scaled data (n, n_variables); each single function is computed once.
 
-    further : (n, n_variables), how far each function goes on from there along its slope.
+    overshoot : (n, n_variables), distance by which each function is extrapolated from there along its slope.
     """
     series = np.ascontiguousarray(np.asarray(scaled, dtype=float).T)
     known: dict[Factor, Array] = {}
@@ -166,13 +166,15 @@ def evaluate_terms(terms: Sequence[Term], scaled: Array, further: Array | None =
             if factor not in known:
                 variable, function = factor
                 known[factor] = values(function, series[variable])
-                if further is not None:
-                    known[factor] += slopes(function, series[variable]) * further[:, variable]
+                if overshoot is not None:
+                    known[factor] += slopes(function, series[variable]) * overshoot[:, variable]
             row *= known[factor]
     return out
 
 
 def _polynomials(n_variables: int, p_c: int, d: int, factors: int) -> list[Term]:
+    """The products of Chebyshev polynomials of up to `factors` different variables, of order 1 to p_c each and of total
+    degree d at most."""
     return [
         Term(tuple(zip(which, orders, strict=True)))
         for size in range(1, factors + 1)

@@ -42,12 +42,12 @@ class Scaling:
 
     def apply(self, data: Array) -> Array:
         """Scale (n, n_variables)."""
-        scaled = self._unheld(data)
+        scaled = self._not_clipped(data)
         return np.clip(scaled, -1.0, 1.0) if self.outside == "clip" else scaled
 
     def cut_off(self, data: Array) -> Array:
         """(n, n_variables) what `apply` has cut off the scaled values, 0 within the trained range."""
-        return self._unheld(data) - self.apply(data)
+        return self._not_clipped(data) - self.apply(data)
 
     def is_outside(self, data: Array) -> BoolArray:
         """(n,) True where any variable leaves its trained range."""
@@ -76,5 +76,5 @@ class Scaling:
         """Inverse of `to_dict`."""
         return cls(np.array(data["low"]), np.array(data["high"]), data["outside"])
 
-    def _unheld(self, data: Array) -> Array:
+    def _not_clipped(self, data: Array) -> Array:
         return 2.0 * (data - self.low) / (self.high - self.low) - 1.0

@@ -256,6 +256,15 @@ def test_the_results_of_a_run_were_written_over_by_another_command(call, tmp_pat
     assert f"--out {run} holds the results of a run (summary.json), whose model would be lost" in err
 
 
+def test_a_batch_with_a_cell_called_model_was_taken_for_a_run_when_it_went_on(tmp_path):
+    from flows.commands.outputs import check_folder
+
+    (tmp_path / "model").mkdir()
+    for name in ("summary.csv", "summary.json", "index.html"):
+        (tmp_path / name).write_text("")
+    check_folder(tmp_path)
+
+
 @pytest.mark.parametrize(
     ("command", "made", "words"),
     [

@@ -110,14 +110,14 @@ def test_a_record_too_short_to_decide_was_told_after_a_server_had_been_started(c
     [(InputError("no."), []), (DataAway("no network."), ["FAILED"]), (FitError("it fails."), ["FAILED"])],
 )
 def test_only_what_was_refused_is_taken_back(tracked, error, left):
-    with pytest.raises(type(error)), tracked_job(Subject("job", 0, "key"), "title", Console()):
+    with pytest.raises(type(error)), tracked_job(Subject("job", 0, "key", "batch"), "title", Console()):
         raise error
     assert statuses("job") == left
 
 
 def test_a_job_that_is_refused_after_it_tracked_something_keeps_it(tracked):
     def work():
-        with tracked_job(Subject("job", 0, "key"), "title", Console()) as tracker:
+        with tracked_job(Subject("job", 0, "key", "batch"), "title", Console()) as tracker:
             tracker.nested("candidate:1", "one", "candidate", {}, {})
             raise InputError("too late.")
 
@@ -133,7 +133,10 @@ def test_a_run_that_the_store_does_not_take_back_is_closed_as_failed(tracked, mo
         raise ConnectionError("no answer")
 
     monkeypatch.setattr(Tracker, "withdraw", away)
-    with pytest.raises(InputError, match="no"), tracked_job(Subject("job", 0, "key"), "title", Console()):
+    with (
+        pytest.raises(InputError, match="no"),
+        tracked_job(Subject("job", 0, "key", "batch"), "title", Console()),
+    ):
         raise InputError("no.")
     assert statuses("job") == ["FAILED"]
     (record,) = records("job")
@@ -149,7 +152,7 @@ def closed(workspace, monkeypatch):
 
 def test_a_workspace_that_cannot_be_written_to_ended_a_job_whose_results_lie_elsewhere(closed, capsys):
     done = []
-    with tracked_job(Subject("job", 0, "key"), "title", Console()) as tracker:
+    with tracked_job(Subject("job", 0, "key", "batch"), "title", Console()) as tracker:
         done.append(tracker)
     assert done == [None]
     (line,) = capsys.readouterr().err.splitlines()
@@ -200,7 +203,8 @@ def test_a_tracking_address_that_is_none_or_away_was_told_after_a_server_had_bee
 
 
 def test_a_workspace_with_an_escape_in_its_name_kept_its_runs_in_another_file(workspace, monkeypatch):
-    from flows.tracking.store import Store, checked_address
+    from flows.base.store_address import checked_address
+    from flows.tracking.store import Store
 
     for name in ("a%20b", "a?b"):
         monkeypatch.setenv("AESI_HOME", str(workspace / name))

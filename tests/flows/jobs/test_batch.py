@@ -51,7 +51,7 @@ def test_a_batch_that_goes_on_after_an_upgrade_says_what_is_done_again(tracked, 
 @pytest.mark.parametrize("runner", ["local", "dask"])
 def test_a_batch_is_tracked_with_the_trend_of_its_specimens(tracked, runner):
     from flows.jobs.batch import batch
-    from flows.tracking.store import Store
+    from flows.tracking.store import JOB, Store
 
     for name in ("a.csv", "b.csv"):
         (tracked / name).write_text(name)
@@ -71,6 +71,7 @@ def test_a_batch_is_tracked_with_the_trend_of_its_specimens(tracked, runner):
     parent = runs["plan.csv"]
     assert parent.data.metrics["failed"] == 1.0
     assert parent.info.status == "FINISHED"
+    assert parent.data.tags[JOB] == "batch"
 
 
 KILLED = """

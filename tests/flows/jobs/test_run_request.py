@@ -40,6 +40,14 @@ def test_an_address_that_nobody_would_go_to_is_refused(path):
         RunRequest(path, ("runner.kind=local",)).config
 
 
+def test_an_address_meant_dask_for_a_file_of_the_local_runner_where_a_batch_refuses_it(path):
+    local = ("runner={kind: local}",)
+    with pytest.raises(InputError, match=r"--address tcp://elsewhere:8786 .*; give --runner dask beside it"):
+        RunRequest(path, local, address=ELSEWHERE).config
+    asked = RunRequest(path, local, "dask", ELSEWHERE).config.runner
+    assert (asked.kind, asked.address) == ("dask", ELSEWHERE)
+
+
 def test_a_run_was_gone_on_with_on_other_data_or_by_another_version(tmp_path, monkeypatch):
     for name in ("cell.json", "a.csv", "b.csv"):
         (tmp_path / name).write_text(name)

@@ -122,7 +122,7 @@ def test_a_run_was_tracked_and_noted_before_it_was_this_processs_alone(
         with working_on(RunRequest(path, resume=resume), store, Console()) as tracker:
             assert taken(tracker.run_id)
         assert not taken(tracker.run_id)
-    with tracked_job(Subject("job", 0, "key"), "title", Console()) as tracker:
+    with tracked_job(Subject("job", 0, "key", "batch"), "title", Console()) as tracker:
         assert taken(tracker.run_id)
     assert not taken(tracker.run_id)
     assert len(seen) == 9
@@ -153,11 +153,11 @@ def test_a_file_that_a_job_left_over_was_sought_from_the_folder_of_the_next(
     monkeypatch.chdir(there)
     with monkeypatch.context() as away:
         away.setattr("flows.tracking.tracker.deliver", _away)
-        tracker = Tracker(store, Subject("job", 0, "key"), print)
+        tracker = Tracker(store, Subject("job", 0, "key", "batch"), print)
         tracker.files(Path("report.html"))
         assert tracker.end("FINISHED", wait_s=0.0) > 0
     monkeypatch.chdir(elsewhere)
-    with tracked_job(Subject("another", 0, "key"), "title", Console()):
+    with tracked_job(Subject("another", 0, "key", "batch"), "title", Console()):
         pass
     assert f"what run {tracker.run_id[:8]} had left over is delivered" in capsys.readouterr().err
     assert [one.path for one in store.client.list_artifacts(tracker.run_id)] == ["report.html"]

@@ -3,7 +3,7 @@
 import pytest
 
 from flows.results.tables import merged
-from flows.tracking.store import KIND, Store
+from flows.tracking.store import JOB, KIND, Store
 from flows.tracking.view import NOTE
 
 
@@ -112,6 +112,34 @@ def test_runs_of_other_settings_were_dropped_without_a_word(call, tracked):
     _, out, _ = call("tables", "two", "--run", ids[0][:8])
     assert f"tracked run {ids[0]} (seed 0)." in out
     assert "left out" not in out
+
+
+@pytest.mark.parametrize("earlier", [False, True], ids=["now", "by an earlier version"])
+@pytest.mark.parametrize(("job", "parameter"), [("batch", "cells"), ("benchmark", "cases")])
+def test_a_batch_stood_for_the_newest_run_of_an_experiment_of_that_name(
+    call, tracked, job, parameter, earlier
+):
+    store = Store()
+    experiment = store.experiment("batch")
+
+    def finish(tags, **parameters):
+        run_id = store.create_run(experiment, "batch", {KIND: "run"} | ({} if earlier else tags))
+        for key, value in parameters.items():
+            store.client.log_param(run_id, key, value)
+        return run_id
+
+    of_batch = finish({JOB: job}, **{parameter: 3})
+    store.client.set_terminated(of_batch)
+    code, _, err = call("tables", "batch")
+    assert (code, "'batch' has no finished run yet" in err) == (2, True)
+    ours = finish({JOB: "experiment"}, seed=0)
+    store.client.log_dict(ours, {"models": run(30.0, 90.0, None)}, "summary.json")
+    store.client.set_terminated(ours)
+    store.client.set_terminated(finish({JOB: job}, **{parameter: 3}))
+    code, out, _ = call("tables", "batch")
+    assert (code, f"tracked run {ours} (seed 0)" in out) == (0, True)
+    code, _, err = call("candidate", of_batch, "--out", tracked / "out")
+    assert (code, "is no candidate of a search, nor the run of an experiment" in err) == (2, True)
 
 
 @pytest.mark.parametrize(("note", "shown"), [("Our own cell", "(seed 1). Our own cell."), ("", "(seed 1).")])

@@ -4,8 +4,9 @@ import shutil
 
 import pytest
 
+from flows.base.store_address import without_login
 from flows.results.tables import tables_of
-from flows.tracking.store import KIND, Store, without_login
+from flows.tracking.store import KIND, Store
 
 
 def copied(source, target):

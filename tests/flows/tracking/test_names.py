@@ -7,7 +7,7 @@ from flows.tracking.delivery import deliver
 from flows.tracking.store import KIND
 from flows.tracking.tracker import Subject, Tracker, flat
 
-QUIET = Subject("small", 0, "digest", TrackingConfig(system_metrics=False, log_model=False))
+QUIET = Subject("small", 0, "digest", "discovery", TrackingConfig(system_metrics=False, log_model=False))
 
 
 @pytest.mark.parametrize("file", ["drive(1).csv", "25 °C, US06.csv", "a+b.csv", "raw//a.csv", "x" * 250])

@@ -5,7 +5,7 @@ import pytest
 from aesi.pipeline.experiment.sections import TrackingConfig
 from flows.tracking.tracker import BegunOtherwise, Subject, Tracker
 
-QUIET = Subject("small", 0, "digest", TrackingConfig(system_metrics=False, log_model=False))
+QUIET = Subject("small", 0, "digest", "discovery", TrackingConfig(system_metrics=False, log_model=False))
 
 
 def test_a_resumed_run_with_another_setting_lost_all_of_its_parameters(store, said):

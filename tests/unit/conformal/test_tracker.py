@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aesi.conformal.online.tracker import AIM, LOG_RATIO_LIMIT, SHARED, move, replay
+from aesi.conformal.online.tracker import AIM, LOG_RATIO_LIMIT, SHARED, adapt_log_ratio, replay
 
 ALPHA, RATE = 0.1, 0.05
 
@@ -100,7 +100,7 @@ def test_log_r_tells_the_share_of_misses_of_each_group(seed: int, n_groups: int)
         group = int(rng.integers(n_groups))
         missed, held = bool(rng.uniform() < often[group]), bool(rng.uniform() < held_often[group])
         before = log_ratio.copy()
-        move(log_ratio, group, missed, held, RATE, ALPHA)
+        adapt_log_ratio(log_ratio, group, missed, held, RATE, ALPHA)
         if not np.array_equal(log_ratio, before):
             assert missed or not held
             misses[group] += missed
@@ -117,7 +117,7 @@ def test_groups_that_push_against_each_other_stay_within_a_few_times_the_limit(
         misses, active = rng.uniform(size=(2, 7)) < rng.uniform(size=(2, 1))
         for group in rng.integers(0, 7, 200):
             if active[group]:
-                move(log_ratio, int(group), bool(misses[group]), False, 0.5, 0.5)
+                adapt_log_ratio(log_ratio, int(group), bool(misses[group]), False, 0.5, 0.5)
         furthest = max(furthest, float(np.abs(log_ratio).max()))
     assert LOG_RATIO_LIMIT < furthest < 4 * LOG_RATIO_LIMIT
 
@@ -142,5 +142,5 @@ def test_a_missing_residual_moves_nothing() -> None:
 
 def test_move_reaches_other_groups_with_the_shared_part() -> None:
     log_ratio = np.zeros(2)
-    move(log_ratio, 0, True, False, RATE, ALPHA)
+    adapt_log_ratio(log_ratio, 0, True, False, RATE, ALPHA)
     np.testing.assert_allclose(log_ratio, RATE * (1 - AIM * ALPHA) * np.array([1 + SHARED, SHARED]))

@@ -78,7 +78,8 @@ def ask(package, home="layout", **environment):
 
 def test_a_command_that_compiled_for_a_minute_said_nothing(package):
     told = (
-        "from aesi.numerics.files.first_use import tell_compiling\ntell_compiling(lambda: print('compiling'))"
+        "from aesi.numerics.files.first_use import on_first_compilation as listen\n"
+        "listen(lambda: print('compiling'))"
     )
     settings = {k: v for k, v in os.environ.items() if not k.startswith("NUMBA")}
     words = []

@@ -13,7 +13,7 @@ from aesi.records import Split
 from aesi.sparse import Candidate, Genome, Options, Problem, SparseModel, evaluate
 from aesi.sparse.baselines.dmd_c import dmd_with_control
 from aesi.sparse.baselines.pysindy_ensemble import pysindy_ensemble
-from aesi.sparse.fade import DOUBT, shrunken
+from aesi.sparse.fade import DOUBT, shrunken_slope
 from aesi.sparse.search.pick.nested import nested_shares
 
 OPTIONS = Options(p_c=2, d=2, special=False, mixed=False, resamples=20, block=60, fade=True)
@@ -37,13 +37,13 @@ def sums(slopes, size=1.0):
 
 def test_an_amplitude_that_drives_agree_on_is_kept_and_one_they_dispute_is_not():
     four = np.arange(4)
-    assert shrunken(sums([0.8] * 4), four) == pytest.approx(0.8 / (1.0 + DOUBT))
-    assert shrunken(sums([2.0, -1.8, 2.0, -1.8]), four) == 0.0
-    assert shrunken(sums([-1.0] * 4), four) == 0.0
+    assert shrunken_slope(sums([0.8] * 4), four) == pytest.approx(0.8 / (1.0 + DOUBT))
+    assert shrunken_slope(sums([2.0, -1.8, 2.0, -1.8]), four) == 0.0
+    assert shrunken_slope(sums([-1.0] * 4), four) == 0.0
 
 
 def test_what_left_out_drives_hardly_see_is_not_believed():
-    assert shrunken(sums([1.0] * 4, size=1e-3), np.arange(4)) < 0.05
+    assert shrunken_slope(sums([1.0] * 4, size=1e-3), np.arange(4)) < 0.05
 
 
 def test_halves_of_two_drives_are_two_witnesses_and_not_four():
@@ -52,14 +52,14 @@ def test_halves_of_two_drives_are_two_witnesses_and_not_four():
     # Student's t with one degree of freedom, the Cauchy distribution, has tan(pi (p - 1 / 2)) for its quantile.
     error = 0.5 * 0.2 / (1.0 + DOUBT)
     expected = 0.8 / (1.0 + DOUBT) - np.tan(np.pi * (norm.cdf(1.0) - 0.5)) * error
-    assert shrunken(sums(slopes), halves) == pytest.approx(expected)
-    assert shrunken(sums(slopes), halves) < shrunken(sums(slopes), np.arange(4))
+    assert shrunken_slope(sums(slopes), halves) == pytest.approx(expected)
+    assert shrunken_slope(sums(slopes), halves) < shrunken_slope(sums(slopes), np.arange(4))
 
 
 def test_pieces_of_a_single_drive_stand_for_drives():
     one = np.zeros(4, dtype=int)
-    assert shrunken(sums([2.0, -1.8, 2.0, -1.8]), one) == 0.0
-    assert shrunken(sums([0.5]), one[:1]) == pytest.approx(0.5 / (1.0 + DOUBT))
+    assert shrunken_slope(sums([2.0, -1.8, 2.0, -1.8]), one) == 0.0
+    assert shrunken_slope(sums([0.5]), one[:1]) == pytest.approx(0.5 / (1.0 + DOUBT))
 
 
 def test_records_are_the_folds_and_a_true_error_is_kept():

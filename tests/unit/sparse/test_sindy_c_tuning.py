@@ -13,7 +13,7 @@ from aesi.sparse.search.genome_space import GenomeSpace
 
 def rows(problem, judge):
     told = []
-    tuned_sindy_c(problem, 0, 8, 4, judge=judge, told=told.append)
+    tuned_sindy_c(problem, 0, 8, 4, judge=judge, on_candidate=told.append)
     return told
 
 

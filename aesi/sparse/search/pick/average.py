@@ -30,12 +30,12 @@ def averaged(candidates: Sequence[Candidate]) -> Candidate:
         mean_model([candidate.ensembles[number] for candidate in candidates])
         for number in range(len(ENSEMBLES))
     )
-    one, stable = np.mean([candidate.valid_losses for candidate in candidates], axis=0)
+    bagging_loss, stability_loss = np.mean([candidate.valid_losses for candidate in candidates], axis=0)
     return replace(
         candidates[0],
         bagging=bagging,
         stability=stability,
-        valid_losses=(float(one), float(stable)),
+        valid_losses=(float(bagging_loss), float(stability_loss)),
         members=tuple(candidates),
     )
 
@@ -47,15 +47,16 @@ def mean_model(models: Sequence[SparseModel]) -> SparseModel:
         models[0],
         library=Library(models[0].library.variables, terms),
         coefficients=_mean(terms, models, [model.coefficients for model in models]),
-        inclusion=_spread(terms, models, "inclusion"),
-        low=_spread(terms, models, "low"),
-        high=_spread(terms, models, "high"),
+        inclusion=_mean_attribute(terms, models, "inclusion"),
+        low=_mean_attribute(terms, models, "low"),
+        high=_mean_attribute(terms, models, "high"),
     )
     memory = 0.0 if mean.has_feedback else float(np.mean([model.memory for model in models]))
     return replace(mean, memory=memory)
 
 
 def _mean(terms: Sequence[Term], models: Sequence[SparseModel], values: Sequence[Array]) -> Array:
+    """(n_terms,) mean of one (m,) array per model, 0 for a term that a model lacks."""
     number = {term: j for j, term in enumerate(terms)}
     total = np.zeros(len(terms))
     for model, each in zip(models, values, strict=True):
@@ -63,6 +64,7 @@ def _mean(terms: Sequence[Term], models: Sequence[SparseModel], values: Sequence
     return total
 
 
-def _spread(terms: Sequence[Term], models: Sequence[SparseModel], name: str) -> Array | None:
+def _mean_attribute(terms: Sequence[Term], models: Sequence[SparseModel], name: str) -> Array | None:
+    """`_mean` of the attribute of that name; None where a model has none."""
     known = [values for model in models if (values := getattr(model, name)) is not None]
     return _mean(terms, models, known) if len(known) == len(models) else None

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aesi.numerics.typing import Array, BoolArray
-from aesi.sparse.fade import shrunken
+from aesi.sparse.fade import shrunken_slope
 from aesi.sparse.search.evaluate import Candidate
 from aesi.sparse.search.problem import Problem
 
@@ -40,9 +40,9 @@ def picked(
     weights = np.array([problem.row_weights[a] for a, _ in problem.folds])
     sums = [(weights[:, None] * c.fold_sums[ensemble])[folds] for c in known]
     drives = problem.fold_drives[folds]
-    amplitudes = [shrunken(each, drives) if problem.options.fade else 1.0 for each in sums]
-    left = [_left(each, a).sum() for each, a in zip(sums, amplitudes, strict=True)]
-    best = int(np.argmin(left))
+    amplitudes = [shrunken_slope(each, drives) if problem.options.fade else 1.0 for each in sums]
+    squared_errors = [_squared_error(each, a).sum() for each, a in zip(sums, amplitudes, strict=True)]
+    best = int(np.argmin(squared_errors))
     return NestedPick(known[best], amplitudes[best])
 
 
@@ -57,9 +57,10 @@ def nested_shares(problem: Problem, candidates: Sequence[Candidate], ensemble: i
         pick = picked(problem, candidates, ensemble, np.arange(len(problem.folds)) != d)
         if pick is not None:
             sums = pick.candidate.fold_sums[ensemble][d]
-            shares[d] = _left(sums, pick.amplitude) / sums[0]
+            shares[d] = _squared_error(sums, pick.amplitude) / sums[0]
     return shares
 
 
-def _left(sums: Array, amplitude: float) -> Array:
+def _squared_error(sums: Array, amplitude: float) -> Array:
+    """Summed |e - amplitude p|**2, from (..., 3) sums of e**2, e p and p**2."""
     return np.asarray(sums[..., 0] - 2.0 * amplitude * sums[..., 1] + amplitude**2 * sums[..., 2])
