@@ -212,7 +212,7 @@ class InverseProblem:
         cell = self.cell if share == 1.0 else self.cell.with_material(share)
         return fit_simulation(cell, data, soc0, effects, hold, self.model, rest_voltage_v)
 
-    def why_not(self, hypothesis: Sequence[str]) -> str:
+    def failure_reason(self, hypothesis: Sequence[str]) -> str:
         """Why a hypothesis cannot be simulated at its typical values: one sentence."""
         try:
             effects = tuple(self.effects[name].activate() for name in hypothesis)

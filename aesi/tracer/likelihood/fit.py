@@ -20,10 +20,10 @@ from aesi.tracer.likelihood.gaussian import (
     Linearised,
     Posterior,
     PredictiveScore,
-    Weighed,
+    ScoreAtSize,
     best_over_sizes,
     block_sums,
-    weighed,
+    score_at_size,
 )
 from aesi.tracer.likelihood.model_error import PRIORS, Size, SplitTable, off_within_seconds, whitened
 from aesi.tracer.likelihood.size_sums import SizeSums
@@ -172,13 +172,15 @@ def beyond_expected(white: Array) -> float:
 def scored(problem: InverseProblem, blocks: Blocks, point: Linearised) -> PredictiveScore:
     """The predictive score of a linearised hypothesis, at the size of the model error where it is highest."""
     prior, sums = PRIORS[problem.trust], SizeSums(SplitTable(problem, blocks, point.table()))
-    said = [said_at(sums, point, size, prior.log_density(size)) for size in prior.sizes]
-    return best_over_sizes(said, len(point.x))
+    scores = [point_score_at_size(sums, point, size, prior.log_density(size)) for size in prior.sizes]
+    return best_over_sizes(scores, len(point.x))
 
 
-def said_at(sums: SizeSums, point: Linearised, size: Size, log_prior: float = 0.0) -> Weighed:
+def point_score_at_size(sums: SizeSums, point: Linearised, size: Size, log_prior: float = 0.0) -> ScoreAtSize:
     """The score of a linearised hypothesis at one size of the model error.  sums : over its `point.table()`."""
-    return weighed(sums.table.blocks, sums.at(size), point.padded_x, point.padded_bounds, size, log_prior)
+    return score_at_size(
+        sums.table.blocks, sums.at(size), point.padded_x, point.padded_bounds, size, log_prior
+    )
 
 
 @dataclass(frozen=True, eq=False)

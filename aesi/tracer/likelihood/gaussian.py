@@ -269,7 +269,7 @@ class PredictiveScore:
         """Size of the lasting part of the model error, V."""
         return self.size.delta_v
 
-    def of(self, columns: IntArray) -> PredictiveScore:
+    def take(self, columns: IntArray) -> PredictiveScore:
         """The score with the shifts and the covariance of some of the parameters; the others are marginalised."""
         shifts = {name: shift[:, columns] for name, shift in self.shifts.items()}
         covariance = self.covariance[np.ix_(columns, columns)]
@@ -325,7 +325,7 @@ def on_lower_bound(place: float, bounds: Array) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class Weighed:
+class ScoreAtSize:
     """A linearised hypothesis at one size of the model error, evaluated as far as sizes have to be compared.
 
     posterior : of the free (not held) parameters.  folds : by partition.  x : (m,) the point.  bounds : (m, 2).
@@ -383,12 +383,13 @@ class Weighed:
         return self.posterior.evidence + of_held
 
 
-def weighed(
+def score_at_size(
     blocks: Blocks, sums: BlockSums, x: Array, bounds: Array, size: Size, log_prior: float
-) -> Weighed:
+) -> ScoreAtSize:
     """A linearised hypothesis at one size of the model error.
 
-    x : (m,) the point.  bounds : (m, 2) of the coordinates.
+    sums : whitened at that size, about the point x (m,).  bounds : (m, 2) of the coordinates.  log_prior : of the size,
+    nats.
     """
     folds = tuple(fold for of_name in blocks.folds.values() for fold in of_name)
     posterior = Posterior(sums, x, folds)
@@ -396,10 +397,10 @@ def weighed(
     if held.any():
         free = np.flatnonzero(~held)
         posterior = Posterior(sums.moved(to_bounds).take(free), x[free], folds)
-    return Weighed(posterior, blocks.folds, x, bounds, sums, to_bounds, held, size, log_prior)
+    return ScoreAtSize(posterior, blocks.folds, x, bounds, sums, to_bounds, held, size, log_prior)
 
 
-def best_over_sizes(sizes: Sequence[Weighed], own: int) -> PredictiveScore:
-    """The score at the size of the model error with the highest total, for the first `own` parameters; the others are
+def best_over_sizes(scores: Sequence[ScoreAtSize], n_parameters: int) -> PredictiveScore:
+    """The score at the size of the model error with the highest total, for the first `n_parameters`; the others are
     marginalised."""
-    return max(sizes, key=lambda one: one.total).score.of(np.arange(own))
+    return max(scores, key=lambda score: score.total).score.take(np.arange(n_parameters))

@@ -96,7 +96,7 @@ class _Sums:
 
 def _gains(blocks: Blocks, sums: _Sums, known: int, effects: Sequence[tuple[int, int]]) -> Array:
     """(e, s) gain on unseen data, nats, of each of e effects over none, on each of s surrogates, with blocks and
-    conditions weighted as in `gaussian.Weighed`.
+    conditions weighted as in `gaussian.ScoreAtSize`.
 
     sums : with the sensitivities of the `known` parameters first.  effects : first column of each and the one after its
     last.

@@ -36,7 +36,8 @@ def sds_behind(nats: float, deviation: float, least_nats: float = ALIKE_NATS) ->
 
 
 def alike(better: Explanation, other: Explanation, sds: float = ALIKE_SDS, nats: float = ALIKE_NATS) -> bool:
-    """True where the data do not tell the second hypothesis from the first."""
+    """True where the data do not tell the second hypothesis from the first: it is behind by less than `nats`, or by
+    less than `sds` standard deviations of the difference."""
     behind, deviation = lag(better, other)
     return behind < max(nats, sds * deviation)
 
@@ -56,6 +57,6 @@ def most_plausible(fits: Sequence[FittedHypothesis], competing: int) -> FittedHy
     """
     if not fits:
         return None
-    most = max(fit.score.total for fit in fits)
-    alike = [fit for fit in fits if fit.score.total > most - ALIKE_NATS]
-    return max(alike, key=lambda fit: plausibility(fit, competing))
+    highest = max(fit.score.total for fit in fits)
+    near_best = [fit for fit in fits if fit.score.total > highest - ALIKE_NATS]
+    return max(near_best, key=lambda fit: plausibility(fit, competing))

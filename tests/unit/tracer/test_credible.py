@@ -21,7 +21,7 @@ from aesi.tracer.report.candidate_effects import (
     why_not_chosen,
 )
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.forward import searched
+from aesi.tracer.search.forward import forward_search
 
 
 def posterior(gram, moment, x):
@@ -64,7 +64,7 @@ def test_on_a_bound_an_interval_begins_there_and_holds_its_share_of_the_density(
 def test_a_parameter_that_ended_at_zero_has_an_interval_with_a_width_and_a_unit(cell, few, make):
     data = make((CATALOGUE["ocv_hysteresis"].activate(magnitude_v=0.006),))
     problem = InverseProblem(cell, prepare_all(cell, [data], 0.9, 0.3), few)
-    path = searched(problem, 2, Archive(None, ""))
+    path = forward_search(problem, 2, Archive(None, ""))
     rows = ranking(path, verdict_on(path, Thresholds()), lambda one: None)
     assert {row.effect for row in rows} == set(few)
     for row in rows:
@@ -110,7 +110,7 @@ def test_what_a_growth_left_on_a_bound_of_its_parent_has_an_interval_too(cell, m
     truth = [CATALOGUE[name].activate() for name in names[:2]]
     tried = {name: CATALOGUE[name] for name in names}
     problem = InverseProblem(cell, prepare_all(cell, [make(truth)], 0.9, 0.3), tried)
-    path = searched(problem, 2, Archive(None, ""))
+    path = forward_search(problem, 2, Archive(None, ""))
     grown = [
         (one, owner) for step in path.steps for one in step.grown for owner, _ in one.held if owner in names
     ]

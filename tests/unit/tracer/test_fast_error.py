@@ -142,7 +142,7 @@ def test_a_lag_of_a_second_says_more_where_seconds_count(cell, few, make):
 
     def said(blocks):
         base = base_of(problem, blocks, Archive(None, ""))
-        grown = EffectGrowth(Parent(problem, blocks, base), "clock_skew", PRIORS["measured"].median).ended()
+        grown = EffectGrowth(Parent(problem, blocks, base), "clock_skew", PRIORS["measured"].median).grow()
         return grown.score.total - base.score.total, grown.placed["clock_skew", "lag_s"]
 
     fine, lag = said(blocks)

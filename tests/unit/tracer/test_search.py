@@ -15,10 +15,10 @@ from aesi.tracer.likelihood.model_error import PRIORS, Size
 from aesi.tracer.search import grown, reach
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import MOVED_SDS, as_declared, base_of, fitted_hypothesis
-from aesi.tracer.search.forward import FINALISTS, admissible, needed, searched
+from aesi.tracer.search.forward import FINALISTS, admissible, forward_search, needed
 from aesi.tracer.search.grown import PROMISING, growths_on, most_promising, promising_first
 from aesi.tracer.search.plausible import ALIKE_NATS, most_plausible
-from aesi.tracer.search.reach import REACH, least_left_v
+from aesi.tracer.search.reach import REACH_FACTOR, least_error_v
 
 ADDED_OHM = 2e-3
 ALLOWED_V = 0.6e-3
@@ -52,7 +52,7 @@ def test_an_effect_grows_about_the_declared_values_as_it_fits_though_the_rest_ha
     assert own_coordinates(there) == [0.0] * len(own_coordinates(base))
     whole = fitted_hypothesis(problem, blocks, ("series_resistance",), None, archive)
     gains = [
-        EffectGrowth(Parent(problem, blocks, one), "series_resistance", SIZE).ended().score.total
+        EffectGrowth(Parent(problem, blocks, one), "series_resistance", SIZE).grow().score.total
         for one in (base, there)
     ]
     off = [abs(gain - whole.score.total) for gain in gains]
@@ -167,7 +167,7 @@ def test_nothing_is_fitted_where_all_effects_together_leave_far_more_than_a_righ
     strange = replace(right, voltage_v=right.voltage_v + 5e-3 * np.sin(right.time_s / 30.0))
     asked = ((right, many), (strange, many), (strange, few))
     problems = [inverse_problem(cell, [data], 0.9, effects=effects) for data, effects in asked]
-    paths = [searched(one, 1, Archive(None, ""), allowed_v=ALLOWED_V) for one in problems]
+    paths = [forward_search(one, 1, Archive(None, ""), allowed_v=ALLOWED_V) for one in problems]
     assert paths[0].chosen.hypothesis == ("series_resistance",)
     assert paths[0].beyond_reach_v is None
     assert paths[1].chosen is paths[1].base
@@ -183,7 +183,9 @@ def test_what_the_other_model_may_account_for_is_not_out_of_reach_of_this_one(ce
     strange = replace(data, voltage_v=data.voltage_v + 5e-3 * np.sin(data.time_s / 30.0))
     problem = inverse_problem(cell, [strange], 0.9, effects=many)
     for reduced_v, begun in ((1e-3, False), (4e-3, True)):  # 3.5 mV are left by all effects together
-        path = searched(replace(problem, reduced_v=reduced_v), 1, Archive(None, ""), allowed_v=ALLOWED_V)
+        path = forward_search(
+            replace(problem, reduced_v=reduced_v), 1, Archive(None, ""), allowed_v=ALLOWED_V
+        )
         assert bool(path.steps) == begun
 
 
@@ -191,10 +193,10 @@ def test_what_moves_the_voltage_far_is_followed_before_it_is_called_out_of_reach
     many = {name: CATALOGUE[name] for name in (*few, "leakage_current", "clock_skew")}
     data = make((CATALOGUE["clock_skew"].activate(lag_s=2.0),))
     problem = inverse_problem(cell, [data], 0.9, effects=many)
-    path = searched(problem, 1, Archive(None, ""), allowed_v=ALLOWED_V)
+    path = forward_search(problem, 1, Archive(None, ""), allowed_v=ALLOWED_V)
     growths = growths_on([Parent(problem, path.blocks, path.base)], {}, Archive(None, ""))
-    begun = least_left_v(path.base, [growth.marks() for growth in growths], problem.white_v)
-    assert begun > REACH * ALLOWED_V
+    begun = least_error_v(path.base, [growth.possible_changes_v() for growth in growths], problem.white_v)
+    assert begun > REACH_FACTOR * ALLOWED_V
     assert path.beyond_reach_v is None
     assert path.chosen.hypothesis == ("clock_skew",)
 
@@ -206,10 +208,10 @@ def test_what_was_within_reach_is_within_reach_with_more_names(cell, few, make, 
     archive = Archive(None, "")
 
     def looked(most, archive):
-        return searched(problem, most, archive, allowed_v=ALLOWED_V)
+        return forward_search(problem, most, archive, allowed_v=ALLOWED_V)
 
     once = looked(1, archive)
-    monkeypatch.setattr(reach, "least_left_v", lambda *_: np.inf)
+    monkeypatch.setattr(reach, "least_error_v", lambda *_: np.inf)
     again = looked(2, archive)
     assert once.chosen.hypothesis == again.chosen.hypothesis == ("series_resistance",)
     assert again.beyond_reach_v is None
@@ -221,7 +223,7 @@ def test_what_all_effects_leave_is_told_beyond_the_noise():
     even, odd = np.tile([1.0, 1.0], 50), np.tile([1.0, -1.0], 50)
     point = SimpleNamespace(residual_v=3e-3 * even + 4e-3 * odd, jacobian_v=np.zeros((100, 1)))
     left_v = [
-        least_left_v(SimpleNamespace(point=point), marks, np.full(100, 1e-3))
+        least_error_v(SimpleNamespace(point=point), marks, np.full(100, 1e-3))
         for marks in ([], [7.0 * odd[:, None]], [odd[:, None], even[:, None]])
     ]
     assert left_v == pytest.approx([np.sqrt(24.0) * 1e-3, np.sqrt(8.0) * 1e-3, 0.0], abs=1e-9)
@@ -238,7 +240,7 @@ def test_with_the_other_model_what_says_most_with_either_is_grown(monkeypatch):
         "_first_slopes",
         lambda growths: {n: np.array([[promised[n]]]) for n in growths if n in simulated},
     )
-    monkeypatch.setattr(grown, "promise", lambda parent, slopes_v: slopes_v[0, 0])
+    monkeypatch.setattr(grown, "expected_score", lambda parent, slopes_v: slopes_v[0, 0])
     parent = SimpleNamespace(fit=SimpleNamespace(score=SimpleNamespace(total=0.0)))
     growths = [SimpleNamespace(parent=parent, effect=name) for name in names]
     kept, slopes = promising_first(growths, SimpleNamespace(near=lambda name, size: np.array([said[name]])))
