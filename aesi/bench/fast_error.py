@@ -71,12 +71,12 @@ def fast_error(case: RealCase, cells: str = "experiments/cells") -> dict[str, An
         return {"case": case.name, "failed": True}
     left, contact = (
         column - windows.means(column[:, None])[:, 0]
-        for column in (base.point.residual_v, base.point.off_v[:, 0])
+        for column in (base.point.residual_v, base.point.fast_errors_v[:, 0])
     )
     grown = grow_all(growths_on([Parent(problem, blocks, base)], {}, archive), archive)
     return {
         "case": case.name,
-        "rms_mv": MV_PER_V * float(np.sqrt(np.average(left**2, weights=windows.lasts_s))),
+        "rms_mv": MV_PER_V * float(np.sqrt(np.average(left**2, weights=windows.row_duration_s))),
         "lasts_s": lasts_s(problem.time_s, left),
         "resistance_off": OHMIC_SHARE * float(left @ contact) / float(contact @ contact),
         "sds": {name: round(sds, 2) for name, sds in (ratio(one) for one in grown if one is not None)},

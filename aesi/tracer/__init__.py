@@ -31,7 +31,7 @@ Words that mean one thing throughout:
                      (trust `beside`)
     competing        of an effect: a hypothesis may name it.  addable : competing, and not yet in the hypothesis
     owner            id of the effect that a parameter belongs to, with an ending where good records share it
-                     (`OF_ALL_RECORDS`); one of `OF_ONE_RECORD` for a parameter of a single record
+                     (`SHARED_SUFFIX`); one of `RECORD_OWNERS` for a parameter of a single record
     x                coordinate of a parameter: distance from the centre of its prior, in prior standard deviations
     size             standard deviation of the model error, V
     block            rows that are left out together.  fold : blocks left out at once.  partition : folds of one kind

@@ -30,7 +30,7 @@ from scipy.special import log_ndtr
 
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.tracer.case.blocks import Blocks
-from aesi.tracer.case.free_parameter import FURTHEST_SDS, TINY, at_ends
+from aesi.tracer.case.free_parameter import FURTHEST_SDS, ON_BOUND_SDS, at_ends
 from aesi.tracer.likelihood.model_error import LOG_2PI, Size
 
 
@@ -211,29 +211,29 @@ class Linearised:
     """A hypothesis linearised about a point.
 
     x : (m,) coordinates.  residual_v : (n,) V, measured - model.  jacobian_v : (n, m) V, sensitivities of the model.
-    bounds : (m, 2) of the coordinates.  off_v : (n, k) V, errors that the file may have within seconds, per standard
-    deviation: part of the model error, not of the model.
+    bounds : (m, 2) of the coordinates.  fast_errors_v : (n, k) V, errors that the file may have within seconds, per
+    standard deviation: part of the model error, not of the model.
     """
 
     x: Array
     residual_v: Array
     jacobian_v: Array
     bounds: Array
-    off_v: Array
+    fast_errors_v: Array
 
     def table(self) -> Array:
         """(n, 1 + m + k) V: residual, sensitivities, errors of the file within seconds."""
-        return np.column_stack([self.residual_v, self.jacobian_v, self.off_v])
+        return np.column_stack([self.residual_v, self.jacobian_v, self.fast_errors_v])
 
     @property
     def padded_x(self) -> Array:
         """(m + k,) coordinates, zero for the errors of the file within seconds."""
-        return np.concatenate([self.x, np.zeros(self.off_v.shape[1])])
+        return np.concatenate([self.x, np.zeros(self.fast_errors_v.shape[1])])
 
     @property
     def padded_bounds(self) -> Array:
         """(m + k, 2) bounds; the errors of the file within seconds have those of own parameters."""
-        return np.vstack([self.bounds, bounds_of_own(self.off_v.shape[1])])
+        return np.vstack([self.bounds, bounds_of_own(self.fast_errors_v.shape[1])])
 
 
 def bounds_of_own(k: int) -> Array:
@@ -283,7 +283,7 @@ def held_at_bounds(posterior: Posterior, bounds: Array) -> tuple[Array, BoolArra
     root, best = posterior.solved
     if np.all((low < best) & (best < high)):
         return np.zeros(len(best)), np.zeros(len(best), dtype=bool)
-    ends = np.maximum(high, low + TINY)
+    ends = np.maximum(high, low + ON_BOUND_SDS)
     inside = lsq_linear(root.T, root.T @ best, (low, ends), method="bvls").x
     lowest, highest = at_ends(inside, low, ends)
     held = lowest | highest

@@ -20,7 +20,7 @@ from aesi.numerics.typing import Array, IntArray
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.free_parameter import (
     FURTHEST_SDS,
-    TINY,
+    ON_BOUND_SDS,
     FreeParameter,
     at_ends,
     by_owner,
@@ -37,7 +37,7 @@ from aesi.tracer.likelihood.gaussian import (
     block_sums,
     score_at_size,
 )
-from aesi.tracer.likelihood.model_error import PRIORS, Size, SplitTable, off_within_seconds, whitened
+from aesi.tracer.likelihood.model_error import PRIORS, Size, SplitTable, fast_file_errors_v, whitened
 from aesi.tracer.likelihood.size_sums import SizeSums
 
 ROUNDS = 6
@@ -72,7 +72,7 @@ class Parent:
         back."""
         bounds = np.array([f.bounds for f in self.fit.free]).reshape(-1, 2)
         reached = np.column_stack(at_ends(self.fit.point.x, bounds[:, 0], bounds[:, 1]))
-        hard = np.abs(bounds) < FURTHEST_SDS - TINY
+        hard = np.abs(bounds) < FURTHEST_SDS - ON_BOUND_SDS
         return np.flatnonzero(~(reached & hard).any(axis=1))
 
 
@@ -96,7 +96,7 @@ class Grown:
     slopes_v: Array
 
     @property
-    def placed(self) -> dict[tuple[str, str], float]:
+    def values_by_key(self) -> dict[tuple[str, str], float]:
         """(owner, name) -> value, those of the parent with their first-order change."""
         x = self.point.x + self.score.shift
         moved = {f.key: f.value(float(v)) for f, v in zip(self.free, x, strict=True)}
@@ -105,7 +105,7 @@ class Grown:
     @property
     def values(self) -> dict[str, dict[str, float]]:
         """owner -> name -> value, with the parent's parameters that are held on a hard bound."""
-        return by_owner({**self.held, **self.placed}, self.hypothesis)
+        return by_owner({**self.held, **self.values_by_key}, self.hypothesis)
 
 
 class EffectGrowth:
@@ -137,7 +137,7 @@ class EffectGrowth:
         self.starts = own_starts if near_u is None else [near_u]
         self.held: ValuesByOwner = {o: v for o, v in fit.values.items() if o != effect}
         self.simulations = 0
-        self.off_v = off_within_seconds(self.problem, parent.blocks, (*fit.hypothesis, effect))
+        self.fast_errors_v = fast_file_errors_v(self.problem, parent.blocks, (*fit.hypothesis, effect))
         self._errors: dict[bytes, Array | None] = {}
         self._slopes: dict[bytes, Array] = {}
 
@@ -145,7 +145,7 @@ class EffectGrowth:
     def q(self) -> Array:
         """(n + m + c, m + c) orthonormal basis of the whitened sensitivities of the m other parameters and the c errors
         of the file within seconds, with their prior."""
-        off = whitened(self.problem, self.parent.blocks, self.off_v, self.size)[0]
+        off = whitened(self.problem, self.parent.blocks, self.fast_errors_v, self.size)[0]
         known_columns = np.column_stack([self.parent.white(self.size)[0][:, self.rest], off])
         return np.linalg.qr(np.vstack([known_columns, np.eye(known_columns.shape[1])]))[0]
 
@@ -182,7 +182,7 @@ class EffectGrowth:
     def projected(self, columns: Array, tail: Array) -> Array:
         """Whitened columns, stacked on `tail`, minus their projection onto `q`."""
         white = whitened(self.problem, self.parent.blocks, columns, self.size)[0]
-        stacked = np.vstack([white, tail, np.zeros((self.off_v.shape[1], columns.shape[1]))])
+        stacked = np.vstack([white, tail, np.zeros((self.fast_errors_v.shape[1], columns.shape[1]))])
         return stacked - self.q @ (self.q.T @ stacked)
 
     def residual(self, u: Array) -> Array | None:
@@ -295,7 +295,7 @@ def _scored(growth: EffectGrowth, u: Array, e: Array, jacobian: Array) -> Grown:
         [fit.point.bounds[growth.rest], np.column_stack([growth.low, growth.high])[inside].reshape(-1, 2)]
     )
     slopes = np.column_stack([fit.point.jacobian_v[:, growth.rest], jacobian[:, inside]])
-    point = Linearised(x, e, slopes, bounds, growth.off_v)
+    point = Linearised(x, e, slopes, bounds, growth.fast_errors_v)
     prior, sums_at = PRIORS[growth.problem.trust], _sums_of(growth, point)
     scores = [
         score_at_size(
@@ -317,7 +317,7 @@ def _sums_of(growth: EffectGrowth, point: Linearised) -> Callable[[Size], BlockS
     if blocks.windows is not None:
         return SizeSums(SplitTable(growth.problem, blocks, point.table())).at
     added = point.jacobian_v[:, len(growth.rest) :]
-    own = SplitTable(growth.problem, blocks, np.column_stack([point.residual_v, added, point.off_v]))
+    own = SplitTable(growth.problem, blocks, np.column_stack([point.residual_v, added, point.fast_errors_v]))
 
     def at(size: Size) -> BlockSums:
         known, _ = parent.white(size)

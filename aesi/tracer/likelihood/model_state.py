@@ -11,7 +11,7 @@ from aesi.physics.effect import ActiveEffect
 from aesi.physics.folded import Folded, folded
 from aesi.records import Run
 from aesi.tracer.case.free_parameter import CAPACITY_SHARE, STATE_OF_CHARGE
-from aesi.tracer.case.problem import InverseProblem, ValuesByOwner, share_of
+from aesi.tracer.case.problem import InverseProblem, ValuesByOwner, record_capacity_share
 from aesi.tracer.case.records import PreparedRecord
 from aesi.tracer.likelihood.growth import Explanation
 
@@ -56,7 +56,7 @@ class ModelState:
         index = record.continues if index is None else index
         data, hold = (record.thin, record.thin_hold) if thin else (record.data, record.hold)
         effects = self.effects(record.good)
-        share = 1.0 if self.values is None or index is None else share_of(self.values, index)
+        share = 1.0 if self.values is None or index is None else record_capacity_share(self.values, index)
         soc0 = self._start(record, index)
         if soc0 is not None:
             return self.problem.run(data, soc0, effects, hold, share=share)

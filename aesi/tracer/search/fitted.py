@@ -53,7 +53,7 @@ def fitted_hypothesis(
         if near is None:
             x = _from_the_middle(fitter, prior)
         else:
-            x0, size = coordinates_of(fitter.free, near.placed), prior.nearest(near.score.size)
+            x0, size = coordinates_of(fitter.free, near.values_by_key), prior.nearest(near.score.size)
             x = fitter.descend(x0, size, FIT_ROUNDS, _slopes_v(near, fitter.free))
         archive.put(name, x)
     found = fitter.finished(x)

@@ -581,7 +581,7 @@ def test_the_resistance_that_a_file_is_off_by_does_not_come_from_the_joints_of_r
         return Measurement(time, current, voltage, name=f"{rate_c}")
 
     records = prepare_all(cell, [discharge(1.0, 0.6), discharge(0.5, 0.95)], None, 0.0)
-    contacts = InverseProblem(cell, records, few, trust="measured").off_at_seconds(())[:, 0]
+    contacts = InverseProblem(cell, records, few, trust="measured").file_errors_v(())[:, 0]
     assert np.abs(contacts).max() < 1e-6  # nothing steps within a record
 
 

@@ -11,7 +11,7 @@ from aesi.physics import simulate
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.model import activation_energies
 from aesi.tracer.case.energies import ACTIVATION_ENERGIES, energies_of
-from aesi.tracer.case.free_parameter import of_all_records
+from aesi.tracer.case.free_parameter import shared_owner
 from aesi.tracer.case.trust import MEASURED_CELL
 from aesi.tracer.decide.evidence import named_options
 from aesi.tracer.discovery import inverse_problem
@@ -62,7 +62,7 @@ def test_energies_are_open_beyond_the_temperature_of_the_file_and_nowhere_else(c
     assert not open_energies(replace(inside, trust="measured"))
     both = inverse_problem(fitted, [cold], SOC0, 0.0, TRIED, good=[warm])
     owners = {f.owner for f in open_energies(replace(both, trust="beside")).values()}
-    assert owners == {of_all_records(ACTIVATION_ENERGIES)}
+    assert owners == {shared_owner(ACTIVATION_ENERGIES)}
 
 
 def test_a_temperature_that_was_not_measured_is_that_of_the_file_but_where_a_hypothesis_says_another(

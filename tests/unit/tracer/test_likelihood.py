@@ -16,7 +16,7 @@ from aesi.tracer.case.records import prepare_all
 from aesi.tracer.likelihood.fit import HypothesisFitter, beyond_expected
 from aesi.tracer.likelihood.gaussian import LOG_2PI, Posterior, block_sums, held_at_bounds, score_at_size
 from aesi.tracer.likelihood.model_error import PRIORS, Size
-from aesi.tracer.likelihood.surrogates import _gains, _Sums
+from aesi.tracer.likelihood.surrogates import _gains_by_effect, _Sums
 
 from .conftest import steps
 
@@ -118,7 +118,7 @@ def test_the_evidence_of_what_is_held_on_a_bound_was_not_an_integral_over_what_i
 def samples_under_load(cell, data):
     problem = replace(InverseProblem(cell, prepare_all(cell, [data], 0.9, 0.0), {}), trust="measured")
     assert problem.independent.max() <= 1.0
-    return problem.independent[np.abs(problem.seen[0].current_a) > 0.3].sum()
+    return problem.independent[np.abs(problem.fit_parts[0].current_a) > 0.3].sum()
 
 
 def test_a_rest_and_a_pause_of_the_logger_took_the_evidence_from_the_load(cell, make):
@@ -179,7 +179,7 @@ def test_a_gain_on_a_surrogate_is_what_its_score_gains():
     white = RNG.normal(size=(N, 5))
     folds = FOLDS | {"charge": ((0, 2), (1, 3))}
     blocks = Blocks(STARTS, np.zeros(4, dtype=int), folds, np.ones(N, dtype=bool))
-    gains = _gains(blocks, _Sums.over_blocks(blocks, table, white), 2, [(2, 3)])
+    gains = _gains_by_effect(blocks, _Sums.over_blocks(blocks, table, white), 2, [(2, 3)])
     for surrogate, (gain,) in zip(white.T, gains.T, strict=True):
         total = [
             score_at_size(

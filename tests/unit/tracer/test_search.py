@@ -8,7 +8,7 @@ import pytest
 
 from aesi.physics.effects import CATALOGUE
 from aesi.tracer.case.blocks import blocks_of
-from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, of_effect
+from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, effect_parameters
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.growth import EffectGrowth, Parent
 from aesi.tracer.likelihood.model_error import PRIORS, Size
@@ -103,12 +103,14 @@ def test_a_pair_is_grown_from_whichever_of_its_effects_says_more_with_the_other(
 
 
 def test_a_declared_parameter_under_test_is_expected_as_far_off_as_files_are():
-    kinetics = of_effect("charge_transfer_kinetics", CATALOGUE["charge_transfer_kinetics"].parameters, 30.0)
+    kinetics = effect_parameters(
+        "charge_transfer_kinetics", CATALOGUE["charge_transfer_kinetics"].parameters, 30.0
+    )
     loose = [p.spread.loose for p in CATALOGUE["charge_transfer_kinetics"].parameters.values()]
     assert [one.sd for one in kinetics] == loose
-    contact = of_effect("series_resistance", CATALOGUE["series_resistance"].parameters, 30.0)
+    contact = effect_parameters("series_resistance", CATALOGUE["series_resistance"].parameters, 30.0)
     assert contact[0].sd == CATALOGUE["series_resistance"].parameters["resistance_ohm"].spread.loose / 30.0
-    lost = of_effect("lithium_inventory_loss", CATALOGUE["lithium_inventory_loss"].parameters, 30.0)
+    lost = effect_parameters("lithium_inventory_loss", CATALOGUE["lithium_inventory_loss"].parameters, 30.0)
     assert lost[0].sd > CATALOGUE["lithium_inventory_loss"].parameters["loss"].spread.loose  # cells age
 
 
