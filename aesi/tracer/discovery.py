@@ -271,10 +271,10 @@ def _discovery_of(
     evidence = _without_fault(evidence, others)
     fits: States = {"before": declared, "recalibrated": evidence.recalibrated, "after": evidence.after}
     states = {
-        name: state.of_one_age() for name, state in fits.items()
+        name: state.with_file_capacity() for name, state in fits.items()
     }  # errors are those of the written models
     files = outcomes(records, states, tested, rng)
-    inside, soc0 = evidence.after.settled()
+    inside, soc0 = evidence.after.folded_cell()
     left = _structure_of(records, states["after"])
     return Discovery(
         cell=inside.cell,
@@ -327,7 +327,7 @@ def _test_error_v(
 ) -> float | None:
     """RMSE on data that no fit has seen, V; None where the model cannot be simulated there."""
     try:
-        error_v = held_out_rmse_v(ModelState.of(problem, one).of_one_age(), problem.records, tested)
+        error_v = held_out_rmse_v(ModelState.of(problem, one).with_file_capacity(), problem.records, tested)
     except AesiError:  # it was simulated on the fit part alone
         return None
     return error_v if np.isfinite(error_v) else None

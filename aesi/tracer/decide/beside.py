@@ -30,7 +30,7 @@ from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import fitted_hypothesis
 from aesi.tracer.search.grown import grown_with
 from aesi.tracer.search.path import Path, Report
-from aesi.tracer.search.plausible import alike, lag, sds_behind
+from aesi.tracer.search.plausible import alike, score_lag, sds_behind
 from aesi.tracer.search.wrong_parameters import NINETY_SDS
 
 
@@ -99,7 +99,7 @@ def checked_against_ageing(verdict: Verdict, believed: Explanation, aged: Sequen
     if not verdict.effects:
         return verdict
     as_well = tuple(one.hypothesis[0] for one in aged if alike(believed, one))
-    behind = [sds_behind(*lag(believed, one)) for one in aged if one.hypothesis[0] not in as_well]
+    behind = [sds_behind(*score_lag(believed, one)) for one in aged if one.hypothesis[0] not in as_well]
     verdict = replace(verdict, margin=min([verdict.margin, *behind]))
     if not as_well:
         return verdict

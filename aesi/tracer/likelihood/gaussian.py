@@ -48,7 +48,7 @@ class BlockSums:
     rows: Array
 
     def take(self, columns: IntArray) -> BlockSums:
-        """The sums of some of the parameters alone."""
+        """The sums of some of the parameters alone.  columns : their numbers."""
         return BlockSums(
             self.square,
             self.moment[:, columns],
@@ -173,21 +173,21 @@ class Posterior:
 
     @property
     def covariances_without(self) -> Array:
-        """(f, m, m) of the parameters without each fold."""
+        """(f, m, m) posterior covariance of the parameters without each fold."""
         inverse = np.linalg.inv(self._solved_without.root)
         return np.asarray(np.swapaxes(inverse, -1, -2) @ inverse)
 
     @cached_property
     def log_density(self) -> Array:
         """(f,) log p(y_F | y_-F) of each fold, nats."""
-        own = self._left_out @ (self.sums.square + self.sums.log_det + LOG_2PI * self.sums.rows)
-        return np.asarray(-0.5 * (own - self._gains[-1] + self._gains[:-1]))
+        by_data = self._left_out @ (self.sums.square + self.sums.log_det + LOG_2PI * self.sums.rows)
+        return np.asarray(-0.5 * (by_data - self._gains[-1] + self._gains[:-1]))
 
     @cached_property
     def evidence(self) -> float:
         """log p(y) of all blocks, nats."""
-        own = float(np.sum(self.sums.square + self.sums.log_det + LOG_2PI * self.sums.rows))
-        return -0.5 * (own + float(self.x @ self.x) - float(self._gains[-1]))
+        by_data = float(np.sum(self.sums.square + self.sums.log_det + LOG_2PI * self.sums.rows))
+        return -0.5 * (by_data + float(self.x @ self.x) - float(self._gains[-1]))
 
     @property
     def shifts(self) -> Array:
@@ -201,7 +201,7 @@ class Posterior:
 
     @cached_property
     def covariance(self) -> Array:
-        """(m, m) of the parameters given all data."""
+        """(m, m) posterior covariance of the parameters given all data."""
         inverse = np.linalg.inv(self.solved.root)
         return np.asarray(inverse.T @ inverse)
 
@@ -290,8 +290,9 @@ def held_at_bounds(posterior: Posterior, bounds: Array) -> tuple[Array, BoolArra
     return np.where(held, inside, 0.0), held
 
 
-class AtBound(NamedTuple):
-    """The density (3) of one held parameter.  slope : g.  curvature : a."""
+class BoundDensity(NamedTuple):
+    """The density (3) of one held parameter.  slope : g, per coordinate, positive into the range.  curvature : a, per
+    square of a coordinate."""
 
     slope: float
     curvature: float
@@ -303,25 +304,25 @@ class AtBound(NamedTuple):
         return 0.5 * (beyond**2 - float(np.log(self.curvature))) + float(log_ndtr(beyond))
 
 
-def along_bounds(sums: BlockSums, place: Array, bounds: Array, held: BoolArray) -> dict[int, AtBound]:
+def densities_at_bounds(sums: BlockSums, x: Array, bounds: Array, held: BoolArray) -> dict[int, BoundDensity]:
     """Number of each held parameter -> its density (3).
 
-    sums : about `place` (m,), where the held parameters are on their bounds (m, 2).  held : (m,) True for these.
+    sums : about x (m,), where the held parameters are on their bounds (m, 2).  held : (m,) True for these.
     """
-    a = sums.gram.sum(axis=0) + np.eye(len(place))
-    b = sums.moment.sum(axis=0) - place
+    a = sums.gram.sum(axis=0) + np.eye(len(x))
+    b = sums.moment.sum(axis=0) - x
     free, out = np.flatnonzero(~held), {}
     for j in np.flatnonzero(held).tolist():
-        taken = np.linalg.solve(a[np.ix_(free, free)], a[free, j])
-        slope = float(b[j] - taken @ b[free])
-        inwards = 1.0 if on_lower_bound(place[j], bounds[j]) else -1.0
-        out[j] = AtBound(inwards * slope, float(a[j, j] - taken @ a[free, j]))
+        onto_free = np.linalg.solve(a[np.ix_(free, free)], a[free, j])  # marginalises the free parameters
+        slope = float(b[j] - onto_free @ b[free])
+        inwards = 1.0 if on_lower_bound(x[j], bounds[j]) else -1.0
+        out[j] = BoundDensity(inwards * slope, float(a[j, j] - onto_free @ a[free, j]))
     return out
 
 
-def on_lower_bound(place: float, bounds: Array) -> bool:
+def on_lower_bound(x: float, bounds: Array) -> bool:
     """Whether a parameter that is held is on the lower of its bounds (2,)."""
-    return bool(place - bounds[0] <= bounds[1] - place)
+    return bool(x - bounds[0] <= bounds[1] - x)
 
 
 @dataclass(frozen=True, eq=False)
@@ -377,9 +378,11 @@ class ScoreAtSize:
         """As `PredictiveScore.evidence`: that of the free parameters, plus (3) and the prior of the held ones."""
         if not self.held.any():
             return self.posterior.evidence
-        place = self.x + self.to_bounds
-        beside = along_bounds(self.sums.moved(self.to_bounds), place, self.bounds, self.held)
-        of_held = sum(one.log_mass for one in beside.values()) - 0.5 * float(np.sum(place[self.held] ** 2))
+        x = self.x + self.to_bounds
+        densities = densities_at_bounds(self.sums.moved(self.to_bounds), x, self.bounds, self.held)
+        of_held = sum(density.log_mass for density in densities.values()) - 0.5 * float(
+            np.sum(x[self.held] ** 2)
+        )
         return self.posterior.evidence + of_held
 
 

@@ -54,7 +54,7 @@ class Parent:
     _white: dict[Size, tuple[Array, Array]] = field(default_factory=dict, init=False)
     _whitening: Lock = field(default_factory=Lock, init=False)
 
-    def white(self, size: Size) -> tuple[Array, Array]:
+    def whitened_columns(self, size: Size) -> tuple[Array, Array]:
         """(whitened sensitivities and errors of the file within seconds (n, m + k), log|C| (n,)); cached."""
         with self._whitening:
             if size not in self._white:
@@ -128,7 +128,8 @@ class EffectGrowth:
         self.parent, self.effect, self.size = parent, effect, size
         self.end_u = end_u
         self.problem, fit = parent.problem, parent.fit
-        self.rest = np.array([j for j in parent.movable if fit.free[j].owner != effect], dtype=int)
+        # Numbers of the parent's parameters that move to first order; those of the effect itself do not.
+        self.parent_columns = np.array([j for j in parent.movable if fit.free[j].owner != effect], dtype=int)
         self.added = tuple(self.problem.parameters_of(effect))
         bounds = np.array([f.bounds for f in self.added]).reshape(-1, 2)
         self.low, self.high = bounds[:, 0], bounds[:, 1]
@@ -146,7 +147,9 @@ class EffectGrowth:
         """(n + m + c, m + c) orthonormal basis of the whitened sensitivities of the m other parameters and the c errors
         of the file within seconds, with their prior."""
         off = whitened(self.problem, self.parent.blocks, self.fast_errors_v, self.size)[0]
-        known_columns = np.column_stack([self.parent.white(self.size)[0][:, self.rest], off])
+        known_columns = np.column_stack(
+            [self.parent.whitened_columns(self.size)[0][:, self.parent_columns], off]
+        )
         return np.linalg.qr(np.vstack([known_columns, np.eye(known_columns.shape[1])]))[0]
 
     def from_own_starts(self) -> EffectGrowth:
@@ -190,7 +193,7 @@ class EffectGrowth:
         e = self.error_v(u)
         if e is None:
             return None
-        tail = -self.parent.fit.point.x[self.rest][:, None]
+        tail = -self.parent.fit.point.x[self.parent_columns][:, None]
         return np.concatenate([self.projected(e[:, None], tail)[:, 0], u])
 
     def slopes(self, u: Array, residual: Array) -> Array | None:
@@ -199,7 +202,9 @@ class EffectGrowth:
         jacobian = None if e is None else self.jacobian(u, e)
         if jacobian is None:
             return None
-        return np.vstack([self.projected(-jacobian, np.zeros((len(self.rest), len(u)))), np.eye(len(u))])
+        return np.vstack(
+            [self.projected(-jacobian, np.zeros((len(self.parent_columns), len(u)))), np.eye(len(u))]
+        )
 
     def held_on_bounds(self) -> dict[tuple[str, str], float]:
         """(owner, name) -> value of the parent's parameters on a hard bound, where they stay."""
@@ -243,7 +248,7 @@ class EffectGrowth:
         start = self._most_promising()
         if start is None:
             return None
-        left = self.projected(self._parent_error_v, -self.parent.fit.point.x[self.rest][:, None])
+        left = self.projected(self._parent_error_v, -self.parent.fit.point.x[self.parent_columns][:, None])
         tolerance = GAIN_NATS * beyond_expected(left[: len(self._parent_error_v)])
         return descend(self, start, self.low, self.high, ROUNDS, tolerance).known_x
 
@@ -279,7 +284,7 @@ def expected_score(parent: Parent, slopes_v: Array) -> float:
     bounds = np.vstack([fit.point.padded_bounds, open_ends])
     totals = []
     for size in {fit.score.size, prior.nearest(prior.median)}:
-        known, log_det = parent.white(size)
+        known, log_det = parent.whitened_columns(size)
         new, _ = own.whitened(size)
         sums = block_sums(parent.blocks, np.column_stack([new[:, :1], known, new[:, 1:]]), log_det)
         totals.append(score_at_size(parent.blocks, sums, x, bounds, size, prior.log_density(size)).total)
@@ -290,11 +295,14 @@ def _scored(growth: EffectGrowth, u: Array, e: Array, jacobian: Array) -> Grown:
     parent, fit = growth.parent, growth.parent.fit
     lowest, highest = at_ends(u, growth.low, growth.high)
     inside = ~(lowest | highest)  # a linear form ignores bounds
-    x = np.concatenate([fit.point.x[growth.rest], u[inside]])
+    x = np.concatenate([fit.point.x[growth.parent_columns], u[inside]])
     bounds = np.vstack(
-        [fit.point.bounds[growth.rest], np.column_stack([growth.low, growth.high])[inside].reshape(-1, 2)]
+        [
+            fit.point.bounds[growth.parent_columns],
+            np.column_stack([growth.low, growth.high])[inside].reshape(-1, 2),
+        ]
     )
-    slopes = np.column_stack([fit.point.jacobian_v[:, growth.rest], jacobian[:, inside]])
+    slopes = np.column_stack([fit.point.jacobian_v[:, growth.parent_columns], jacobian[:, inside]])
     point = Linearised(x, e, slopes, bounds, growth.fast_errors_v)
     prior, sums_at = PRIORS[growth.problem.trust], _sums_of(growth, point)
     scores = [
@@ -304,7 +312,10 @@ def _scored(growth: EffectGrowth, u: Array, e: Array, jacobian: Array) -> Grown:
         for size in prior.sizes
     ]
     hypothesis = (*fit.hypothesis, growth.effect)
-    free = (*(fit.free[j] for j in growth.rest), *(f for f, i in zip(growth.added, inside, strict=True) if i))
+    free = (
+        *(fit.free[j] for j in growth.parent_columns),
+        *(f for f, i in zip(growth.added, inside, strict=True) if i),
+    )
     on_bounds = {f.key: f.value(float(v)) for f, v, i in zip(growth.added, u, inside, strict=True) if not i}
     score, held = best_over_sizes(scores, len(x)), growth.held_on_bounds()
     return Grown(hypothesis, free, point, score, growth.simulations, on_bounds, held, u, jacobian)
@@ -316,13 +327,15 @@ def _sums_of(growth: EffectGrowth, point: Linearised) -> Callable[[Size], BlockS
     parent, blocks = growth.parent, growth.parent.blocks
     if blocks.windows is not None:
         return SizeSums(SplitTable(growth.problem, blocks, point.table())).at
-    added = point.jacobian_v[:, len(growth.rest) :]
+    added = point.jacobian_v[:, len(growth.parent_columns) :]
     own = SplitTable(growth.problem, blocks, np.column_stack([point.residual_v, added, point.fast_errors_v]))
 
     def at(size: Size) -> BlockSums:
-        known, _ = parent.white(size)
+        known, _ = parent.whitened_columns(size)
         new, log_det = own.whitened(size)
-        return block_sums(blocks, np.column_stack([new[:, :1], known[:, growth.rest], new[:, 1:]]), log_det)
+        return block_sums(
+            blocks, np.column_stack([new[:, :1], known[:, growth.parent_columns], new[:, 1:]]), log_det
+        )
 
     return at
 

@@ -46,7 +46,7 @@ def largest_gains(
     """(draws,) nats, the largest gain over the effects, at least one, on each surrogate."""
     problem, blocks, size = parent.problem, parent.blocks, parent.fit.score.size
     white = _whitened_surrogates(problem, blocks.windows, draws, rng)
-    known = parent.white(size)[0]
+    known = parent.whitened_columns(size)[0]
     added = whitened(problem, blocks, np.column_stack(list(slopes_v.values())), size)[0]
     sums = _Sums.over_blocks(blocks, np.column_stack([known, added]), white)
     ends = known.shape[1] + np.cumsum([0, *(slopes.shape[1] for slopes in slopes_v.values())])

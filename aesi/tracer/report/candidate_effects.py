@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aesi.tracer.decide.verdict import Verdict
-from aesi.tracer.likelihood.credible import reaches
+from aesi.tracer.likelihood.credible import interval_distances
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.gaussian import Linearised, Posterior, block_sums
 from aesi.tracer.likelihood.growth import Explanation, Grown
@@ -149,5 +149,5 @@ def _reach(path: Path, one: Explanation) -> dict[tuple[str, str], tuple[float, f
         )
     white, log_det = whitened(path.problem, path.blocks, point.table(), one.score.size)
     posterior = Posterior(block_sums(path.blocks, white, log_det), point.padded_x, ())
-    ends = reaches(posterior, point.padded_bounds, SHARE)[: len(keys)]
+    ends = interval_distances(posterior, point.padded_bounds, SHARE)[: len(keys)]
     return {key: (float(below), float(above)) for key, (below, above) in zip(keys, ends, strict=True)}

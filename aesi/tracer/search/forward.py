@@ -18,7 +18,7 @@ from aesi.tracer.likelihood.fit import FittedHypothesis, held_out_residual
 from aesi.tracer.likelihood.growth import EffectGrowth, Explanation, Grown, Parent
 from aesi.tracer.likelihood.surrogates import admission_nats
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import as_declared, base_of, fitted_hypothesis, from_within
+from aesi.tracer.search.fitted import base_of, fitted_hypothesis, linearised_as_declared, refitted_off_bounds
 from aesi.tracer.search.grown import grow_all, growths_on, promising_first
 from aesi.tracer.search.path import Path, Report, Step, excess_mean_square_v2, unseen_rmse_v
 from aesi.tracer.search.plausible import most_plausible, plausibility
@@ -176,7 +176,7 @@ class _ForwardSearch:
         places = [Parent(self.problem, self.blocks, fit) for fit in parents]
         grown, refused = _grown(growths or growths_on(places, self.slopes, self.archive), self.archive)
         slopes = {**self.slopes, **{g.hypothesis[-1]: g.slopes_v for g in grown}}
-        declared = as_declared(self.problem, self.blocks, best)
+        declared = linearised_as_declared(self.problem, self.blocks, best)
         if declared is not None:
             place = Parent(self.problem, self.blocks, declared)
             again, more = _grown(growths_on([place], slopes, self.archive), self.archive)
@@ -200,7 +200,7 @@ class _ForwardSearch:
                 fitted.append(fit)
         fitted.sort(key=lambda f: -f.score.total)
         if fitted and fitted[0].at_bounds:
-            fitted[0] = from_within(self.problem, self.blocks, fitted[0], self.archive)
+            fitted[0] = refitted_off_bounds(self.problem, self.blocks, fitted[0], self.archive)
         return fitted
 
     def _fitted(self, hypothesis: Sequence[str], near: Explanation) -> FittedHypothesis | None:

@@ -17,7 +17,7 @@ from aesi.tracer.decide.verdict import Thresholds, Verdict
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.search.archive import context_of
 from aesi.tracer.search.grown import addable
-from aesi.tracer.search.plausible import lag
+from aesi.tracer.search.plausible import score_lag
 
 OFFSET_V = 8e-3
 TRIED = ("series_resistance", "current_sensor_gain", "voltage_sensor_offset", "ocv_hysteresis")
@@ -271,7 +271,7 @@ def test_an_age_that_lags_less_than_any_other_rival_is_what_the_confidence_is_re
     believed = said("series_resistance", 40.0)
     assert checked_against_ageing(named, believed, [said("film_growth", 10.0)]).margin == 9.0
     scattered = said("film_growth", 10.0, scatter=3.0)
-    nats, deviation = lag(believed, scattered)
+    nats, deviation = score_lag(believed, scattered)
     assert checked_against_ageing(named, believed, [scattered]).margin == nats / deviation < 9.0
 
 

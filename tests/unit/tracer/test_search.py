@@ -14,7 +14,7 @@ from aesi.tracer.likelihood.growth import EffectGrowth, Parent
 from aesi.tracer.likelihood.model_error import PRIORS, Size
 from aesi.tracer.search import grown, reach
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import MOVED_SDS, as_declared, base_of, fitted_hypothesis
+from aesi.tracer.search.fitted import MOVED_SDS, base_of, fitted_hypothesis, linearised_as_declared
 from aesi.tracer.search.forward import FINALISTS, admissible, forward_search, needed
 from aesi.tracer.search.grown import PROMISING, growths_on, most_promising, promising_first
 from aesi.tracer.search.plausible import ALIKE_NATS, most_plausible
@@ -48,7 +48,7 @@ def test_an_effect_grows_about_the_declared_values_as_it_fits_though_the_rest_ha
     blocks, archive = blocks_of(problem), Archive(None, "")
     base = base_of(problem, blocks, archive)
     assert max(np.abs(own_coordinates(base))) > MOVED_SDS  # a resistance that is not there, as slow kinetics
-    there = as_declared(problem, blocks, base)
+    there = linearised_as_declared(problem, blocks, base)
     assert own_coordinates(there) == [0.0] * len(own_coordinates(base))
     whole = fitted_hypothesis(problem, blocks, ("series_resistance",), None, archive)
     gains = [
@@ -62,7 +62,7 @@ def test_an_effect_grows_about_the_declared_values_as_it_fits_though_the_rest_ha
 def test_a_hypothesis_that_moved_nothing_far_is_grown_where_it_is(cell, few, make):
     problem = inverse_problem(cell, [make()], 0.9, effects=few)
     blocks = blocks_of(problem)
-    assert as_declared(problem, blocks, base_of(problem, blocks, Archive(None, ""))) is None
+    assert linearised_as_declared(problem, blocks, base_of(problem, blocks, Archive(None, ""))) is None
 
 
 def said(total, evidence, names=1):
