@@ -185,40 +185,45 @@ def point_score_at_size(sums: SizeSums, point: Linearised, size: Size, log_prior
 
 @dataclass(frozen=True, eq=False)
 class _Whitened:
-    """Least-squares residual that a descent minimises at one size of the model error: the whitened residual of the rows
-    `kept` (n,), projected off the errors that the file may have within seconds, then the coordinates (their prior)."""
+    """Least-squares residual that a descent minimises at one size of the model error: the whitened residual of the n
+    rows that are `kept` (True for them), projected off the errors that the file may have within seconds, then the
+    coordinates (their prior)."""
 
     fitter: HypothesisFitter
     size: Size
     kept: BoolArray
 
     @cached_property
-    def _off(self) -> Array:
+    def _error_basis(self) -> Array:
         """(n + k, k) orthonormal basis of the errors that the file may have within seconds, with their prior."""
         fitter = self.fitter
-        off = self._whitened_rows(fast_file_errors_v(fitter.problem, fitter.blocks, fitter.hypothesis))
-        return np.asarray(np.linalg.qr(np.vstack([off, np.eye(off.shape[1])]))[0])
+        errors = self._whitened_rows(fast_file_errors_v(fitter.problem, fitter.blocks, fitter.hypothesis))
+        return np.asarray(np.linalg.qr(np.vstack([errors, np.eye(errors.shape[1])]))[0])
 
     def errors(self, error_v: Array) -> Array:
         """(n + k,) a residual (n,) V, whitened and projected."""
         return np.asarray(self._projected(error_v[:, None])[:, 0])
 
     def residual(self, x: Array) -> Array | None:
+        """(n + k + m,) what a descent minimises, at x (m,); None where the model fails."""
         e = self.fitter.residual(x)
         return None if e is None else np.concatenate([self.errors(e), x])
 
     def slopes(self, x: Array, residual: Array) -> Array | None:
+        """(n + k + m, m) slopes of `residual`; None where the model fails."""
         e = self.fitter.residual(x)
         jacobian = None if e is None else self.fitter.jacobian(x, e)
         return None if jacobian is None else self.columns(jacobian)
 
     def columns(self, jacobian_v: Array) -> Array:
+        """(n + k + m, m) slopes of the residual for the sensitivities (n, m) V of the model."""
         return np.vstack([-self._projected(jacobian_v), np.eye(jacobian_v.shape[1])])
 
     def _projected(self, columns_v: Array) -> Array:
-        white, k = self._whitened_rows(columns_v), self._off.shape[1]
+        """(n + k, j) columns (n, j) V, whitened and projected off `_error_basis`."""
+        white, k = self._whitened_rows(columns_v), self._error_basis.shape[1]
         stacked = np.vstack([white, np.zeros((k, columns_v.shape[1]))])
-        return np.asarray(stacked - self._off @ (self._off.T @ stacked)) if k else white
+        return np.asarray(stacked - self._error_basis @ (self._error_basis.T @ stacked)) if k else white
 
     def _whitened_rows(self, columns_v: Array) -> Array:
         return whitened(self.fitter.problem, self.fitter.blocks, columns_v, self.size)[0][self.kept]

@@ -136,7 +136,7 @@ class EffectGrowth:
         self.near_u = near_u
         own_starts = [np.clip(u, self.low, self.high) for u in starts(self.added)]
         self.starts = own_starts if near_u is None else [near_u]
-        self.held: ValuesByOwner = {o: v for o, v in fit.values.items() if o != effect}
+        self.parent_values: ValuesByOwner = {o: v for o, v in fit.values.items() if o != effect}
         self.simulations = 0
         self.fast_errors_v = fast_file_errors_v(self.problem, parent.blocks, (*fit.hypothesis, effect))
         self._errors: dict[bytes, Array | None] = {}
@@ -165,7 +165,7 @@ class EffectGrowth:
 
     def _simulated_error_v(self, u: Array) -> Array | None:
         self.simulations += 1
-        predicted = self.problem.predict({**self.held, **values_of(self.added, u, (self.effect,))})
+        predicted = self.problem.predict({**self.parent_values, **values_of(self.added, u, (self.effect,))})
         return None if predicted is None else self.problem.measured - predicted
 
     def jacobian(self, u: Array, e: Array) -> Array | None:
@@ -183,7 +183,8 @@ class EffectGrowth:
         return out
 
     def projected(self, columns: Array, tail: Array) -> Array:
-        """Whitened columns, stacked on `tail`, minus their projection onto `q`."""
+        """(n + m + c, j) whitened columns (n, j), stacked on those of the m other parameters' prior, `tail` (m, j), and
+        on zeros for the c errors of the file within seconds; minus their projection onto `q`."""
         white = whitened(self.problem, self.parent.blocks, columns, self.size)[0]
         stacked = np.vstack([white, tail, np.zeros((self.fast_errors_v.shape[1], columns.shape[1]))])
         return stacked - self.q @ (self.q.T @ stacked)
@@ -248,26 +249,28 @@ class EffectGrowth:
         start = self._most_promising()
         if start is None:
             return None
-        left = self.projected(self._parent_error_v, -self.parent.fit.point.x[self.parent_columns][:, None])
-        tolerance = GAIN_NATS * beyond_expected(left[: len(self._parent_error_v)])
+        residual = self.projected(
+            self._parent_error_v, -self.parent.fit.point.x[self.parent_columns][:, None]
+        )
+        tolerance = GAIN_NATS * beyond_expected(residual[: len(self._parent_error_v)])
         return descend(self, start, self.low, self.high, ROUNDS, tolerance).known_x
 
     @property
     def _parent_error_v(self) -> Array:
-        """(n, 1) V."""
+        """(n, 1) V, residual of the parent."""
         return self.parent.fit.point.residual_v[:, None]
 
     def _most_promising(self) -> Array | None:
         """The start from which one step reduces the objective most; None where no start can be simulated."""
         if len(self.starts) == 1:
             return self.starts[0]
-        promised = []
+        costs = []
         for u in self.starts:
             residual = self.residual(u)
             slopes = None if residual is None else self.slopes(u, residual)
             if residual is not None and slopes is not None:
-                promised.append((foreseen_cost(u, residual, slopes, self.low, self.high), u))
-        return min(promised, key=lambda one: one[0])[1] if promised else None
+                costs.append((foreseen_cost(u, residual, slopes, self.low, self.high), u))
+        return min(costs, key=lambda one: one[0])[1] if costs else None
 
 
 def expected_score(parent: Parent, slopes_v: Array) -> float:
