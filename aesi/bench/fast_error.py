@@ -35,7 +35,7 @@ from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.growth import Parent
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import base_of
-from aesi.tracer.search.grown import ended, growths_on
+from aesi.tracer.search.grown import grow_all, growths_on
 
 RIGHT_TEMPERATURE = ("25degC", "drive_cycle")
 """Parts of the names of the records that were measured at the temperature of their cell file."""
@@ -71,12 +71,12 @@ def fast_error(case: RealCase, cells: str = "experiments/cells") -> dict[str, An
         return {"case": case.name, "failed": True}
     left, contact = (
         column - windows.means(column[:, None])[:, 0]
-        for column in (base.point.residual_v, base.point.off_v[:, 0])
+        for column in (base.point.residual_v, base.point.fast_errors_v[:, 0])
     )
-    grown = ended(growths_on([Parent(problem, blocks, base)], {}, archive), archive)
+    grown = grow_all(growths_on([Parent(problem, blocks, base)], {}, archive), archive)
     return {
         "case": case.name,
-        "rms_mv": MV_PER_V * float(np.sqrt(np.average(left**2, weights=windows.lasts_s))),
+        "rms_mv": MV_PER_V * float(np.sqrt(np.average(left**2, weights=windows.row_duration_s))),
         "lasts_s": lasts_s(problem.time_s, left),
         "resistance_off": OHMIC_SHARE * float(left @ contact) / float(contact @ contact),
         "sds": {name: round(sds, 2) for name, sds in (ratio(one) for one in grown if one is not None)},

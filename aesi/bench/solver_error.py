@@ -30,7 +30,7 @@ from aesi.data.blind import BlindCase, cells_in, generate
 from aesi.errors import SimulationError
 from aesi.numerics.typing import Array
 from aesi.tracer.case.blocks import blocks_of
-from aesi.tracer.likelihood.fit import said_at
+from aesi.tracer.likelihood.fit import point_score_at_size
 from aesi.tracer.likelihood.model_error import Size, SplitTable
 from aesi.tracer.likelihood.size_sums import SizeSums
 from aesi.tracer.search.archive import Archive
@@ -54,7 +54,7 @@ def said_by_size(case: BlindCase) -> Array | None:
     if fit is None:
         return None
     sums = SizeSums(SplitTable(problem, blocks, fit.point.table()))
-    said = np.array([said_at(sums, fit.point, Size(size)).total for size in SIZES_V])
+    said = np.array([point_score_at_size(sums, fit.point, Size(size)).total for size in SIZES_V])
     return said - said.max()
 
 

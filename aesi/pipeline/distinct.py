@@ -11,7 +11,7 @@ from aesi.over_time import stamp
 from aesi.records import Measurement, Spectrum
 from aesi.records.overlap import overlap
 from aesi.records.rows import Overlap, Rows
-from aesi.tracer.case.records import led_by
+from aesi.tracer.case.records import leading_record
 
 _Listed = Sequence[Measurement] | Sequence[Spectrum]
 
@@ -76,7 +76,7 @@ def check_distinct(
 
 def _is_continuation(test: Measurement, known: Measurement) -> bool:
     """Whether a test begins with the rows of a known record, and goes on after them."""
-    found = led_by(test, [known])
+    found = leading_record(test, [known])
     return found is not None and found[1] is test
 
 

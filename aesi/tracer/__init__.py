@@ -29,11 +29,14 @@ Words that mean one thing throughout:
     trust            how far the declared parameters are believed: widths of the own priors, and size of the model error
     good             of a record: known to lack nothing. The other records are searched for what differs from it
                      (trust `beside`)
-    competing        of an effect: a hypothesis may name it.  addable : competing, and not yet in the hypothesis
+    competing        of an effect: a hypothesis may name it.  addable : competing, not yet in the hypothesis, and the
+                     records can decide on it
+    grown            of a hypothesis: one effect more than its parent, fitted with the parent's parameters to first
+                     order.  fitted : all parameters with the whole model.  admitted : believed, after a step
     owner            id of the effect that a parameter belongs to, with an ending where good records share it
-                     (`OF_ALL_RECORDS`); one of `OF_ONE_RECORD` for a parameter of a single record
+                     (`SHARED_SUFFIX`); one of `RECORD_OWNERS` for a parameter of a single record
     x                coordinate of a parameter: distance from the centre of its prior, in prior standard deviations
-    size             standard deviation of the model error, V
+    size             standard deviation of the model error, V.  lasting, fast : its parts over and within seconds
     block            rows that are left out together.  fold : blocks left out at once.  partition : folds of one kind
     to say           a hypothesis says n nats of data: n is the log predictive density of these data while they are left
                      out, `score.total`.  gain : difference of two of these

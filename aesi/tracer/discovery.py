@@ -22,7 +22,7 @@ from aesi.physics.start.temperature import OtherTemperature
 from aesi.records import Hold, Measurement
 from aesi.tracer.case.checks import check_compared, check_record, check_same_cell
 from aesi.tracer.case.energies import ACTIVATION_ENERGIES
-from aesi.tracer.case.free_parameter import OF_ONE_RECORD, by_owner
+from aesi.tracer.case.free_parameter import RECORD_OWNERS, by_owner
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import PreparedRecord, prepare_all, prepare_test
 from aesi.tracer.decide.beside import searched_answer_beside
@@ -220,7 +220,7 @@ def inverse_problem(
     records = prepare_all(cell, measurements, soc0, holdout, given, good)
     for record in records:
         check_record(cell, record)
-    taken = next((name for name in effects if name in (*OF_ONE_RECORD, ACTIVATION_ENERGIES)), None)
+    taken = next((name for name in effects if name in (*RECORD_OWNERS, ACTIVATION_ENERGIES)), None)
     if taken is not None:
         raise DataError(
             f"an effect cannot have the id {taken!r}, which the cell or its records have their own of; give it another."
@@ -247,7 +247,7 @@ class _Spent:
         if self.progress is None:
             return
         left = one.point.residual_v - one.point.jacobian_v @ one.score.shift
-        values = by_owner(one.placed, one.hypothesis)
+        values = by_owner(one.values_by_key, one.hypothesis)
         tried = TriedHypothesis(
             one.hypothesis, problem.trust, gain, rms(left), one.score.delta_v, values, one.simulations
         )
@@ -271,10 +271,10 @@ def _discovery_of(
     evidence = _without_fault(evidence, others)
     fits: States = {"before": declared, "recalibrated": evidence.recalibrated, "after": evidence.after}
     states = {
-        name: state.of_one_age() for name, state in fits.items()
+        name: state.with_file_capacity() for name, state in fits.items()
     }  # errors are those of the written models
     files = outcomes(records, states, tested, rng)
-    inside, soc0 = evidence.after.settled()
+    inside, soc0 = evidence.after.folded_cell()
     left = _structure_of(records, states["after"])
     return Discovery(
         cell=inside.cell,
@@ -327,7 +327,7 @@ def _test_error_v(
 ) -> float | None:
     """RMSE on data that no fit has seen, V; None where the model cannot be simulated there."""
     try:
-        error_v = held_out_rmse_v(ModelState.of(problem, one).of_one_age(), problem.records, tested)
+        error_v = held_out_rmse_v(ModelState.of(problem, one).with_file_capacity(), problem.records, tested)
     except AesiError:  # it was simulated on the fit part alone
         return None
     return error_v if np.isfinite(error_v) else None

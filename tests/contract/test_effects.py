@@ -18,7 +18,7 @@ from aesi.physics.effect import Contribution, Effect, Record, Trace
 from aesi.physics.effects import CATALOGUE, active_effect, describe, find_effect, load_effect
 from aesi.physics.folded import folded
 from aesi.physics.simulation import model_with
-from aesi.tracer.case.free_parameter import of_effect
+from aesi.tracer.case.free_parameter import effect_parameters
 from aesi.tracer.case.problem import STEP
 
 CELLS = Path(__file__).resolve().parents[2] / "experiments" / "cells"
@@ -166,7 +166,7 @@ def test_it_vanishes_at_its_neutral_values(effect, model):
 @each
 def test_a_fit_can_move_it_from_where_it_vanishes(effect):
     # A first small step has to move the voltage in proportion; a standard deviation of sizes does so by its square.
-    free = of_effect(effect.id, effect.parameters, CELL.nominal_capacity_ah)
+    free = effect_parameters(effect.id, effect.parameters, CELL.nominal_capacity_ah)
     moving = [f for f in free if f.amplitude and effect.refines != "discretisation"]
     nowhere = {f.name: f.centre if f.amplitude else f.typical for f in free}
     at_rest = run(effect.activate(**nowhere)).voltage_v

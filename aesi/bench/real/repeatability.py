@@ -30,7 +30,7 @@ from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.growth import Grown, Parent
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import base_of
-from aesi.tracer.search.grown import ended, growths_on
+from aesi.tracer.search.grown import grow_all, growths_on
 
 ALIKE: dict[str, tuple[str, ...]] = {
     HG2: ("25degC_mixed1", "25degC_mixed2", "25degC_mixed3"),
@@ -69,7 +69,7 @@ def scatter(cell: str, good: str, other: str, cells: str = "experiments/cells") 
     base = base_of(problem, blocks, archive)
     if base is None:
         return {"cell": cell, "good": good, "other": other, "failed": True}
-    grown = ended(growths_on([Parent(problem, blocks, base)], {}, archive), archive)
+    grown = grow_all(growths_on([Parent(problem, blocks, base)], {}, archive), archive)
     ratios = [ratio(one) for one in grown if one is not None]
     return {
         "cell": cell,

@@ -16,7 +16,7 @@ from aesi.data.read import MAX_ROWS
 from aesi.data.resample import decimate, in_runs, run_within
 from aesi.pipeline.discovery.discover import Case
 from aesi.records import Measurement
-from aesi.tracer.case.records import joined, led_by
+from aesi.tracer.case.records import joined, leading_record
 
 MOST_ROWS = 80_000
 """Most rows of the fitted records together: a hypothesis is simulated hundreds of times, and more rows take hours
@@ -62,7 +62,7 @@ def _thinned_test(record: Measurement, fitted: Sequence[Measurement], most: int)
 
     fitted : as they were given.  most : rows that each of them may have.
     """
-    led = led_by(record, fitted)
+    led = leading_record(record, fitted)
     if led is None:
         return _thinned(record, MOST_ROWS)
     index, whole = led

@@ -16,20 +16,20 @@ from aesi.tracer.case.problem import InverseProblem
 BLOCKS = 24
 """Number of blocks over all records, each left out in turn: enough of them for a sum of scores, and each long against
 the correlation time of a model error. A convention."""
-FEWEST = 4
+FEWEST_BLOCKS = 4
 """Fewest blocks that one record is cut into."""
 SEEN_SHARE = 2.0 / 3.0
 """Share of the blocks, from the first on, that is kept in the fold "end", which leaves out the rest."""
-FEWEST_MEASURED = 6
-"""Most blocks of a record of a measured cell, unless it holds more independent samples of the model error. The error of
-a measured cell's model has the longer correlation time."""
+MEASURED_BLOCKS = 6
+"""Most blocks of a record of a measured cell, or as many as it has independent samples of the model error where these
+are more: the error of such a cell's model has the longer correlation time."""
 RANGES = 3
 """Number of ranges of RMS current, and of state of charge. The blocks of one range are left out together."""
 WINDOW_S = 20.0
 """Length of the window, s, that tells an error within seconds from a lasting one: what differs from the window's
 mean counts as an error within seconds. Its correlation time is 4 to 6 s on six development records; with windows of
 60 s it is 7 to 10 s, since part of the slow drift is then counted in (`python -m aesi.bench.fast_error`)."""
-OTHER_RATE = 1.1
+DISTINCT_RATES = 1.1
 """Least ratio of the largest to the smallest mean RMS current of the ranges. Below it they count as one rate, as with a
 current that never changes, and the partition "rate" is left out. A convention."""
 
@@ -38,27 +38,32 @@ current that never changes, and the partition "rate" is left out. A convention."
 class Windows:
     """Short stretches of time, for means over seconds.
 
-    of_row : (n,) number of each row's window.  lasts_s : (n,) s that each row stands for.
+    of_row : (n,) number of each row's window.  row_duration_s : (n,) s, duration that each row stands for.
     """
 
     of_row: IntArray
-    lasts_s: Array
+    row_duration_s: Array
 
     @classmethod
-    def within(cls, starts: IntArray, time_s: Array, lasts_s: Array, length_s: float) -> Windows:
-        """Windows of `length_s` that do not cross blocks.  starts : (b + 1,) first row of each block, then n."""
+    def within(cls, starts: IntArray, time_s: Array, row_duration_s: Array, length_s: float) -> Windows:
+        """Windows of `length_s` (s) that do not cross blocks.
+
+        starts : (b + 1,) first row of each block, then n.  time_s : (n,) s.
+        """
         of_row = np.zeros(len(time_s), dtype=int)
-        opened = 0
+        n_windows = 0
         for rows in _slices(starts):
             since = time_s[rows] - time_s[rows.start]
-            of_row[rows] = opened + np.unique(np.floor(since / length_s), return_inverse=True)[1]
-            opened = int(of_row[rows.stop - 1]) + 1
-        return cls(of_row, lasts_s)
+            of_row[rows] = n_windows + np.unique(np.floor(since / length_s), return_inverse=True)[1]
+            n_windows = int(of_row[rows.stop - 1]) + 1
+        return cls(of_row, row_duration_s)
 
     @cached_property
     def row_weight(self) -> Array:
         """(n,) weight of each row in the mean of its window: its share of the window's duration."""
-        return np.asarray(self.lasts_s / np.bincount(self.of_row, self.lasts_s)[self.of_row], dtype=float)
+        return np.asarray(
+            self.row_duration_s / np.bincount(self.of_row, self.row_duration_s)[self.of_row], dtype=float
+        )
 
     @cached_property
     def fast_dof(self) -> Array:
@@ -67,14 +72,14 @@ class Windows:
         return 1.0 - self.row_weight
 
     @cached_property
-    def _opens(self) -> IntArray:
+    def _first_rows(self) -> IntArray:
         """First row of each window."""
         return np.flatnonzero(np.diff(self.of_row, prepend=-1))
 
     def means(self, columns: Array) -> Array:
         """(n, m) for each row, the mean of each column (n, m) over the row's window."""
         weighted = columns * self.row_weight[:, None]
-        return np.asarray(np.add.reduceat(weighted, self._opens, axis=0)[self.of_row])
+        return np.asarray(np.add.reduceat(weighted, self._first_rows, axis=0)[self.of_row])
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,24 +116,25 @@ class Blocks:
 
 def blocks_of(problem: InverseProblem) -> Blocks:
     """The blocks of all records, and their folds."""
-    starts, record = _cut(problem)
+    starts, record = _record_blocks(problem)
     windows = None
     if problem.two_scales:
-        windows = Windows.within(starts, problem.time_s, problem.lasts_s, WINDOW_S)
+        windows = Windows.within(starts, problem.time_s, problem.row_duration_s, WINDOW_S)
     return Blocks(starts, record, _folds(problem, _slices(starts), record), problem.compared, windows)
 
 
-def _cut(problem: InverseProblem) -> tuple[IntArray, IntArray]:
+def _record_blocks(problem: InverseProblem) -> tuple[IntArray, IntArray]:
     """`Blocks.starts` and `Blocks.record`: as many blocks of each record as its share of the rows, but no fewer than
-    `FEWEST`, and of a measured cell no more than it has independent samples."""
+    `FEWEST_BLOCKS`, and of a measured cell no more than `MEASURED_BLOCKS` or its number of independent samples,
+    whichever is larger."""
     total = len(problem.measured)
     starts: list[int] = []
     record: list[int] = []
     for i, rows in enumerate(problem.slices):
         length = rows.stop - rows.start
-        pieces = max(FEWEST, round(BLOCKS * length / total))
+        pieces = max(FEWEST_BLOCKS, round(BLOCKS * length / total))
         if problem.coarse:
-            pieces = min(pieces, max(FEWEST_MEASURED, int(problem.independent[rows].sum())))
+            pieces = min(pieces, max(MEASURED_BLOCKS, int(problem.independent[rows].sum())))
         starts += np.linspace(rows.start, rows.stop, pieces + 1).astype(int)[:-1].tolist()
         record += [i] * pieces
     return np.array([*starts, total]), np.array(record)
@@ -139,7 +145,7 @@ def _folds(
 ) -> dict[str, tuple[tuple[int, ...], ...]]:
     """`Blocks.folds`.  rows_of : of each block.  record : (b,)."""
     every = range(len(record))
-    current = np.concatenate([m.current_a for m in problem.seen])
+    current = np.concatenate([m.current_a for m in problem.fit_parts])
     rate = np.array([rms(current[rows]) for rows in rows_of])
     charge = np.array([np.mean(problem.declared_soc[rows]) for rows in rows_of])
     folds: dict[str, tuple[tuple[int, ...], ...]] = {"block": tuple((b,) for b in every)}
@@ -147,24 +153,26 @@ def _folds(
         folds["record"] = tuple(
             tuple(b for b in every if record[b] == k) for k in range(len(problem.records))
         )
-    by_rate = _ranges(rate)
-    if _differ([rate[list(blocks)] for blocks in by_rate]):
+    by_rate = _folds_by_range(rate)
+    if _are_distinct([rate[list(blocks)] for blocks in by_rate]):
         folds["rate"] = by_rate
-    folds["charge"] = _ranges(charge)
+    folds["charge"] = _folds_by_range(charge)
     folds["end"] = (tuple(b for b in every if b >= round(SEEN_SHARE * len(record))),)
     return folds
 
 
 def _slices(bounds: IntArray) -> list[slice]:
+    """Rows between each two successive bounds (b + 1,)."""
     return [slice(int(a), int(b)) for a, b in pairwise(bounds)]
 
 
-def _differ(rates: Sequence[Array]) -> bool:
+def _are_distinct(rates: Sequence[Array]) -> bool:
+    """Whether the ranges have several rates.  rates : RMS current, A, of the blocks of each range."""
     means = [float(np.mean(r)) for r in rates]
-    return max(means) > OTHER_RATE * min(means)
+    return max(means) > DISTINCT_RATES * min(means)
 
 
-def _ranges(of_block: Array) -> tuple[tuple[int, ...], ...]:
+def _folds_by_range(of_block: Array) -> tuple[tuple[int, ...], ...]:
     """Blocks by `RANGES` ranges of a quantity (b,), with about as many blocks in each."""
     order = np.argsort(of_block, kind="stable")
     return tuple(tuple(sorted(part.tolist())) for part in np.array_split(order, RANGES) if len(part))

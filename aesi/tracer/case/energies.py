@@ -83,18 +83,18 @@ def with_energies(
 
     declared : activation energy in the file, J/mol, of every rate.
     """
-    cell, there = model.cell, {**declared, **energies}
+    cell, new_j_mol = model.cell, {**declared, **energies}
 
-    def as_it_was(name: str) -> float:
-        """Factor of a rate at the reference temperature."""
-        return rate_factor(declared[name] - there[name], held_at_k, cell.reference_temperature_k)
+    def rate_scale(name: str) -> float:
+        """Factor on a rate at the reference temperature that keeps it the same at `held_at_k`."""
+        return rate_factor(declared[name] - new_j_mol[name], held_at_k, cell.reference_temperature_k)
 
     e = cell.electrolyte
     cell = cell.with_electrolyte(
-        diffusivity=scaled(e.diffusivity, as_it_was("electrolyte_diffusivity")),
-        diffusivity_ea_j_mol=there["electrolyte_diffusivity"],
-        conductivity=scaled(e.conductivity, as_it_was("electrolyte_conductivity")),
-        conductivity_ea_j_mol=there["electrolyte_conductivity"],
+        diffusivity=scaled(e.diffusivity, rate_scale("electrolyte_diffusivity")),
+        diffusivity_ea_j_mol=new_j_mol["electrolyte_diffusivity"],
+        conductivity=scaled(e.conductivity, rate_scale("electrolyte_conductivity")),
+        conductivity_ea_j_mol=new_j_mol["electrolyte_conductivity"],
     )
     for side, electrode, with_side in (
         ("negative", cell.negative, Cell.with_negative),
@@ -102,11 +102,11 @@ def with_energies(
     ):
         cell = with_side(
             cell,
-            diffusivity=scaled(electrode.diffusivity, as_it_was(f"{side}_diffusivity")),
-            diffusivity_ea_j_mol=there[f"{side}_diffusivity"],
-            rate_constant=electrode.rate_constant * as_it_was(f"{side}_rate"),
-            rate_ea_j_mol=there[f"{side}_rate"],
-            film_ohm_m2=scaled(electrode.film_ohm_m2, 1.0 / as_it_was(f"{side}_film")),
-            film_ea_j_mol=there[f"{side}_film"],
+            diffusivity=scaled(electrode.diffusivity, rate_scale(f"{side}_diffusivity")),
+            diffusivity_ea_j_mol=new_j_mol[f"{side}_diffusivity"],
+            rate_constant=electrode.rate_constant * rate_scale(f"{side}_rate"),
+            rate_ea_j_mol=new_j_mol[f"{side}_rate"],
+            film_ohm_m2=scaled(electrode.film_ohm_m2, 1.0 / rate_scale(f"{side}_film")),
+            film_ea_j_mol=new_j_mol[f"{side}_film"],
         )
     return model.of(cell)

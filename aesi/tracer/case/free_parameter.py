@@ -22,14 +22,14 @@ STATE_OF_CHARGE = "soc0"
 """Owner of the parameters that shift a record's initial state of charge."""
 CAPACITY_SHARE = "capacity_share"
 """Owner of the parameters that give a cell's capacity during a record, as a share of the file's."""
-OF_ONE_RECORD = (STATE_OF_CHARGE, CAPACITY_SHARE)
+RECORD_OWNERS = (STATE_OF_CHARGE, CAPACITY_SHARE)
 """Owners of parameters that belong to one record, not to the cell. The parameter's name is the record's number."""
-OF_ALL_RECORDS = " of all records"
-"""Ending of the owner of a declared parameter that all records share, the good ones too. It tells this parameter from
-that of the effect under test, which acts on the other records alone."""
+SHARED_SUFFIX = " of all records"
+"""Ending of the owner of a declared parameter where good records are given: all records share it, the good ones too.
+The parameter of the same name of an effect under test, which acts on the other records alone, has none."""
 FURTHEST_SDS = 4.0
 """An own parameter may not leave this many of its standard deviations."""
-TINY = 1e-6
+ON_BOUND_SDS = 1e-6
 """A coordinate counts as on a bound where it is nearer than this, in standard deviations of the prior."""
 
 
@@ -37,7 +37,7 @@ TINY = 1e-6
 class FreeParameter:
     """One scalar: who owns it, its bounds, and its normal prior.
 
-    owner : id of an effect, or one of OF_ONE_RECORD with the number of a record as the name.
+    owner : id of an effect, or one of RECORD_OWNERS with the number of a record as the name.
     low, high, centre : in `unit`.  sd : of the natural logarithm where `log`, of the square where `even`, else in
     `unit`.
     own : True for a parameter of the declared model, False for one of an effect under test.
@@ -67,7 +67,7 @@ class FreeParameter:
     @property
     def record(self) -> int | None:
         """Number of the record that it belongs to; None for what all records share."""
-        return int(self.name) if self.owner in OF_ONE_RECORD else None
+        return int(self.name) if self.owner in RECORD_OWNERS else None
 
     def coordinate(self, value: float) -> float:
         """x of a value."""
@@ -102,7 +102,7 @@ class FreeParameter:
         lowest, highest = at_ends(x, *self.bounds)
         return bool(lowest), bool(highest)
 
-    def told(self, value: float) -> float:
+    def reported(self, value: float) -> float:
         """A value for reports: the bound itself where the value differs from it by round-off only."""
         lowest, highest = self.ends(self.coordinate(value))
         return self.low if lowest else self.high if highest else value
@@ -113,22 +113,24 @@ class FreeParameter:
         if self.own or not (self.amplitude or self.log):
             return False
         (low, high), (lowest, highest) = self.bounds, self.ends(x)
-        below = lowest and abs(low) > TINY and not self.low_is_limit
-        return below or (highest and abs(high) > TINY)
+        below = lowest and abs(low) > ON_BOUND_SDS and not self.low_is_limit
+        return below or (highest and abs(high) > ON_BOUND_SDS)
 
 
 def at_ends(x: Array | float, low: Array | float, high: Array | float) -> tuple[BoolArray, BoolArray]:
     """(at the lower end, at the upper end) of its range for each coordinate: two boolean arrays of the shape of x."""
-    return np.asarray(x - low < TINY), np.asarray(high - x < TINY)
+    return np.asarray(x - low < ON_BOUND_SDS), np.asarray(high - x < ON_BOUND_SDS)
 
 
-def of_effect(effect: str, parameters: Mapping[str, Parameter], capacity_ah: float) -> list[FreeParameter]:
+def effect_parameters(
+    effect: str, parameters: Mapping[str, Parameter], capacity_ah: float
+) -> list[FreeParameter]:
     """The parameters of an effect under test, in a cell of this capacity (Ah). The prior is as wide as the effect's
     usual size where that is known, else as its range."""
-    return [_of_effect(effect, name, p, capacity_ah) for name, p in parameters.items()]
+    return [_effect_parameter(effect, name, p, capacity_ah) for name, p in parameters.items()]
 
 
-def _of_effect(effect: str, name: str, p: Parameter, capacity_ah: float) -> FreeParameter:
+def _effect_parameter(effect: str, name: str, p: Parameter, capacity_ah: float) -> FreeParameter:
     low, high = p.bounds
     inside = p.neutral is not None and low <= p.neutral <= high
     centre = float(p.neutral) if inside and p.neutral is not None else p.default
@@ -143,7 +145,8 @@ def _of_effect(effect: str, name: str, p: Parameter, capacity_ah: float) -> Free
         high=high,
         log=log,
         centre=centre,
-        sd=_expected(p, capacity_ah) or float(reach) / 2.0,  # ends of the range at two standard deviations
+        sd=_effect_prior_sd(p, capacity_ah)
+        or float(reach) / 2.0,  # ends of the range at two standard deviations
         own=False,
         amplitude=p.neutral is not None,
         typical=p.default,
@@ -152,18 +155,19 @@ def _of_effect(effect: str, name: str, p: Parameter, capacity_ah: float) -> Free
     )
 
 
-def _expected(p: Parameter, capacity_ah: float) -> float | None:
-    """Prior standard deviation of an effect's parameter about its neutral value, None where none is known.
-
-    For what every cell file declares, it is the scatter between files of cells of one make.
+def _effect_prior_sd(p: Parameter, capacity_ah: float) -> float | None:
+    """Prior standard deviation of an effect's parameter about its neutral value, in its unit or of its natural
+    logarithm; None where none is known. For what every cell file declares, it is the scatter between files of cells of
+    one make.
     """
     declared = p.log and p.neutral is not None and p.spread is not None and p.spread.tight is not None
     sd = p.spread.loose if declared and p.spread is not None else p.expected
     return None if sd is None else sd * capacity_ah**p.capacity_power
 
 
-def own(effect: str, name: str, p: Parameter, sd: float) -> FreeParameter:
-    """A parameter of the declared model that may be off by `sd`."""
+def own_parameter(effect: str, name: str, p: Parameter, sd: float) -> FreeParameter:
+    """A parameter of the declared model that may be off by `sd`, in its unit, or in its natural logarithm where it has
+    a logarithmic scale.  effect : its owner."""
     centre = p.default if p.neutral is None else p.neutral
     log = p.log and centre > 0
     reach = FURTHEST_SDS * sd
@@ -214,12 +218,12 @@ def values_of(
 
 
 def by_owner(
-    placed: Mapping[tuple[str, str], float], hypothesis: Sequence[str]
+    values: Mapping[tuple[str, str], float], hypothesis: Sequence[str]
 ) -> dict[str, dict[str, float]]:
     """owner -> name -> value, from values by (owner, name). An effect of the hypothesis without parameters has an empty
     entry, so that it still acts."""
     out: dict[str, dict[str, float]] = {}
-    for (owner, name), value in placed.items():
+    for (owner, name), value in values.items():
         out.setdefault(owner, {})[name] = value
     for effect in hypothesis:
         out.setdefault(effect, {})
@@ -249,9 +253,9 @@ def starts(free: Sequence[FreeParameter]) -> list[Array]:
     return out
 
 
-def of_all_records(effect: str) -> str:
+def shared_owner(effect: str) -> str:
     """Owner of those parameters of an effect that all records share, good ones included."""
-    return effect + OF_ALL_RECORDS
+    return effect + SHARED_SUFFIX
 
 
 def acting_on(
@@ -264,16 +268,20 @@ def acting_on(
     """
     out: dict[str, dict[str, float]] = {}
     for owner, given in values.items():
-        name = owner.removesuffix(OF_ALL_RECORDS)
-        if owner in OF_ONE_RECORD or (good and name == owner):
+        name = owner.removesuffix(SHARED_SUFFIX)
+        if owner in RECORD_OWNERS or (good and name == owner):
             continue
-        there = out.setdefault(name, {})
+        acting = out.setdefault(name, {})
         for key, value in given.items():
-            there[key] = _moved(effects[name].parameters[key], there[key], value) if key in there else value
+            if key in acting:
+                value = _added_deviations(effects[name].parameters[key], acting[key], value)
+            acting[key] = value
     return out
 
 
-def _moved(p: Parameter, value: float, further: float) -> float:
+def _added_deviations(p: Parameter, value: float, further: float) -> float:
+    """The value whose deviation from neutral is the sum (product where logarithmic) of those of two values, in
+    bounds."""
     centre = p.default if p.neutral is None else p.neutral
     both = value * further / centre if p.log and centre > 0 else value + further - centre
     return min(max(both, p.bounds[0]), p.bounds[1])

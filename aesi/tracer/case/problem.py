@@ -25,9 +25,9 @@ from aesi.tracer.case.free_parameter import (
     FreeParameter,
     acting_on,
     capacity_share,
-    of_all_records,
-    of_effect,
-    own,
+    effect_parameters,
+    own_parameter,
+    shared_owner,
     state_of_charge,
 )
 from aesi.tracer.case.records import PreparedRecord
@@ -58,15 +58,15 @@ aesi.bench.fast_error`)."""
 STEP = 4e-3
 """Step of finite differences, in standard deviations of a parameter's prior: short against the posterior standard
 deviation. Rows at 10 Hz determine a lag to a thousandth of its spread."""
-REMEMBERED = 64
+CACHED_VOLTAGES = 64
 """Number of simulated voltages of good records in the cache: enough for a dozen hypotheses that grow in parallel."""
 
 ValuesByOwner = Mapping[str, Mapping[str, float]]
 """owner -> name -> value."""
 
 
-def share_of(values: ValuesByOwner, record: int) -> float:
-    """Capacity of the cell during a record, as a share of the file's; 1 where it is not fitted."""
+def record_capacity_share(values: ValuesByOwner, record: int) -> float:
+    """Capacity of the cell during a record (its number), as a share of the file's; 1 where it is not fitted."""
     return values.get(CAPACITY_SHARE, {}).get(str(record), 1.0)
 
 
@@ -131,11 +131,11 @@ class InverseProblem:
         for effect in self.effects.values():
             if effect.refines is not None or (effect.id in hypothesis and not self.has_good):
                 continue
-            owner = of_all_records(effect.id) if self.has_good else effect.id
+            owner = shared_owner(effect.id) if self.has_good else effect.id
             for name, p in effect.parameters.items():
                 sd = own_sd(self.trust, effect, p, self.cell.nominal_capacity_ah)
                 if sd is not None:
-                    out.append(own(owner, name, p, sd))
+                    out.append(own_parameter(owner, name, p, sd))
         out += self._open_energies(hypothesis)
         for effect_id in hypothesis:
             out += self.parameters_of(effect_id)
@@ -151,9 +151,9 @@ class InverseProblem:
         supposed = any(effect.infers == "temperature" for effect in acting)
         if not any(far_from_file(self.cell, record.data, supposed) for record in self.records):
             return []
-        owner = of_all_records(ACTIVATION_ENERGIES) if self.has_good else ACTIVATION_ENERGIES
+        owner = shared_owner(ACTIVATION_ENERGIES) if self.has_good else ACTIVATION_ENERGIES
         return [
-            own(owner, name, p, p.spread.tight)
+            own_parameter(owner, name, p, p.spread.tight)
             for name, p in self._movable[ACTIVATION_ENERGIES].parameters.items()
             if p.spread is not None and p.spread.tight is not None
         ]
@@ -165,7 +165,7 @@ class InverseProblem:
 
     def parameters_of(self, effect: str) -> list[FreeParameter]:
         """The parameters of an effect under test, by its id, in order."""
-        return of_effect(effect, self.effects[effect].parameters, self.cell.nominal_capacity_ah)
+        return effect_parameters(effect, self.effects[effect].parameters, self.cell.nominal_capacity_ah)
 
     def active(self, values: ValuesByOwner, good: bool = False) -> tuple[ActiveEffect, ...]:
         """The effects to simulate with. An effect under test is included even at its neutral point: some rewrite the
@@ -177,27 +177,33 @@ class InverseProblem:
         return (*self.fixed, *(self._movable[name].activate_only(**given) for name, given in acting.items()))
 
     def predict(self, values: ValuesByOwner, only: int | None = None) -> Array | None:
-        """(n,) V over the fit parts of all records, or of record `only`; None where the model fails."""
+        """(n,) V, voltage of the model over the fit parts of all records, or of record `only`; None where it cannot be
+        simulated or is not finite."""
         out = []
-        asked_for = range(len(self.records)) if only is None else (only,)
+        indices = range(len(self.records)) if only is None else (only,)
         try:
-            acting = {good: self.active(values, good) for good in {self.records[i].good for i in asked_for}}
-            for i in asked_for:
+            acting = {good: self.active(values, good) for good in {self.records[i].good for i in indices}}
+            for i in indices:
                 good = self.records[i].good
-                voltage_v = self._of_good_v if good else self._voltage_v
-                out.append(voltage_v(i, values[STATE_OF_CHARGE][str(i)], acting[good], share_of(values, i)))
+                voltage_v = self._cached_voltage_v if good else self._voltage_v
+                out.append(
+                    voltage_v(
+                        i, values[STATE_OF_CHARGE][str(i)], acting[good], record_capacity_share(values, i)
+                    )
+                )
         except (AesiError, FloatingPointError, ZeroDivisionError, OverflowError):
             return None
         joined = np.concatenate(out)
         return joined if np.isfinite(joined).all() else None
 
     def _voltage_v(self, i: int, soc0: float, effects: tuple[ActiveEffect, ...], share: float = 1.0) -> Array:
-        return self.run(self.seen[i], soc0, effects, self.records[i].thin_hold, share=share).voltage_v
+        return self.run(self.fit_parts[i], soc0, effects, self.records[i].thin_hold, share=share).voltage_v
 
     @cached_property
-    def _of_good_v(self) -> Callable[[int, float, tuple[ActiveEffect, ...], float], Array]:
-        """`_voltage_v` of good records, cached: effects under test do not act on them."""
-        return lru_cache(maxsize=REMEMBERED)(self._voltage_v)
+    def _cached_voltage_v(self) -> Callable[[int, float, tuple[ActiveEffect, ...], float], Array]:
+        """`_voltage_v` with a cache, for good records: effects under test do not act on them, so that their voltage
+        repeats."""
+        return lru_cache(maxsize=CACHED_VOLTAGES)(self._voltage_v)
 
     def run(
         self,
@@ -212,29 +218,29 @@ class InverseProblem:
         cell = self.cell if share == 1.0 else self.cell.with_material(share)
         return fit_simulation(cell, data, soc0, effects, hold, self.model, rest_voltage_v)
 
-    def why_not(self, hypothesis: Sequence[str]) -> str:
+    def failure_reason(self, hypothesis: Sequence[str]) -> str:
         """Why a hypothesis cannot be simulated at its typical values: one sentence."""
         try:
             effects = tuple(self.effects[name].activate() for name in hypothesis)
-            self.run(self.seen[0], self.records[0].soc0, effects, self.records[0].thin_hold)
+            self.run(self.fit_parts[0], self.records[0].soc0, effects, self.records[0].thin_hold)
         except AesiError as error:
             return str(error)
         return "no start of the fit could be simulated."
 
     @cached_property
-    def seen(self) -> tuple[Measurement, ...]:
+    def fit_parts(self) -> tuple[Measurement, ...]:
         """The fit part of each record, thinned."""
         return tuple(r.thin.take(slice(0, r.n_fit)) for r in self.records)
 
     @cached_property
     def measured(self) -> Array:
         """(n,) V, measured voltage of the fitted rows, thinned."""
-        return np.concatenate([m.voltage_v for m in self.seen])
+        return np.concatenate([m.voltage_v for m in self.fit_parts])
 
     @cached_property
     def time_s(self) -> Array:
         """(n,) s."""
-        return np.concatenate([m.time_s for m in self.seen])
+        return np.concatenate([m.time_s for m in self.fit_parts])
 
     @cached_property
     def white_v(self) -> Array:
@@ -242,9 +248,9 @@ class InverseProblem:
         return np.concatenate([r.white_v[: r.n_fit] for r in self.records])
 
     @cached_property
-    def as_white_v(self) -> Array:
-        """(n,) V, see `PreparedRecord.as_white_v`."""
-        return np.concatenate([r.as_white_v[: r.n_fit] for r in self.records])
+    def equivalent_white_v(self) -> Array:
+        """(n,) V, see `PreparedRecord.equivalent_white_v`."""
+        return np.concatenate([r.equivalent_white_v[: r.n_fit] for r in self.records])
 
     @cached_property
     def noise_v(self) -> float:
@@ -261,7 +267,7 @@ class InverseProblem:
     def _declared(self) -> tuple[Run, ...]:
         return tuple(
             self.run(data, record.soc0, self.fixed, record.thin_hold)
-            for record, data in zip(self.records, self.seen, strict=True)
+            for record, data in zip(self.records, self.fit_parts, strict=True)
         )
 
     @cached_property
@@ -269,7 +275,7 @@ class InverseProblem:
         """(n,) V, change of the declared model's voltage by one standard deviation of each record's initial state of
         charge; zero for a record that cannot be simulated there."""
         out = []
-        for record, data in zip(self.records, self.seen, strict=True):
+        for record, data in zip(self.records, self.fit_parts, strict=True):
             try:
                 out.append(self.start_slope_of_v(record, data, self.fixed, record.thin_hold))
             except AesiError:
@@ -295,54 +301,58 @@ class InverseProblem:
     def independent(self) -> Array:
         """(n,) number of independent samples of the model error that each row stands for.
 
-        The samples of a record are shared out by time. The error does not change while no charge moves, so that a rest
-        or a pause of the logger, however long, counts as the time of one sample."""
+        A record has as many as its time or its charge allows, whichever is less, shared out over its rows by time. The
+        error does not change while no charge moves, so that a rest or a pause of the logger, however long, counts as
+        the time of one sample."""
         out = []
-        for data, rows in zip(self.seen, self.slices, strict=True):
-            lasts = self.lasts_s[rows]
-            moved_ah = float(np.abs(data.current_a) @ lasts) / SECONDS_PER_HOUR
+        for data, rows in zip(self.fit_parts, self.slices, strict=True):
+            duration_s = self.row_duration_s[rows]
+            moved_ah = float(np.abs(data.current_a) @ duration_s) / SECONDS_PER_HOUR
             by_charge = moved_ah / self.cell.nominal_capacity_ah / INDEPENDENT_CHARGE
-            lasts = self._without_long_rests(data, lasts)
-            many = min(float(lasts.sum()) / INDEPENDENT_S, by_charge)
+            duration_s = self._without_long_rests(data, duration_s)
+            number = min(float(duration_s.sum()) / INDEPENDENT_S, by_charge)
             if self.trust == "beside":
-                many *= BESIDE_TIMES
-            out.append(lasts / lasts.sum() * max(many, 1.0))
+                number *= BESIDE_TIMES
+            out.append(duration_s / duration_s.sum() * max(number, 1.0))
         joined = np.concatenate(out)
         return joined * self.compared if self.trust == "beside" else joined
 
-    def _without_long_rests(self, data: Measurement, lasts_s: Array) -> Array:
-        """(n,) s that each row stands for, with each rest shortened to the time of as many independent samples as its
-        charge makes up, at least one."""
+    def _without_long_rests(self, data: Measurement, row_duration_s: Array) -> Array:
+        """(n,) s, duration that each row stands for, with each rest shortened to the time of as many independent
+        samples as its charge makes up, at least one."""
         capacity_ah = self.cell.nominal_capacity_ah
         rests = np.abs(data.current_a) <= REST_C_RATE * capacity_ah
         number = np.cumsum(np.diff(rests, prepend=False))
-        together_s = np.bincount(number, lasts_s)[number]
-        moved_ah = np.bincount(number, np.abs(data.current_a) * lasts_s)[number] / SECONDS_PER_HOUR
+        together_s = np.bincount(number, row_duration_s)[number]
+        moved_ah = np.bincount(number, np.abs(data.current_a) * row_duration_s)[number] / SECONDS_PER_HOUR
         most_s = INDEPENDENT_S * np.maximum(moved_ah / capacity_ah / INDEPENDENT_CHARGE, 1.0)
-        return np.where(rests, lasts_s * np.minimum(most_s / together_s, 1.0), lasts_s)
+        return np.where(rests, row_duration_s * np.minimum(most_s / together_s, 1.0), row_duration_s)
 
     @cached_property
-    def lasts_s(self) -> Array:
-        """(n,) s that each row stands for."""
-        return np.concatenate([np.gradient(data.time_s) for data in self.seen])
+    def row_duration_s(self) -> Array:
+        """(n,) s, duration that each row stands for."""
+        return np.concatenate([np.gradient(data.time_s) for data in self.fit_parts])
 
-    def off_at_seconds(self, hypothesis: Sequence[str]) -> Array:
+    def file_errors_v(self, hypothesis: Sequence[str]) -> Array:
         """(n, k) V, change of the declared model's voltage by one standard deviation of each parameter in which the
-        file may err within seconds. Parameters that the hypothesis itself moves are left out; k is 0 where the model
-        error has one scale. Lasting shifts are included: `model_error.off_within_seconds` subtracts them."""
-        off = self._off_at_seconds if self.two_scales else ()
-        kept = [column for restating, column in off if restating.isdisjoint(hypothesis)]
+        file may be wrong about the response within seconds. Parameters that the hypothesis itself moves are left out; k
+        is 0 where the model error has one part. Lasting changes are included: `model_error.fast_file_errors_v`
+        subtracts them."""
+        errors = self._file_errors_v if self.two_scales else ()
+        kept = [column for restating, column in errors if restating.isdisjoint(hypothesis)]
         return np.column_stack([np.zeros((len(self.time_s), 0)), *kept])
 
     @cached_property
-    def _off_at_seconds(self) -> tuple[tuple[frozenset[str], Array], ...]:
+    def _file_errors_v(self) -> tuple[tuple[frozenset[str], Array], ...]:
         """(effects that restate the parameter, (n,) V for one standard deviation) of each parameter; the first is
         the resistance of the contacts."""
-        current = np.concatenate([data.current_a for data in self.seen])
-        held = np.concatenate([run.voltage_v for run in self._declared])
-        moves = np.concatenate([np.diff(data.current_a) for data in self.seen])
-        responds = np.concatenate([np.diff(run.voltage_v) for run in self._declared])
-        resistance = max(-float(moves @ responds) / max(float(moves @ moves), 1e-12), 0.0)
+        current = np.concatenate([data.current_a for data in self.fit_parts])
+        declared_v = np.concatenate([run.voltage_v for run in self._declared])
+        current_steps = np.concatenate([np.diff(data.current_a) for data in self.fit_parts])
+        voltage_steps = np.concatenate([np.diff(run.voltage_v) for run in self._declared])
+        resistance = max(
+            -float(current_steps @ voltage_steps) / max(float(current_steps @ current_steps), 1e-12), 0.0
+        )
         ohmic = frozenset(name for name, effect in self.effects.items() if effect.ohmic)
         out = [(ohmic, -OHMIC_SHARE * resistance * current)]
         for effect in self.effects.values():
@@ -351,10 +361,10 @@ class InverseProblem:
             for name, p in effect.parameters.items():
                 if p.spread is None or p.spread.tight is None:
                     continue
-                one = own(effect.id, name, p, p.spread.tight)
+                one = own_parameter(effect.id, name, p, p.spread.tight)
                 moved = self._declared_with(effect, name, one.value(STEP))
                 if moved is not None:
-                    out.append((frozenset({effect.id}), (moved - held) / STEP))
+                    out.append((frozenset({effect.id}), (moved - declared_v) / STEP))
         return tuple(out)
 
     def _declared_with(self, effect: Effect, name: str, value: float) -> Array | None:
@@ -372,8 +382,8 @@ class InverseProblem:
         """(n,) True for all rows of records not known to be good, and for those rows of good records whose state of
         charge lies in the range of the former: the size of a model error depends on the state of charge."""
         z, good = self.declared_soc, self.good_rows
-        looked = z[~good]
-        near = (z > looked.min() - INDEPENDENT_CHARGE) & (z < looked.max() + INDEPENDENT_CHARGE)
+        other = z[~good]
+        near = (z > other.min() - INDEPENDENT_CHARGE) & (z < other.max() + INDEPENDENT_CHARGE)
         return np.asarray(~good | near)
 
     @cached_property
@@ -382,8 +392,8 @@ class InverseProblem:
         return np.concatenate([np.full(r.n_fit, r.good) for r in self.records])
 
     @cached_property
-    def steepness(self) -> Array:
-        """(n,) |dU/dz| / (1 V), U the declared open-circuit voltage and z the state of charge."""
+    def ocv_slope_v(self) -> Array:
+        """(n,) V, |dU/dz|, U the declared open-circuit voltage and z the state of charge (share)."""
         z = self.declared_soc
         step = 5e-3
         low, high = np.clip(z - step, -0.01, 1.01), np.clip(z + step, -0.01, 1.01)

@@ -24,7 +24,7 @@ from aesi.physics.effect import ActiveEffect
 from aesi.physics.initial_state import InitialState, initial_state
 from aesi.physics.rest.open_circuit import GOOD_READING_V
 from aesi.records import Hold, Measurement, at_its_temperature, hold_sentence
-from aesi.tracer.case.thinned import ThinnedRecord, lost_v, thinned_record, thinned_together
+from aesi.tracer.case.thinned import ThinnedRecord, thinned_record, thinned_together, thinning_error_v
 
 THINNED_SHARE = 0.5
 """Share of the declared model's change by thinning that counts as noise, since another model changes by another amount:
@@ -38,7 +38,7 @@ HALF_FULL = 0.5
 """State of charge, share: above it a smaller one is safer to simulate, below it a larger one."""
 FEWEST_ROWS = 8
 """Fewest rows from which noise is estimated; a shorter record gets SMALLEST_NOISE_V."""
-CALM_SHARE = 0.3
+STEADIEST_SHARE = 0.3
 """Share of the rows, those at which the current changes least, from which the noise is estimated. A convention."""
 LARGEST_SDS = 3.5
 """A difference larger than this many standard deviations is a step of the voltage, not noise. A convention."""
@@ -75,9 +75,9 @@ class PreparedRecord:
     data : as measured.  thin : thinned rows for fits, fit part and held-out part.  n_fit : rows of `thin` in the fit
     part.  fit_until_s : time at which the fit part of `data` ends, s (inf for all).  start : state at the first row.
     hold, thin_hold : how the current runs between the rows of `data` and of `thin`.  white_v : (n_thin,) V, standard
-    deviation of the noise in each row of `thin`.  as_white_v : (n_thin,) V, standard deviation of white noise with the
-    same information, larger where rows share one value of the noise.  noise_full_v : standard deviation of the noise in
-    the fit part of `data`, V.
+    deviation of the noise in each row of `thin`.  equivalent_white_v : (n_thin,) V, standard deviation of white noise
+    with the same information, larger where rows share one value of the noise.  noise_full_v : standard deviation of the
+    noise in the fit part of `data`, V.
     lead_rows : number of first rows of `data` that are simulated but not judged.
     good : known to be good: no effect acts on it, and the other records are compared with it.
     continues : number of the fitted record whose rows this one begins with, or None.
@@ -91,7 +91,7 @@ class PreparedRecord:
     hold: Hold
     thin_hold: Hold
     white_v: Array
-    as_white_v: Array
+    equivalent_white_v: Array
     noise_full_v: float
     lead_rows: int = 0
     notes: tuple[str, ...] = ()
@@ -150,26 +150,27 @@ class Noise(NamedTuple):
     resolution_v: float
     rows: int
 
-    def of_means_v(self, rows: Array) -> Array:
+    def sd_of_means_v(self, rows: Array) -> Array:
         """(m,) V, standard deviations of means over `rows` (m,) rows each."""
         values = np.maximum(rows / self.rows, 1.0)
         return np.sqrt((self.sd_v**2 - self.resolution_v**2) / values + self.resolution_v**2)
 
 
 def noise_of(data: Measurement, capacity_ah: float) -> Noise:
-    """The noise of a record.
+    """The noise of a record's voltage: white, unless differences over several rows show more of it than those of
+    neighbouring rows (`_noise_by_lag_v`).
 
     capacity_ah : of the cell; a current counts as steady by its C-rate.
     """
     if len(data) < FEWEST_ROWS:
         return Noise(SMALLEST_NOISE_V, 0.0, 1)
     sd_v, rows = noise_floor_v(data.voltage_v, data.current_a), 1
-    smooth = _smooth_noise_v(data, capacity_ah)
-    most_v = max(smooth.values(), default=0.0)
+    by_lag_v = _noise_by_lag_v(data, capacity_ah)
+    most_v = max(by_lag_v.values(), default=0.0)
     if most_v > SMOOTH_TIMES * sd_v:
-        sd_v, rows = most_v, next(lag for lag, v in smooth.items() if SMOOTH_TIMES * v > most_v)
-    scattered_v = max(_from_row_to_row_v(data.voltage_v, data.current_a), most_v)
-    return Noise(sd_v, min(_rounded_by_v(_quantum_v(data.voltage_v), scattered_v), sd_v), rows)
+        sd_v, rows = most_v, next(lag for lag, v in by_lag_v.items() if SMOOTH_TIMES * v > most_v)
+    scattered_v = max(_second_difference_sd_v(data.voltage_v, data.current_a), most_v)
+    return Noise(sd_v, min(_rounding_error_v(_quantum_v(data.voltage_v), scattered_v), sd_v), rows)
 
 
 def noise_floor_v(voltage_v: Array, current_a: Array) -> float:
@@ -181,25 +182,25 @@ def noise_floor_v(voltage_v: Array, current_a: Array) -> float:
     if len(voltage_v) < FEWEST_ROWS:
         return SMALLEST_NOISE_V
     rounding = _quantum_v(voltage_v) / np.sqrt(12.0)
-    return max(_from_row_to_row_v(voltage_v, current_a), float(rounding), SMALLEST_NOISE_V)
+    return max(_second_difference_sd_v(voltage_v, current_a), float(rounding), SMALLEST_NOISE_V)
 
 
-def _from_row_to_row_v(voltage_v: Array, current_a: Array) -> float:
-    """As `noise_floor_v`, without its lower limits."""
+def _second_difference_sd_v(voltage_v: Array, current_a: Array) -> float:
+    """As `noise_floor_v`, without its lower limits: RMS of the second differences over the root of 6, V."""
     second = voltage_v[2:] - 2.0 * voltage_v[1:-1] + voltage_v[:-2]
     change = np.abs(np.diff(current_a))
     change = np.maximum(change[1:], change[:-1])
-    return _scale(second[change <= np.quantile(change, CALM_SHARE)]) / float(np.sqrt(6.0))
+    return _rms_without_outliers(second[change <= np.quantile(change, STEADIEST_SHARE)]) / float(np.sqrt(6.0))
 
 
-def _scale(differences: Array, share: float = 0.5) -> float:
-    """RMS of differences, without those that are too large to be noise.
+def _rms_without_outliers(differences: Array, share: float = 0.5) -> float:
+    """RMS of differences (m,), without those of more than `LARGEST_SDS` standard deviations, which are no noise.
 
-    share : quantile of their magnitude from which the scale of the noise is read, as of a normal distribution.
+    share : quantile of their magnitude from which that standard deviation is read, as of a normal distribution.
     """
     size = np.abs(differences)
-    usual = float(np.quantile(size, share)) / float(ndtri(0.5 * (1.0 + share)))
-    kept = differences[size <= LARGEST_SDS * max(usual, 1e-9)]
+    sd = float(np.quantile(size, share)) / float(ndtri(0.5 * (1.0 + share)))
+    kept = differences[size <= LARGEST_SDS * max(sd, 1e-9)]
     return rms(kept if len(kept) > 5 else differences)
 
 
@@ -209,7 +210,7 @@ def _quantum_v(voltage_v: Array) -> float:
     return float(steps.min()) if len(steps) else 0.0
 
 
-def _rounded_by_v(quantum_v: float, scattered_v: float) -> float:
+def _rounding_error_v(quantum_v: float, scattered_v: float) -> float:
     """RMS error, V, of the mean of a constant voltage with white noise whose rows are rounded to multiples of a
     quantum: quantum / sqrt(12) without noise, a 200th of that with noise of half a quantum, which scatters the rows
     over neighbouring multiples.
@@ -222,13 +223,13 @@ def _rounded_by_v(quantum_v: float, scattered_v: float) -> float:
         return 0.0
     noise_v2 = max(scattered_v**2 - quantum_v**2 / 12.0, 0.0)
     k = np.arange(1, HARMONICS + 1)
-    of_each_v2 = (
+    harmonics_v2 = (
         0.5 * (quantum_v / (np.pi * k)) ** 2 * np.exp(-4.0 * np.pi**2 * k**2 * noise_v2 / quantum_v**2)
     )
-    return float(np.sqrt(of_each_v2.sum()))
+    return float(np.sqrt(harmonics_v2.sum()))
 
 
-def _smooth_noise_v(data: Measurement, capacity_ah: float) -> dict[int, float]:
+def _noise_by_lag_v(data: Measurement, capacity_ah: float) -> dict[int, float]:
     """Lag (rows) -> standard deviation of the noise, V, from differences at that lag. It is the same at each lag for
     white noise, and grows with the lag for a channel that is filtered or holds its values.
 
@@ -245,10 +246,10 @@ def _smooth_noise_v(data: Measurement, capacity_ah: float) -> dict[int, float]:
             break
         v = data.voltage_v[settled:]
         third = v[3 * lag :] - 3.0 * v[2 * lag : -lag] + 3.0 * v[lag : -2 * lag] - v[: -3 * lag]
-        steady = _calm(data, span, EVEN_TIMES * span * typical, STEP_C_RATE * capacity_ah)
+        steady = _steady_spans(data, span, EVEN_TIMES * span * typical, STEP_C_RATE * capacity_ah)
         if np.count_nonzero(steady) < FEWEST_SPANS * lag:
             break
-        found_v = _scale(third[steady], HELD_SHARE) / float(np.sqrt(20.0))
+        found_v = _rms_without_outliers(third[steady], HELD_SHARE) / float(np.sqrt(20.0))
         before = max(out, default=lag)
         if out and found_v > lag / before * max(out[before], SMALLEST_NOISE_V):
             break
@@ -256,14 +257,14 @@ def _smooth_noise_v(data: Measurement, capacity_ah: float) -> dict[int, float]:
     return out
 
 
-def _calm(data: Measurement, span: int, longest_s: float, most_a: float) -> BoolArray:
+def _steady_spans(data: Measurement, span: int, longest_s: float, most_a: float) -> BoolArray:
     """(n - span,) True where the current is steady from a row to the one `span` rows later: among the spans of at most
-    `longest_s` (s) whose current varies by at most `most_a` (A), the `CALM_SHARE` that vary least."""
+    `longest_s` (s) whose current varies by at most `most_a` (A), the `STEADIEST_SHARE` that vary least."""
     inside = slice((span + 1) // 2, (span + 1) // 2 + len(data) - span)
     highest, lowest = (of(data.current_a, span + 1)[inside] for of in (maximum_filter1d, minimum_filter1d))
     moves = highest - lowest
     calm = (data.time_s[span:] - data.time_s[:-span] <= longest_s) & (moves <= most_a)
-    return calm & (moves <= np.quantile(moves[calm], CALM_SHARE)) if calm.any() else calm
+    return calm & (moves <= np.quantile(moves[calm], STEADIEST_SHARE)) if calm.any() else calm
 
 
 def prepare(
@@ -294,18 +295,18 @@ def _prepared(
 ) -> PreparedRecord:
     data = record.whole
     start = initial_state(cell, data, soc0, record.hold, given, shared=shared, potentials_v=GOOD_READING_V)
-    lost = lost_v(cell, record, start.soc, given)
+    lost = thinning_error_v(cell, record, start.soc, given)
     thin = replace(record.thin, voltage_v=record.thin.voltage_v - lost)
     duration = float(data.time_s[-1] - data.time_s[0])
     until = data.time_s[0] + (1.0 - holdout) * duration if holdout > 0 else np.inf
     n_fit = int(np.searchsorted(thin.time_s, until))
     fitted = data.take(slice(0, int(np.searchsorted(data.time_s, until))))
     noise = noise_of(fitted, cell.nominal_capacity_ah)
-    of_thin = noise_of(thin.take(slice(0, n_fit)), cell.nominal_capacity_ah)
-    white = _white_v(record, noise, of_thin)
-    as_white = _as_white_v(record, noise, of_thin, white, n_fit)
+    thin_noise = noise_of(thin.take(slice(0, n_fit)), cell.nominal_capacity_ah)
+    white = _white_v(record, noise, thin_noise)
+    equivalent = _equivalent_white_v(record, noise, thin_noise, white, n_fit)
     as_given = start.basis == "given" and not (start.contradicted or start.doubted)
-    said = () if as_given else (start.sentence,)
+    start_note = () if as_given else (start.sentence,)
     return PreparedRecord(
         data=data,
         thin=thin,
@@ -315,37 +316,40 @@ def _prepared(
         hold=record.hold,
         thin_hold=record.thin_hold,
         white_v=np.hypot(white, THINNED_SHARE * lost),
-        as_white_v=np.hypot(as_white, THINNED_SHARE * lost),
+        equivalent_white_v=np.hypot(equivalent, THINNED_SHARE * lost),
         noise_full_v=noise.sd_v,
         notes=(
-            *said,
+            *start_note,
             hold_sentence(data.name, record.hold, data.hold is not None, HOLD_OPTION),
             *_temperature_noted(data),
         ),
     )
 
 
-def _white_v(record: ThinnedRecord, noise: Noise, of_thin: Noise) -> Array:
-    """(n_thin,) V, noise of each row of `thin`.  noise, of_thin : of the fit part, as measured and thinned."""
+def _white_v(record: ThinnedRecord, noise: Noise, thin_noise: Noise) -> Array:
+    """(n_thin,) V, noise of each row of `thin`.  noise, thin_noise : of the fit part, as measured and thinned."""
     if record.rows is not None:  # rows are too far apart for their differences to be noise
-        return np.maximum(noise.of_means_v(record.rows), SMALLEST_NOISE_V)
+        return np.maximum(noise.sd_of_means_v(record.rows), SMALLEST_NOISE_V)
     # Averages are no noisier than rows: a larger estimate comes from the load of a drive that never rests.
-    return np.full(len(record.thin), min(max(of_thin.sd_v, noise.resolution_v), noise.sd_v))
+    return np.full(len(record.thin), min(max(thin_noise.sd_v, noise.resolution_v), noise.sd_v))
 
 
-def _as_white_v(record: ThinnedRecord, noise: Noise, of_thin: Noise, white_v: Array, n_fit: int) -> Array:
-    """(n_thin,) V, `PreparedRecord.as_white_v` for the noise `white_v` (n_thin,) of the rows.
+def _equivalent_white_v(
+    record: ThinnedRecord, noise: Noise, thin_noise: Noise, white_v: Array, n_fit: int
+) -> Array:
+    """(n_thin,) V, `PreparedRecord.equivalent_white_v` for the noise `white_v` (n_thin,) of the rows.
 
     Rows that share one value of the noise carry the information of a single row: rows over which a channel is smooth,
     and rows that were rounded to one value, which share the rounding error `resolution_v`.
     """
-    share = np.maximum(noise.rows / record.rows, 1.0) if record.rows is not None else float(of_thin.rows)
+    share = np.maximum(noise.rows / record.rows, 1.0) if record.rows is not None else float(thin_noise.rows)
     if not noise.resolution_v:
         return np.sqrt(share) * white_v
     code = np.round(record.thin.voltage_v / _quantum_v(record.whole.voltage_v))
-    opens = np.diff(code, prepend=np.nan) != 0.0
-    opens[n_fit : n_fit + 1] = True  # rows held back must not change the weight of fitted ones
-    alike = np.bincount(np.cumsum(opens) - 1)[np.cumsum(opens) - 1]
+    first_of_run = np.diff(code, prepend=np.nan) != 0.0
+    first_of_run[n_fit : n_fit + 1] = True  # rows held back must not change the weight of fitted ones
+    run = np.cumsum(first_of_run) - 1
+    alike = np.bincount(run)[run]
     scattered_v2 = np.maximum(white_v**2 - noise.resolution_v**2, 0.0)
     return np.sqrt(share * scattered_v2 + alike * noise.resolution_v**2)
 
@@ -359,7 +363,7 @@ def _temperature_noted(data: Measurement) -> tuple[str, ...]:
     )
 
 
-def led_by(data: Measurement, seen: Sequence[Measurement]) -> tuple[int, Measurement] | None:
+def leading_record(data: Measurement, seen: Sequence[Measurement]) -> tuple[int, Measurement] | None:
     """(index of the fitted record that leads to `data`, both as one record); None where no fitted record does.
 
     It is the longest one with whose rows `data` begins, else the first one that `data` continues. The latter is not
@@ -393,19 +397,19 @@ def prepare_test(
 ) -> PreparedRecord:
     """A prepared test record, to which nothing is fitted.
 
-    Where a fitted record leads to it (`led_by`), the simulation starts with that record and only the later rows are
-    judged. The notes then say so, in place of a state of charge read from the first row.
+    Where a fitted record leads to it (`leading_record`), the simulation starts with that record and only the later rows
+    are judged. The notes then say so, in place of a state of charge read from the first row.
     """
-    led = led_by(data, seen)
+    led = leading_record(data, seen)
     if led is None:
         return prepare(cell, data, soc0, 0.0, given=given, shared=True)
     index, whole = led
     prepared = prepare(cell, whole, soc0, 0.0, given=given, shared=True)
-    said = (
+    lead_note = (
         f"{data.name} is judged from {stamp(float(whole.time_s[len(seen[index])]))} s on, after the rows of "
         f"{seen[index].name} that were fitted; the model is run from {stamp(float(whole.time_s[0]))} s to get there."
     )
-    notes = (said, *(note for note in prepared.notes if note != prepared.start.sentence))
+    notes = (lead_note, *(note for note in prepared.notes if note != prepared.start.sentence))
     return replace(prepared, lead_rows=len(seen[index]), continues=index, notes=notes)
 
 

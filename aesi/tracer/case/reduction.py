@@ -28,17 +28,17 @@ def with_fine_numerics(problem: InverseProblem) -> InverseProblem:
         return problem
     effects = (*problem.fixed, finer.activate())
     moved = []
-    for record, data in zip(problem.records, problem.seen, strict=True):
+    for record, data in zip(problem.records, problem.fit_parts, strict=True):
         coarse = problem.run(data, record.soc0, problem.fixed, record.thin_hold).voltage_v
         moved.append(problem.run(data, record.soc0, effects, record.thin_hold).voltage_v - coarse)
     shift = rms(np.concatenate(moved))
     if shift > NOTABLE_SHARE * problem.noise_v:
         return replace(problem, fixed=effects)
-    return let_stand(problem, shift)
+    return with_approximation_kept(problem, shift)
 
 
-def let_stand(problem: InverseProblem, shift_v: float) -> InverseProblem:
-    """The problem, with one more approximation kept that moves the voltage by `shift_v` (V RMS)."""
+def with_approximation_kept(problem: InverseProblem, shift_v: float) -> InverseProblem:
+    """The problem, with a further approximation of its model kept, which moves the voltage by `shift_v` (V RMS)."""
     return replace(problem, approximated_v=float(np.hypot(problem.approximated_v, shift_v)))
 
 

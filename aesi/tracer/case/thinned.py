@@ -73,7 +73,7 @@ def thinned_together(cell: Cell, measurements: Sequence[Measurement]) -> list[Th
         step_s *= 2.0
 
 
-def lost_v(cell: Cell, record: ThinnedRecord, soc0: float, given: Sequence[ActiveEffect]) -> Array:
+def thinning_error_v(cell: Cell, record: ThinnedRecord, soc0: float, given: Sequence[ActiveEffect]) -> Array:
     """(n_thin,) V, error of the declared model's voltage by thinning: its voltage on the whole record, averaged over
     the thinned rows, minus its voltage on the thinned record; zero where it cannot be simulated.
 

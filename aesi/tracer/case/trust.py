@@ -39,8 +39,8 @@ def own_sd(trust: Trust, effect: Effect, p: Parameter, capacity_ah: float) -> fl
     if p.spread is None:
         return None
     measured_cell = trust in MEASURED_CELL
-    as_it_is = measured_cell and effect.kind == "instrument"
-    sd = p.spread.loose if trust == "loose" or as_it_is else p.spread.tight
+    instrument_may_be_off = measured_cell and effect.kind == "instrument"
+    sd = p.spread.loose if trust == "loose" or instrument_may_be_off else p.spread.tight
     if sd is None:
         return None
     if (trust == "exact" or measured_cell) and effect.kind == "parameter":

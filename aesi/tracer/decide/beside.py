@@ -30,8 +30,8 @@ from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import fitted_hypothesis
 from aesi.tracer.search.grown import grown_with
 from aesi.tracer.search.path import Path, Report
-from aesi.tracer.search.plausible import alike, lag, sds_behind
-from aesi.tracer.search.wrong_parameters import NINETY
+from aesi.tracer.search.plausible import alike, score_lag, sds_behind
+from aesi.tracer.search.wrong_parameters import NINETY_SDS
 
 
 def searched_answer_beside(
@@ -99,7 +99,7 @@ def checked_against_ageing(verdict: Verdict, believed: Explanation, aged: Sequen
     if not verdict.effects:
         return verdict
     as_well = tuple(one.hypothesis[0] for one in aged if alike(believed, one))
-    behind = [sds_behind(*lag(believed, one)) for one in aged if one.hypothesis[0] not in as_well]
+    behind = [sds_behind(*score_lag(believed, one)) for one in aged if one.hypothesis[0] not in as_well]
     verdict = replace(verdict, margin=min([verdict.margin, *behind]))
     if not as_well:
         return verdict
@@ -128,7 +128,7 @@ class AllowedError:
         problem, good = path.problem, path.problem.good_rows
         good_v = error_beyond_noise_v(path, believed, good & problem.compared)
         usual_v = float(np.hypot(good_v, tolerance_v(problem, thresholds)))
-        return cls(good_v, usual_v, usual_v * (1.0 + NINETY * _relative_sd(problem, good)))
+        return cls(good_v, usual_v, usual_v * (1.0 + NINETY_SDS * _relative_sd(problem, good)))
 
     def discounted_gain_nats(self, path: Path, one: FittedHypothesis) -> float:
         """Gain of a hypothesis over the bare model, nats. Where its error on the other records, left_v, is more than

@@ -34,7 +34,7 @@ from aesi.tracer.decide.verdict import (
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import base_of
-from aesi.tracer.search.forward import refitted, searched
+from aesi.tracer.search.forward import forward_search, refitted
 from aesi.tracer.search.path import Path, Report
 from aesi.tracer.search.plausible import most_plausible, plausibility
 from aesi.tracer.search.wrong_parameters import beyond_spread, with_wrong_parameters
@@ -90,7 +90,7 @@ class _Searches:
             allowed_v = np.inf if trust in MOST_EFFECTS else tolerance_v(problem, self.thresholds)
             trusted = replace(problem, trust=trust)
             begun = self.shallower.get(trust)
-            self.paths[trust] = searched(trusted, most, self.archive, self.report, allowed_v, begun)
+            self.paths[trust] = forward_search(trusted, most, self.archive, self.report, allowed_v, begun)
         return self.paths[trust]
 
 

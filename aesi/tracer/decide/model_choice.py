@@ -18,7 +18,13 @@ from typing import Protocol, TypeGuard
 
 from aesi.physics.simulation import MODEL_WORDS, ModelName
 from aesi.tracer.case.problem import InverseProblem
-from aesi.tracer.case.reduction import LEAST_V, Reduction, let_stand, reduction_of, with_fine_numerics
+from aesi.tracer.case.reduction import (
+    LEAST_V,
+    Reduction,
+    reduction_of,
+    with_approximation_kept,
+    with_fine_numerics,
+)
 from aesi.tracer.decide.evidence import Answer, Evidence, second_is_believed
 from aesi.tracer.decide.verdict import Thresholds, across_models, structured_v, tolerance_v
 from aesi.tracer.search.archive import Archive
@@ -78,7 +84,7 @@ def with_model(
         return _chosen(search(one, archive_of(one, None), max_effects), one.model, declared, why)
     reduced = _fine(problem, "espm")
     if declared is not None and not declared.notable:
-        reduced = let_stand(reduced, declared.shift_v)
+        reduced = with_approximation_kept(reduced, declared.shift_v)
     single = _SingleParticle(reduced, archive_of(reduced, None), search, max_effects, declared)
     if problem.has_good:
         return _chosen(

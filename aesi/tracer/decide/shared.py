@@ -14,7 +14,7 @@ from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.trust import own_sd
 from aesi.tracer.search.archive import Archive, context_of
 from aesi.tracer.search.fitted import base_of
-from aesi.tracer.search.forward import searched
+from aesi.tracer.search.forward import forward_search
 from aesi.tracer.search.path import Path, Report
 from aesi.tracer.search.plausible import most_plausible
 
@@ -36,7 +36,7 @@ def searched_unshared(problem: InverseProblem, most: int, archive: Archive, repo
 
     most : effects that may be named, 0 or 1.  Raises DataError where the model cannot be simulated on the records.
     """
-    found, opened = Unshared(searched(problem, most, archive, report), archive), set[str]()
+    found, opened = Unshared(forward_search(problem, most, archive, report), archive), set[str]()
     while found.path.chosen.hypothesis and not opened.issuperset(found.path.chosen.hypothesis):
         (name,) = found.path.chosen.hypothesis
         opened.add(name)
@@ -63,7 +63,7 @@ def _with_shared(found: Unshared, name: str, most: int, report: Report) -> Unsha
         "that are compared with the good ones: it is taken as common to all, and the verdict is on what these have "
         "beyond it; leave out --good to ask what the file lacks."
     )
-    path = searched(problem, most, archive, report)
+    path = forward_search(problem, most, archive, report)
     return Unshared(path, archive, (*found.shared, told))
 
 

@@ -27,7 +27,7 @@ NMC cell, with nine parameters moved."""
 def other_temperatures(problem: InverseProblem) -> dict[int, OtherTemperature]:
     """Number of a record -> the temperature at which the declared model follows its fitted rows, for records that
     contradict their own temperature column."""
-    pairs = zip(problem.records, problem.seen, strict=True)
+    pairs = zip(problem.records, problem.fit_parts, strict=True)
     found = {index: _other(problem, record, seen) for index, (record, seen) in enumerate(pairs)}
     return {index: other for index, other in found.items() if other is not None}
 

@@ -18,7 +18,7 @@ from aesi.tracer.likelihood.fit import LinearForm, held_out_residual, prediction
 from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_error import MEASURED_V, PRIORS
 from aesi.tracer.search.path import Path, unseen_rmse_v
-from aesi.tracer.search.plausible import ALIKE_NATS, ALIKE_SDS, alike, lag, sds_behind
+from aesi.tracer.search.plausible import ALIKE_NATS, ALIKE_SDS, alike, score_lag, sds_behind
 
 Word = Literal["found", "none", "unknown"]
 GROUP_SIZE = 3
@@ -242,7 +242,7 @@ def look_alikes(
             without = tried.get(frozenset(anchor.hypothesis) - {name})
             if without is not None and other.score.total - without.score.total < path.admission_nats:
                 continue
-            nats, deviation = lag(anchor, other)
+            nats, deviation = score_lag(anchor, other)
             close = alike(anchor, other, thresholds.alike_sds, thresholds.alike_nats)
             if close and _as_adequate(path, other, anchor, allowed_v):
                 same.append((nats, added))

@@ -11,24 +11,25 @@ import numpy as np
 from scipy.special import log_ndtr, ndtri, ndtri_exp
 
 from aesi.numerics.typing import Array
-from aesi.tracer.likelihood.gaussian import Posterior, along_bounds, held_at_bounds, on_lower_bound
+from aesi.tracer.likelihood.gaussian import Posterior, densities_at_bounds, held_at_bounds, on_lower_bound
 
 
-def reaches(posterior: Posterior, bounds: Array, share: float) -> Array:
-    """(m, 2) distances, at least 0, from each parameter to the lower and the upper end of its credible interval.
+def interval_distances(posterior: Posterior, bounds: Array, share: float) -> Array:
+    """(m, 2) distances, at least 0, from each parameter to the lower and the upper end of its credible interval, in
+    prior standard deviations.
 
-    bounds : (m, 2) of the coordinates.  share : posterior probability of the interval.  Distances are in coordinates.
+    bounds : (m, 2) of the coordinates.  share : posterior probability of the interval.
     """
     to_bounds, held = held_at_bounds(posterior, bounds)
-    free, place = np.flatnonzero(~held), posterior.x + to_bounds
+    free, x = np.flatnonzero(~held), posterior.x + to_bounds
     sums = posterior.sums.moved(to_bounds)
-    a = sums.gram.sum(axis=0) + np.eye(len(place))
-    out = np.zeros((len(place), 2))
+    a = sums.gram.sum(axis=0) + np.eye(len(x))
+    out = np.zeros((len(x), 2))
     covariance = np.linalg.inv(a[np.ix_(free, free)])
     out[free] = float(ndtri(0.5 * (1.0 + share))) * np.sqrt(np.diagonal(covariance))[:, None]
-    for j, beside in along_bounds(sums, place, bounds, held).items():
-        above = on_lower_bound(place[j], bounds[j])
-        out[j, int(above)] = _distance(beside.slope, beside.curvature, share)
+    for j, density in densities_at_bounds(sums, x, bounds, held).items():
+        upper_end = on_lower_bound(x[j], bounds[j])  # the interval begins at the bound
+        out[j, int(upper_end)] = _distance(density.slope, density.curvature, share)
     return out
 
 

@@ -20,12 +20,12 @@ from aesi.tracer.likelihood.gaussian import (
     Linearised,
     Posterior,
     PredictiveScore,
-    Weighed,
+    ScoreAtSize,
     best_over_sizes,
     block_sums,
-    weighed,
+    score_at_size,
 )
-from aesi.tracer.likelihood.model_error import PRIORS, Size, SplitTable, off_within_seconds, whitened
+from aesi.tracer.likelihood.model_error import PRIORS, Size, SplitTable, fast_file_errors_v, whitened
 from aesi.tracer.likelihood.size_sums import SizeSums
 
 GAIN_NATS = 0.05
@@ -55,7 +55,7 @@ class FittedHypothesis:
         return values_of(self.free, self.point.x, self.hypothesis)
 
     @property
-    def placed(self) -> dict[tuple[str, str], float]:
+    def values_by_key(self) -> dict[tuple[str, str], float]:
         """(owner, name) -> value."""
         return {f.key: f.value(float(x)) for f, x in zip(self.free, self.point.x, strict=True)}
 
@@ -142,11 +142,11 @@ class HypothesisFitter:
         rounds : most evaluations of the jacobian.  slopes_v : (n, k) V, approximate sensitivities at x to begin with.
         without : blocks that are left out.
         """
-        whitened_one = _Whitened(self, size, ~np.isin(self.blocks.of_row, without))
-        begin = None if slopes_v is None else whitened_one.columns(slopes_v)
+        objective = _Whitened(self, size, ~np.isin(self.blocks.of_row, without))
+        begin = None if slopes_v is None else objective.columns(slopes_v)
         e = self.residual(x)
-        tolerance = GAIN_NATS * (1.0 if e is None else beyond_expected(whitened_one.errors(e)))
-        return descend(whitened_one, x, self.low, self.high, rounds, tolerance, begin).known_x
+        tolerance = GAIN_NATS * (1.0 if e is None else beyond_expected(objective.errors(e)))
+        return descend(objective, x, self.low, self.high, rounds, tolerance, begin).known_x
 
     def finished(self, x: Array) -> FittedHypothesis | None:
         """The fit that ended at x, with its score; None where the model fails there."""
@@ -154,8 +154,8 @@ class HypothesisFitter:
         jacobian = None if e is None else self.jacobian(x, e)
         if e is None or jacobian is None:
             return None
-        off_v = off_within_seconds(self.problem, self.blocks, self.hypothesis)
-        point = Linearised(x, e, jacobian, np.column_stack([self.low, self.high]), off_v)
+        fast_errors_v = fast_file_errors_v(self.problem, self.blocks, self.hypothesis)
+        point = Linearised(x, e, jacobian, np.column_stack([self.low, self.high]), fast_errors_v)
         score = scored(self.problem, self.blocks, point)
         return FittedHypothesis(self.hypothesis, self.free, point, score, self.simulations)
 
@@ -172,54 +172,61 @@ def beyond_expected(white: Array) -> float:
 def scored(problem: InverseProblem, blocks: Blocks, point: Linearised) -> PredictiveScore:
     """The predictive score of a linearised hypothesis, at the size of the model error where it is highest."""
     prior, sums = PRIORS[problem.trust], SizeSums(SplitTable(problem, blocks, point.table()))
-    said = [said_at(sums, point, size, prior.log_density(size)) for size in prior.sizes]
-    return best_over_sizes(said, len(point.x))
+    scores = [point_score_at_size(sums, point, size, prior.log_density(size)) for size in prior.sizes]
+    return best_over_sizes(scores, len(point.x))
 
 
-def said_at(sums: SizeSums, point: Linearised, size: Size, log_prior: float = 0.0) -> Weighed:
+def point_score_at_size(sums: SizeSums, point: Linearised, size: Size, log_prior: float = 0.0) -> ScoreAtSize:
     """The score of a linearised hypothesis at one size of the model error.  sums : over its `point.table()`."""
-    return weighed(sums.table.blocks, sums.at(size), point.padded_x, point.padded_bounds, size, log_prior)
+    return score_at_size(
+        sums.table.blocks, sums.at(size), point.padded_x, point.padded_bounds, size, log_prior
+    )
 
 
 @dataclass(frozen=True, eq=False)
 class _Whitened:
-    """Least-squares residual that a descent minimises at one size of the model error: the whitened residual of the rows
-    `seen`, projected off the errors that the file may have within seconds, then the coordinates (their prior)."""
+    """Least-squares residual that a descent minimises at one size of the model error: the whitened residual of the n
+    rows that are `kept` (True for them), projected off the errors that the file may have within seconds, then the
+    coordinates (their prior)."""
 
     fitter: HypothesisFitter
     size: Size
-    seen: BoolArray
+    kept: BoolArray
 
     @cached_property
-    def _off(self) -> Array:
+    def _error_basis(self) -> Array:
         """(n + k, k) orthonormal basis of the errors that the file may have within seconds, with their prior."""
         fitter = self.fitter
-        off = self._seen(off_within_seconds(fitter.problem, fitter.blocks, fitter.hypothesis))
-        return np.asarray(np.linalg.qr(np.vstack([off, np.eye(off.shape[1])]))[0])
+        errors = self._whitened_rows(fast_file_errors_v(fitter.problem, fitter.blocks, fitter.hypothesis))
+        return np.asarray(np.linalg.qr(np.vstack([errors, np.eye(errors.shape[1])]))[0])
 
     def errors(self, error_v: Array) -> Array:
         """(n + k,) a residual (n,) V, whitened and projected."""
-        return np.asarray(self._white(error_v[:, None])[:, 0])
+        return np.asarray(self._projected(error_v[:, None])[:, 0])
 
     def residual(self, x: Array) -> Array | None:
+        """(n + k + m,) what a descent minimises, at x (m,); None where the model fails."""
         e = self.fitter.residual(x)
         return None if e is None else np.concatenate([self.errors(e), x])
 
     def slopes(self, x: Array, residual: Array) -> Array | None:
+        """(n + k + m, m) slopes of `residual`; None where the model fails."""
         e = self.fitter.residual(x)
         jacobian = None if e is None else self.fitter.jacobian(x, e)
         return None if jacobian is None else self.columns(jacobian)
 
     def columns(self, jacobian_v: Array) -> Array:
-        return np.vstack([-self._white(jacobian_v), np.eye(jacobian_v.shape[1])])
+        """(n + k + m, m) slopes of the residual for the sensitivities (n, m) V of the model."""
+        return np.vstack([-self._projected(jacobian_v), np.eye(jacobian_v.shape[1])])
 
-    def _white(self, columns_v: Array) -> Array:
-        white, k = self._seen(columns_v), self._off.shape[1]
+    def _projected(self, columns_v: Array) -> Array:
+        """(n + k, j) columns (n, j) V, whitened and projected off `_error_basis`."""
+        white, k = self._whitened_rows(columns_v), self._error_basis.shape[1]
         stacked = np.vstack([white, np.zeros((k, columns_v.shape[1]))])
-        return np.asarray(stacked - self._off @ (self._off.T @ stacked)) if k else white
+        return np.asarray(stacked - self._error_basis @ (self._error_basis.T @ stacked)) if k else white
 
-    def _seen(self, columns_v: Array) -> Array:
-        return whitened(self.fitter.problem, self.fitter.blocks, columns_v, self.size)[0][self.seen]
+    def _whitened_rows(self, columns_v: Array) -> Array:
+        return whitened(self.fitter.problem, self.fitter.blocks, columns_v, self.size)[0][self.kept]
 
 
 class LinearForm(Protocol):

@@ -30,7 +30,7 @@ from scipy.special import log_ndtr
 
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.tracer.case.blocks import Blocks
-from aesi.tracer.case.free_parameter import FURTHEST_SDS, TINY, at_ends
+from aesi.tracer.case.free_parameter import FURTHEST_SDS, ON_BOUND_SDS, at_ends
 from aesi.tracer.likelihood.model_error import LOG_2PI, Size
 
 
@@ -48,7 +48,7 @@ class BlockSums:
     rows: Array
 
     def take(self, columns: IntArray) -> BlockSums:
-        """The sums of some of the parameters alone."""
+        """The sums of some of the parameters alone.  columns : their numbers."""
         return BlockSums(
             self.square,
             self.moment[:, columns],
@@ -173,21 +173,21 @@ class Posterior:
 
     @property
     def covariances_without(self) -> Array:
-        """(f, m, m) of the parameters without each fold."""
+        """(f, m, m) posterior covariance of the parameters without each fold."""
         inverse = np.linalg.inv(self._solved_without.root)
         return np.asarray(np.swapaxes(inverse, -1, -2) @ inverse)
 
     @cached_property
     def log_density(self) -> Array:
         """(f,) log p(y_F | y_-F) of each fold, nats."""
-        own = self._left_out @ (self.sums.square + self.sums.log_det + LOG_2PI * self.sums.rows)
-        return np.asarray(-0.5 * (own - self._gains[-1] + self._gains[:-1]))
+        by_data = self._left_out @ (self.sums.square + self.sums.log_det + LOG_2PI * self.sums.rows)
+        return np.asarray(-0.5 * (by_data - self._gains[-1] + self._gains[:-1]))
 
     @cached_property
     def evidence(self) -> float:
         """log p(y) of all blocks, nats."""
-        own = float(np.sum(self.sums.square + self.sums.log_det + LOG_2PI * self.sums.rows))
-        return -0.5 * (own + float(self.x @ self.x) - float(self._gains[-1]))
+        by_data = float(np.sum(self.sums.square + self.sums.log_det + LOG_2PI * self.sums.rows))
+        return -0.5 * (by_data + float(self.x @ self.x) - float(self._gains[-1]))
 
     @property
     def shifts(self) -> Array:
@@ -201,7 +201,7 @@ class Posterior:
 
     @cached_property
     def covariance(self) -> Array:
-        """(m, m) of the parameters given all data."""
+        """(m, m) posterior covariance of the parameters given all data."""
         inverse = np.linalg.inv(self.solved.root)
         return np.asarray(inverse.T @ inverse)
 
@@ -211,29 +211,29 @@ class Linearised:
     """A hypothesis linearised about a point.
 
     x : (m,) coordinates.  residual_v : (n,) V, measured - model.  jacobian_v : (n, m) V, sensitivities of the model.
-    bounds : (m, 2) of the coordinates.  off_v : (n, k) V, errors that the file may have within seconds, per standard
-    deviation: part of the model error, not of the model.
+    bounds : (m, 2) of the coordinates.  fast_errors_v : (n, k) V, errors that the file may have within seconds, per
+    standard deviation: part of the model error, not of the model.
     """
 
     x: Array
     residual_v: Array
     jacobian_v: Array
     bounds: Array
-    off_v: Array
+    fast_errors_v: Array
 
     def table(self) -> Array:
         """(n, 1 + m + k) V: residual, sensitivities, errors of the file within seconds."""
-        return np.column_stack([self.residual_v, self.jacobian_v, self.off_v])
+        return np.column_stack([self.residual_v, self.jacobian_v, self.fast_errors_v])
 
     @property
     def padded_x(self) -> Array:
         """(m + k,) coordinates, zero for the errors of the file within seconds."""
-        return np.concatenate([self.x, np.zeros(self.off_v.shape[1])])
+        return np.concatenate([self.x, np.zeros(self.fast_errors_v.shape[1])])
 
     @property
     def padded_bounds(self) -> Array:
         """(m + k, 2) bounds; the errors of the file within seconds have those of own parameters."""
-        return np.vstack([self.bounds, bounds_of_own(self.off_v.shape[1])])
+        return np.vstack([self.bounds, bounds_of_own(self.fast_errors_v.shape[1])])
 
 
 def bounds_of_own(k: int) -> Array:
@@ -269,7 +269,7 @@ class PredictiveScore:
         """Size of the lasting part of the model error, V."""
         return self.size.delta_v
 
-    def of(self, columns: IntArray) -> PredictiveScore:
+    def take(self, columns: IntArray) -> PredictiveScore:
         """The score with the shifts and the covariance of some of the parameters; the others are marginalised."""
         shifts = {name: shift[:, columns] for name, shift in self.shifts.items()}
         covariance = self.covariance[np.ix_(columns, columns)]
@@ -283,15 +283,16 @@ def held_at_bounds(posterior: Posterior, bounds: Array) -> tuple[Array, BoolArra
     root, best = posterior.solved
     if np.all((low < best) & (best < high)):
         return np.zeros(len(best)), np.zeros(len(best), dtype=bool)
-    ends = np.maximum(high, low + TINY)
+    ends = np.maximum(high, low + ON_BOUND_SDS)
     inside = lsq_linear(root.T, root.T @ best, (low, ends), method="bvls").x
     lowest, highest = at_ends(inside, low, ends)
     held = lowest | highest
     return np.where(held, inside, 0.0), held
 
 
-class AtBound(NamedTuple):
-    """The density (3) of one held parameter.  slope : g.  curvature : a."""
+class BoundDensity(NamedTuple):
+    """The density (3) of one held parameter.  slope : g, per coordinate, positive into the range.  curvature : a, per
+    square of a coordinate."""
 
     slope: float
     curvature: float
@@ -303,29 +304,29 @@ class AtBound(NamedTuple):
         return 0.5 * (beyond**2 - float(np.log(self.curvature))) + float(log_ndtr(beyond))
 
 
-def along_bounds(sums: BlockSums, place: Array, bounds: Array, held: BoolArray) -> dict[int, AtBound]:
+def densities_at_bounds(sums: BlockSums, x: Array, bounds: Array, held: BoolArray) -> dict[int, BoundDensity]:
     """Number of each held parameter -> its density (3).
 
-    sums : about `place` (m,), where the held parameters are on their bounds (m, 2).  held : (m,) True for these.
+    sums : about x (m,), where the held parameters are on their bounds (m, 2).  held : (m,) True for these.
     """
-    a = sums.gram.sum(axis=0) + np.eye(len(place))
-    b = sums.moment.sum(axis=0) - place
+    a = sums.gram.sum(axis=0) + np.eye(len(x))
+    b = sums.moment.sum(axis=0) - x
     free, out = np.flatnonzero(~held), {}
     for j in np.flatnonzero(held).tolist():
-        taken = np.linalg.solve(a[np.ix_(free, free)], a[free, j])
-        slope = float(b[j] - taken @ b[free])
-        inwards = 1.0 if on_lower_bound(place[j], bounds[j]) else -1.0
-        out[j] = AtBound(inwards * slope, float(a[j, j] - taken @ a[free, j]))
+        onto_free = np.linalg.solve(a[np.ix_(free, free)], a[free, j])  # marginalises the free parameters
+        slope = float(b[j] - onto_free @ b[free])
+        inwards = 1.0 if on_lower_bound(x[j], bounds[j]) else -1.0
+        out[j] = BoundDensity(inwards * slope, float(a[j, j] - onto_free @ a[free, j]))
     return out
 
 
-def on_lower_bound(place: float, bounds: Array) -> bool:
+def on_lower_bound(x: float, bounds: Array) -> bool:
     """Whether a parameter that is held is on the lower of its bounds (2,)."""
-    return bool(place - bounds[0] <= bounds[1] - place)
+    return bool(x - bounds[0] <= bounds[1] - x)
 
 
 @dataclass(frozen=True, eq=False)
-class Weighed:
+class ScoreAtSize:
     """A linearised hypothesis at one size of the model error, evaluated as far as sizes have to be compared.
 
     posterior : of the free (not held) parameters.  folds : by partition.  x : (m,) the point.  bounds : (m, 2).
@@ -377,18 +378,21 @@ class Weighed:
         """As `PredictiveScore.evidence`: that of the free parameters, plus (3) and the prior of the held ones."""
         if not self.held.any():
             return self.posterior.evidence
-        place = self.x + self.to_bounds
-        beside = along_bounds(self.sums.moved(self.to_bounds), place, self.bounds, self.held)
-        of_held = sum(one.log_mass for one in beside.values()) - 0.5 * float(np.sum(place[self.held] ** 2))
+        x = self.x + self.to_bounds
+        densities = densities_at_bounds(self.sums.moved(self.to_bounds), x, self.bounds, self.held)
+        of_held = sum(density.log_mass for density in densities.values()) - 0.5 * float(
+            np.sum(x[self.held] ** 2)
+        )
         return self.posterior.evidence + of_held
 
 
-def weighed(
+def score_at_size(
     blocks: Blocks, sums: BlockSums, x: Array, bounds: Array, size: Size, log_prior: float
-) -> Weighed:
+) -> ScoreAtSize:
     """A linearised hypothesis at one size of the model error.
 
-    x : (m,) the point.  bounds : (m, 2) of the coordinates.
+    sums : whitened at that size, about the point x (m,).  bounds : (m, 2) of the coordinates.  log_prior : of the size,
+    nats.
     """
     folds = tuple(fold for of_name in blocks.folds.values() for fold in of_name)
     posterior = Posterior(sums, x, folds)
@@ -396,10 +400,10 @@ def weighed(
     if held.any():
         free = np.flatnonzero(~held)
         posterior = Posterior(sums.moved(to_bounds).take(free), x[free], folds)
-    return Weighed(posterior, blocks.folds, x, bounds, sums, to_bounds, held, size, log_prior)
+    return ScoreAtSize(posterior, blocks.folds, x, bounds, sums, to_bounds, held, size, log_prior)
 
 
-def best_over_sizes(sizes: Sequence[Weighed], own: int) -> PredictiveScore:
-    """The score at the size of the model error with the highest total, for the first `own` parameters; the others are
+def best_over_sizes(scores: Sequence[ScoreAtSize], n_parameters: int) -> PredictiveScore:
+    """The score at the size of the model error with the highest total, for the first `n_parameters`; the others are
     marginalised."""
-    return max(sizes, key=lambda one: one.total).score.of(np.arange(own))
+    return max(scores, key=lambda score: score.total).score.take(np.arange(n_parameters))

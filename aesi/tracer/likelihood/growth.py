@@ -20,7 +20,7 @@ from aesi.numerics.typing import Array, IntArray
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.free_parameter import (
     FURTHEST_SDS,
-    TINY,
+    ON_BOUND_SDS,
     FreeParameter,
     at_ends,
     by_owner,
@@ -35,9 +35,9 @@ from aesi.tracer.likelihood.gaussian import (
     PredictiveScore,
     best_over_sizes,
     block_sums,
-    weighed,
+    score_at_size,
 )
-from aesi.tracer.likelihood.model_error import PRIORS, Size, SplitTable, off_within_seconds, whitened
+from aesi.tracer.likelihood.model_error import PRIORS, Size, SplitTable, fast_file_errors_v, whitened
 from aesi.tracer.likelihood.size_sums import SizeSums
 
 ROUNDS = 6
@@ -54,7 +54,7 @@ class Parent:
     _white: dict[Size, tuple[Array, Array]] = field(default_factory=dict, init=False)
     _whitening: Lock = field(default_factory=Lock, init=False)
 
-    def white(self, size: Size) -> tuple[Array, Array]:
+    def whitened_columns(self, size: Size) -> tuple[Array, Array]:
         """(whitened sensitivities and errors of the file within seconds (n, m + k), log|C| (n,)); cached."""
         with self._whitening:
             if size not in self._white:
@@ -72,7 +72,7 @@ class Parent:
         back."""
         bounds = np.array([f.bounds for f in self.fit.free]).reshape(-1, 2)
         reached = np.column_stack(at_ends(self.fit.point.x, bounds[:, 0], bounds[:, 1]))
-        hard = np.abs(bounds) < FURTHEST_SDS - TINY
+        hard = np.abs(bounds) < FURTHEST_SDS - ON_BOUND_SDS
         return np.flatnonzero(~(reached & hard).any(axis=1))
 
 
@@ -96,7 +96,7 @@ class Grown:
     slopes_v: Array
 
     @property
-    def placed(self) -> dict[tuple[str, str], float]:
+    def values_by_key(self) -> dict[tuple[str, str], float]:
         """(owner, name) -> value, those of the parent with their first-order change."""
         x = self.point.x + self.score.shift
         moved = {f.key: f.value(float(v)) for f, v in zip(self.free, x, strict=True)}
@@ -105,15 +105,16 @@ class Grown:
     @property
     def values(self) -> dict[str, dict[str, float]]:
         """owner -> name -> value, with the parent's parameters that are held on a hard bound."""
-        return by_owner({**self.held, **self.placed}, self.hypothesis)
+        return by_owner({**self.held, **self.values_by_key}, self.hypothesis)
 
 
 class EffectGrowth:
     """The fit of one effect on top of a parent.
 
     size : size of the model error at which the effect's parameters are fitted, one of those tried.
-    known : coordinates of the effect's parameters at the end of an earlier descent.  near : the same at the end of a
-    descent with the other model of the cell, as a start; None starts from the best of several starts.
+    end_u : (k,) coordinates of the effect's parameters at the end of an earlier descent; None descends.  near_u : (k,)
+    the same at the end of a descent with the other model of the cell, as a start; None starts from the best of several
+    starts.
     """
 
     def __init__(
@@ -121,38 +122,42 @@ class EffectGrowth:
         parent: Parent,
         effect: str,
         size: Size,
-        known: Array | None = None,
-        near: Array | None = None,
+        end_u: Array | None = None,
+        near_u: Array | None = None,
     ) -> None:
         self.parent, self.effect, self.size = parent, effect, size
-        self.known = known
+        self.end_u = end_u
         self.problem, fit = parent.problem, parent.fit
-        self.rest = np.array([j for j in parent.movable if fit.free[j].owner != effect], dtype=int)
+        # Numbers of the parent's parameters that move to first order; those of the effect itself do not.
+        self.parent_columns = np.array([j for j in parent.movable if fit.free[j].owner != effect], dtype=int)
         self.added = tuple(self.problem.parameters_of(effect))
         bounds = np.array([f.bounds for f in self.added]).reshape(-1, 2)
         self.low, self.high = bounds[:, 0], bounds[:, 1]
-        self.near = near
+        self.near_u = near_u
         own_starts = [np.clip(u, self.low, self.high) for u in starts(self.added)]
-        self.starts = own_starts if near is None else [near]
-        self.held: ValuesByOwner = {o: v for o, v in fit.values.items() if o != effect}
+        self.starts = own_starts if near_u is None else [near_u]
+        self.parent_values: ValuesByOwner = {o: v for o, v in fit.values.items() if o != effect}
         self.simulations = 0
-        self.off_v = off_within_seconds(self.problem, parent.blocks, (*fit.hypothesis, effect))
+        self.fast_errors_v = fast_file_errors_v(self.problem, parent.blocks, (*fit.hypothesis, effect))
         self._errors: dict[bytes, Array | None] = {}
         self._slopes: dict[bytes, Array] = {}
 
     @cached_property
     def q(self) -> Array:
-        """Orthonormal basis of the whitened sensitivities of the other parameters, with their prior."""
-        off = whitened(self.problem, self.parent.blocks, self.off_v, self.size)[0]
-        known_columns = np.column_stack([self.parent.white(self.size)[0][:, self.rest], off])
+        """(n + m + c, m + c) orthonormal basis of the whitened sensitivities of the m other parameters and the c errors
+        of the file within seconds, with their prior."""
+        off = whitened(self.problem, self.parent.blocks, self.fast_errors_v, self.size)[0]
+        known_columns = np.column_stack(
+            [self.parent.whitened_columns(self.size)[0][:, self.parent_columns], off]
+        )
         return np.linalg.qr(np.vstack([known_columns, np.eye(known_columns.shape[1])]))[0]
 
     def from_own_starts(self) -> EffectGrowth:
         """The same growth, started from the effect's own starts and not from the end of another descent."""
-        return self if self.near is None else EffectGrowth(self.parent, self.effect, self.size)
+        return self if self.near_u is None else EffectGrowth(self.parent, self.effect, self.size)
 
     def error_v(self, u: Array) -> Array | None:
-        """(n,) V, or None where the model fails."""
+        """(n,) V, measured - model; None where the model fails."""
         key = u.tobytes()
         if key not in self._errors:
             self._errors[key] = self._simulated_error_v(u)
@@ -160,11 +165,12 @@ class EffectGrowth:
 
     def _simulated_error_v(self, u: Array) -> Array | None:
         self.simulations += 1
-        predicted = self.problem.predict({**self.held, **values_of(self.added, u, (self.effect,))})
+        predicted = self.problem.predict({**self.parent_values, **values_of(self.added, u, (self.effect,))})
         return None if predicted is None else self.problem.measured - predicted
 
     def jacobian(self, u: Array, e: Array) -> Array | None:
-        """(n, k) V of the model, by one-sided differences within the bounds."""
+        """(n, k) V, sensitivities of the model per prior standard deviation, by one-sided differences within the
+        bounds; None where the model fails."""
         if u.tobytes() in self._slopes:
             return self._slopes[u.tobytes()]
         out = np.zeros((len(e), len(u)))
@@ -177,9 +183,10 @@ class EffectGrowth:
         return out
 
     def projected(self, columns: Array, tail: Array) -> Array:
-        """Whitened columns, stacked on `tail`, minus their projection onto `q`."""
+        """(n + m + c, j) whitened columns (n, j), stacked on those of the m other parameters' prior, `tail` (m, j), and
+        on zeros for the c errors of the file within seconds; minus their projection onto `q`."""
         white = whitened(self.problem, self.parent.blocks, columns, self.size)[0]
-        stacked = np.vstack([white, tail, np.zeros((self.off_v.shape[1], columns.shape[1]))])
+        stacked = np.vstack([white, tail, np.zeros((self.fast_errors_v.shape[1], columns.shape[1]))])
         return stacked - self.q @ (self.q.T @ stacked)
 
     def residual(self, u: Array) -> Array | None:
@@ -187,7 +194,7 @@ class EffectGrowth:
         e = self.error_v(u)
         if e is None:
             return None
-        tail = -self.parent.fit.point.x[self.rest][:, None]
+        tail = -self.parent.fit.point.x[self.parent_columns][:, None]
         return np.concatenate([self.projected(e[:, None], tail)[:, 0], u])
 
     def slopes(self, u: Array, residual: Array) -> Array | None:
@@ -196,7 +203,9 @@ class EffectGrowth:
         jacobian = None if e is None else self.jacobian(u, e)
         if jacobian is None:
             return None
-        return np.vstack([self.projected(-jacobian, np.zeros((len(self.rest), len(u)))), np.eye(len(u))])
+        return np.vstack(
+            [self.projected(-jacobian, np.zeros((len(self.parent_columns), len(u)))), np.eye(len(u))]
+        )
 
     def held_on_bounds(self) -> dict[tuple[str, str], float]:
         """(owner, name) -> value of the parent's parameters on a hard bound, where they stay."""
@@ -207,12 +216,12 @@ class EffectGrowth:
             if j not in movable and f.owner != self.effect
         }
 
-    def marks(self) -> Array:
-        """(n, c) V, changes of the voltage that the effect can make: at each start, and at the end of its descent where
-        it has one, the sensitivities there and the change from the parent to there; c is 0 where none can be
-        simulated."""
+    def possible_changes_v(self) -> Array:
+        """(n, c) V, changes of the voltage that the effect can make, as columns. Each start, and the end of the descent
+        where there is one, gives the sensitivities there and the change from the parent to there; c is 0 where none of
+        these can be simulated."""
         columns = [np.zeros((len(self.parent.fit.point.residual_v), 0))]
-        end = [] if self.known is None else [self.known]
+        end = [] if self.end_u is None else [self.end_u]
         for u in {one.tobytes(): one for one in (*self.starts, *end)}.values():
             e = self.error_v(u)
             jacobian = None if e is None else self.jacobian(u, e)
@@ -226,9 +235,10 @@ class EffectGrowth:
         e = None if u is None else self.error_v(u)
         return None if u is None or e is None else self.jacobian(u, e)
 
-    def ended(self) -> Grown | None:
-        """The growth at the end of its descent, within the bounds; None where the effect cannot be simulated."""
-        self.known = u = self._descended() if self.known is None else self.known
+    def grow(self) -> Grown | None:
+        """The effect fitted on its parent: the end of its descent within the bounds, scored; None where the effect
+        cannot be simulated."""
+        self.end_u = u = self._descended() if self.end_u is None else self.end_u
         if u is None:
             return None
         e = self.error_v(u)
@@ -239,85 +249,96 @@ class EffectGrowth:
         start = self._most_promising()
         if start is None:
             return None
-        left = self.projected(self._parent_error_v, -self.parent.fit.point.x[self.rest][:, None])
-        tolerance = GAIN_NATS * beyond_expected(left[: len(self._parent_error_v)])
+        residual = self.projected(
+            self._parent_error_v, -self.parent.fit.point.x[self.parent_columns][:, None]
+        )
+        tolerance = GAIN_NATS * beyond_expected(residual[: len(self._parent_error_v)])
         return descend(self, start, self.low, self.high, ROUNDS, tolerance).known_x
 
     @property
     def _parent_error_v(self) -> Array:
-        """(n, 1) V."""
+        """(n, 1) V, residual of the parent."""
         return self.parent.fit.point.residual_v[:, None]
 
     def _most_promising(self) -> Array | None:
         """The start from which one step reduces the objective most; None where no start can be simulated."""
         if len(self.starts) == 1:
             return self.starts[0]
-        promised = []
+        costs = []
         for u in self.starts:
             residual = self.residual(u)
             slopes = None if residual is None else self.slopes(u, residual)
             if residual is not None and slopes is not None:
-                promised.append((foreseen_cost(u, residual, slopes, self.low, self.high), u))
-        return min(promised, key=lambda one: one[0])[1] if promised else None
+                costs.append((foreseen_cost(u, residual, slopes, self.low, self.high), u))
+        return min(costs, key=lambda one: one[0])[1] if costs else None
 
 
-def promise(parent: Parent, slopes_v: Array) -> float:
-    """Expected gain of a parent with one more effect on unseen data, nats, to first order and without a simulation.
+def expected_score(parent: Parent, slopes_v: Array) -> float:
+    """Expected score (`PredictiveScore.total`, nats) of a parent with one more effect, to first order and without a
+    simulation. The gain over the parent is this minus the parent's own score.
 
     slopes_v : (n, k) V, sensitivities of the effect as they were on another parent.
-    The model error has the size of the parent's score or that of a right hypothesis, whichever gives more.
+    The model error has the size of the parent's score or that of a right hypothesis, whichever scores higher.
     """
     fit, prior = parent.fit, PRIORS[parent.problem.trust]
     own = SplitTable(parent.problem, parent.blocks, np.column_stack([fit.point.residual_v, slopes_v]))
     x = np.concatenate([fit.point.padded_x, np.zeros(slopes_v.shape[1])])
     open_ends = np.tile([-np.inf, np.inf], (slopes_v.shape[1], 1))
     bounds = np.vstack([fit.point.padded_bounds, open_ends])
-    said = []
+    totals = []
     for size in {fit.score.size, prior.nearest(prior.median)}:
-        known, log_det = parent.white(size)
+        known, log_det = parent.whitened_columns(size)
         new, _ = own.whitened(size)
         sums = block_sums(parent.blocks, np.column_stack([new[:, :1], known, new[:, 1:]]), log_det)
-        said.append(weighed(parent.blocks, sums, x, bounds, size, prior.log_density(size)).total)
-    return max(said)
+        totals.append(score_at_size(parent.blocks, sums, x, bounds, size, prior.log_density(size)).total)
+    return max(totals)
 
 
 def _scored(growth: EffectGrowth, u: Array, e: Array, jacobian: Array) -> Grown:
     parent, fit = growth.parent, growth.parent.fit
     lowest, highest = at_ends(u, growth.low, growth.high)
     inside = ~(lowest | highest)  # a linear form ignores bounds
-    x = np.concatenate([fit.point.x[growth.rest], u[inside]])
+    x = np.concatenate([fit.point.x[growth.parent_columns], u[inside]])
     bounds = np.vstack(
-        [fit.point.bounds[growth.rest], np.column_stack([growth.low, growth.high])[inside].reshape(-1, 2)]
+        [
+            fit.point.bounds[growth.parent_columns],
+            np.column_stack([growth.low, growth.high])[inside].reshape(-1, 2),
+        ]
     )
-    slopes = np.column_stack([fit.point.jacobian_v[:, growth.rest], jacobian[:, inside]])
-    point = Linearised(x, e, slopes, bounds, growth.off_v)
+    slopes = np.column_stack([fit.point.jacobian_v[:, growth.parent_columns], jacobian[:, inside]])
+    point = Linearised(x, e, slopes, bounds, growth.fast_errors_v)
     prior, sums_at = PRIORS[growth.problem.trust], _sums_of(growth, point)
-    out = [
-        weighed(
+    scores = [
+        score_at_size(
             parent.blocks, sums_at(size), point.padded_x, point.padded_bounds, size, prior.log_density(size)
         )
         for size in prior.sizes
     ]
     hypothesis = (*fit.hypothesis, growth.effect)
-    free = (*(fit.free[j] for j in growth.rest), *(f for f, i in zip(growth.added, inside, strict=True) if i))
+    free = (
+        *(fit.free[j] for j in growth.parent_columns),
+        *(f for f, i in zip(growth.added, inside, strict=True) if i),
+    )
     on_bounds = {f.key: f.value(float(v)) for f, v, i in zip(growth.added, u, inside, strict=True) if not i}
-    score, held = best_over_sizes(out, len(x)), growth.held_on_bounds()
+    score, held = best_over_sizes(scores, len(x)), growth.held_on_bounds()
     return Grown(hypothesis, free, point, score, growth.simulations, on_bounds, held, u, jacobian)
 
 
 def _sums_of(growth: EffectGrowth, point: Linearised) -> Callable[[Size], BlockSums]:
-    """Size of the model error -> sums of a linear form whose first parameters are the parent's. Where columns have to
-    be whitened at each size, those of the parent are shared by all growths on it."""
+    """Size of the model error -> sums over each block of a linear form whose first parameters are the parent's. Where
+    columns have to be whitened at each size, those of the parent are shared by all growths on it."""
     parent, blocks = growth.parent, growth.parent.blocks
     if blocks.windows is not None:
         return SizeSums(SplitTable(growth.problem, blocks, point.table())).at
-    added = point.jacobian_v[:, len(growth.rest) :]
-    own = SplitTable(growth.problem, blocks, np.column_stack([point.residual_v, added, point.off_v]))
+    added = point.jacobian_v[:, len(growth.parent_columns) :]
+    own = SplitTable(growth.problem, blocks, np.column_stack([point.residual_v, added, point.fast_errors_v]))
 
     def at(size: Size) -> BlockSums:
-        known, _ = parent.white(size)
+        known, _ = parent.whitened_columns(size)
         new, log_det = own.whitened(size)
-        return block_sums(blocks, np.column_stack([new[:, :1], known[:, growth.rest], new[:, 1:]]), log_det)
+        return block_sums(
+            blocks, np.column_stack([new[:, :1], known[:, growth.parent_columns], new[:, 1:]]), log_det
+        )
 
     return at
 

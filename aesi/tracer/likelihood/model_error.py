@@ -4,8 +4,8 @@
 
 A model errs by a voltage, delta, and by a state of charge, zeta, which shows where the open-circuit voltage is
 steep. delta has a log-normal prior: tight for a cell whose file was measured on it, loose for another of its make. zeta
-is delta where the balance of the electrodes is held as declared. Where the balance is free, it takes up errors of
-charge itself, and zeta is no larger than for the cell that was measured.
+is delta over 1 V where the balance of the electrodes is held as declared. Where the balance is free, it takes up errors
+of charge itself, and zeta is no larger than for the cell that was measured.
 
 For a measured cell only the size of this error and its correlation time are known. No stationary process describes it,
 and a process fitted to it would count its details as evidence. The likelihood is therefore coarsened: rows count as
@@ -77,7 +77,7 @@ class SizePrior:
     def sizes(self) -> tuple[Size, ...]:
         """All sizes that are tried."""
         fast_v = (0.0,) if self.fast is None else self.fast.sizes_v
-        return tuple(Size(slow, fast) for slow in self.sizes_v for fast in fast_v)
+        return tuple(Size(lasting, fast) for lasting in self.sizes_v for fast in fast_v)
 
     @property
     def median(self) -> Size:
@@ -128,14 +128,18 @@ CHARGE_PER_V = 0.4
 to 0.6 % of charge."""
 
 
-def amplitude_v(steepness: Array, delta_v: float, trust: Trust) -> Array:
-    """(n,) V, standard deviation of the model error in each row."""
+def amplitude_v(ocv_slope_v: Array, delta_v: float, trust: Trust) -> Array:
+    """(n,) V, standard deviation a of the lasting model error in each row.
+
+    ocv_slope_v : (n,) V, |dU/dz|.  delta_v : V. The error in charge, zeta (share), is delta_v per volt at exact and
+    tight.
+    """
     charge = delta_v
     if trust == "loose":
         charge = min(delta_v, LOOSE_CHARGE)
     elif trust in MEASURED_CELL:
         charge = CHARGE_PER_V * delta_v
-    return np.sqrt(delta_v**2 + (charge * steepness) ** 2)
+    return np.sqrt(delta_v**2 + (charge * ocv_slope_v) ** 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,16 +155,16 @@ class SplitTable:
     def _parts(self) -> tuple[Array, Array]:
         """(means over the windows, deviations from these), (n, m) V each."""
         assert self.blocks.windows is not None
-        slow = self.blocks.windows.means(self.table)
-        return slow, self.table - slow
+        lasting = self.blocks.windows.means(self.table)
+        return lasting, self.table - lasting
 
     @cached_property
     def at_one_volt(self) -> tuple[Array, Array]:
         """(part that lasts, part within seconds), (n, m) each, whitened at a size of 1 V. Division by another size
         whitens at that one, since the amplitude of a measured cell's error is proportional to its size."""
-        slow, rest = self._parts
+        lasting, fast = self._parts
         root = np.sqrt(self.problem.independent)[:, None]
-        return slow * root / self._amplitude(Size(1.0))[:, None], rest * root
+        return lasting * root / self._amplitude(Size(1.0))[:, None], fast * root
 
     def whitened(self, size: Size) -> tuple[Array, Array]:
         """(columns (n, m) whitened at a size, log|C| by rows (n,)).
@@ -170,25 +174,27 @@ class SplitTable:
         """
         problem, amplitude = self.problem, self._amplitude(size)
         if not problem.coarse:
-            return whiten(self.table, problem.time_s, self.blocks.starts[:-1], amplitude, problem.as_white_v)
+            return whiten(
+                self.table, problem.time_s, self.blocks.starts[:-1], amplitude, problem.equivalent_white_v
+            )
         root = np.sqrt(problem.independent)
         if self.blocks.windows is None:
             return self.table * (root / amplitude)[:, None], self.log_det(size)
-        slow, rest = self._parts
-        over = slow / amplitude[:, None] + rest / size.fast_v
-        return over * root[:, None], self.log_det(size)
+        lasting, fast = self._parts
+        white = lasting / amplitude[:, None] + fast / size.fast_v
+        return white * root[:, None], self.log_det(size)
 
     def log_det(self, size: Size) -> Array:
         """(n,) log|C| by rows of a coarsened likelihood: that of the row's number of independent samples."""
-        share, windows = self.problem.independent, self.blocks.windows
-        of_lasting = share * (2.0 * np.log(self._amplitude(size)) + LOG_2PI) - LOG_2PI
+        samples, windows = self.problem.independent, self.blocks.windows
+        of_lasting = samples * (2.0 * np.log(self._amplitude(size)) + LOG_2PI) - LOG_2PI
         if windows is None:
             return np.asarray(of_lasting)
-        return np.asarray(of_lasting + share * windows.fast_dof * (2.0 * np.log(size.fast_v) + LOG_2PI))
+        return np.asarray(of_lasting + samples * windows.fast_dof * (2.0 * np.log(size.fast_v) + LOG_2PI))
 
     def _amplitude(self, size: Size) -> Array:
         """(n,) V, standard deviation of the lasting part."""
-        return amplitude_v(self.problem.steepness, size.delta_v, self.problem.trust)
+        return amplitude_v(self.problem.ocv_slope_v, size.delta_v, self.problem.trust)
 
 
 def whitened(problem: InverseProblem, blocks: Blocks, table: Array, size: Size) -> tuple[Array, Array]:
@@ -196,8 +202,8 @@ def whitened(problem: InverseProblem, blocks: Blocks, table: Array, size: Size) 
     return SplitTable(problem, blocks, table).whitened(size)
 
 
-def off_within_seconds(problem: InverseProblem, blocks: Blocks, hypothesis: Sequence[str]) -> Array:
-    """(n, k) V, errors that the file may have within seconds under a hypothesis, per standard deviation:
-    `InverseProblem.off_at_seconds` minus its means over the windows, in which the file is believed."""
-    columns = problem.off_at_seconds(hypothesis)
+def fast_file_errors_v(problem: InverseProblem, blocks: Blocks, hypothesis: Sequence[str]) -> Array:
+    """(n, k) V, errors that the file may have in the response within seconds under a hypothesis, per standard
+    deviation: `InverseProblem.file_errors_v` minus its means over the windows, in which the file is believed."""
+    columns = problem.file_errors_v(hypothesis)
     return columns if blocks.windows is None else columns - blocks.windows.means(columns)

@@ -11,7 +11,7 @@ from aesi.physics.effect import ActiveEffect
 from aesi.physics.folded import Folded, folded
 from aesi.records import Run
 from aesi.tracer.case.free_parameter import CAPACITY_SHARE, STATE_OF_CHARGE
-from aesi.tracer.case.problem import InverseProblem, ValuesByOwner, share_of
+from aesi.tracer.case.problem import InverseProblem, ValuesByOwner, record_capacity_share
 from aesi.tracer.case.records import PreparedRecord
 from aesi.tracer.likelihood.growth import Explanation
 
@@ -33,7 +33,7 @@ class ModelState:
         """The model where a fit ended."""
         return cls(problem, one.values, one.hypothesis)
 
-    def of_one_age(self) -> ModelState:
+    def with_file_capacity(self) -> ModelState:
         """The model as it is written: with the file's capacity in every record, in place of the fitted shares."""
         if self.values is None or CAPACITY_SHARE not in self.values:
             return self
@@ -56,8 +56,8 @@ class ModelState:
         index = record.continues if index is None else index
         data, hold = (record.thin, record.thin_hold) if thin else (record.data, record.hold)
         effects = self.effects(record.good)
-        share = 1.0 if self.values is None or index is None else share_of(self.values, index)
-        soc0 = self._start(record, index)
+        share = 1.0 if self.values is None or index is None else record_capacity_share(self.values, index)
+        soc0 = self._initial_soc(record, index)
         if soc0 is not None:
             return self.problem.run(data, soc0, effects, hold, share=share)
         try:
@@ -65,7 +65,7 @@ class ModelState:
         except AesiError:
             return self.problem.run(data, record.soc0, effects, hold)
 
-    def _start(self, record: PreparedRecord, index: int | None) -> float | None:
+    def _initial_soc(self, record: PreparedRecord, index: int | None) -> float | None:
         """State of charge at a record's first row; None where the model's rest at the first voltage determines it.
 
         index : number of the fitted record that it is or continues; None where there is none.
@@ -75,7 +75,7 @@ class ModelState:
         if index is not None:
             return self.values[STATE_OF_CHARGE][str(index)]
         if record.start.basis == "full charge":
-            return self._full(record.soc0)
+            return self._full_charge_soc(record.soc0)
         return record.soc0 if record.start.rest_voltage_v is None else None  # it was given
 
     def start_slope_v(self, record: PreparedRecord) -> Array:
@@ -83,16 +83,17 @@ class ModelState:
         state of charge.  Raises AesiError where it cannot be simulated there."""
         return self.problem.start_slope_of_v(record, record.data, self.effects(record.good), record.hold)
 
-    def _full(self, otherwise: float) -> float:
+    def _full_charge_soc(self, otherwise: float) -> float:
         """State of charge that counts as full: the mean fitted start of the records that begin fully charged."""
         assert self.values is not None
         known = self.values[STATE_OF_CHARGE]
         full = [known[str(i)] for i, r in enumerate(self.problem.records) if r.start.basis == "full charge"]
         return sum(full) / len(full) if full else otherwise
 
-    def settled(self) -> tuple[Folded, float]:
-        """(cell that holds all values which a cell file can hold, except effects that infer a quantity a later record
-        may have measured; state of charge at the first sample, in the stoichiometry windows of that cell)."""
+    def folded_cell(self) -> tuple[Folded, float]:
+        """(the cell with all fitted values and effects that a cell file can hold, except effects that infer a quantity
+        which a later record may have measured; state of charge at the first row of the first record, in the
+        stoichiometry windows of that cell)."""
         declared, fixed = self.problem.cell, self.problem.fixed
         inside = folded(
             declared, self.effects(), lambda active: active in fixed or active.effect.infers is not None

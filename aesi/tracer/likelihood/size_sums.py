@@ -1,8 +1,9 @@
 """Sums over the rows of each block, whitened at many sizes of the model error.
 
-With s the part that lasts and r the part within seconds, a whitened row is s/delta + r/phi, and at every size
+With L the part of the columns that lasts and F the part within seconds, whitened at 1 V, the columns whitened at a size
+(delta, phi) are L/delta + F/phi, and at every size
 
-    J'J = S'S/delta^2 + (S'R + R'S)/(delta phi) + R'R/phi^2     (1)
+    J'J = L'L/delta^2 + (L'F + F'L)/(delta phi) + F'F/phi^2     (1)
 
 so that 30 sizes take three products of columns. Where the error has a single part, rows are whitened at each size.
 """
@@ -30,21 +31,19 @@ class SizeSums:
         table = self.table
         if table.blocks.windows is None:
             return block_sums(table.blocks, *table.whitened(size))
-        lasting, mixed, gone = self._products
-        over = lasting / size.delta_v**2 + mixed / (size.delta_v * size.fast_v) + gone / size.fast_v**2
-        return sums_of_products(table.blocks, over, table.log_det(size))
+        lasting, mixed, fast = self._products
+        products = lasting / size.delta_v**2 + mixed / (size.delta_v * size.fast_v) + fast / size.fast_v**2
+        return sums_of_products(table.blocks, products, table.log_det(size))
 
     @cached_property
     def _products(self) -> tuple[Array, Array, Array]:
-        """(b, 1 + m, 1 + m) each: the three of (1)."""
-        slow, rest = self.table.at_one_volt
-        shape = (len(self.table.blocks), slow.shape[1], slow.shape[1])
-        lasting, mixed, gone = np.empty(shape), np.empty(shape), np.empty(shape)
+        """(L'L, L'F + F'L, F'F) of (1), (b, 1 + m, 1 + m) each."""
+        lasting, fast = self.table.at_one_volt
+        shape = (len(self.table.blocks), lasting.shape[1], lasting.shape[1])
+        of_lasting, mixed, of_fast = np.empty(shape), np.empty(shape), np.empty(shape)
         for k, rows in enumerate(self.table.blocks.rows):
-            crossed = slow[rows].T @ rest[rows]
-            lasting[k], mixed[k], gone[k] = (
-                slow[rows].T @ slow[rows],
-                crossed + crossed.T,
-                rest[rows].T @ rest[rows],
-            )
-        return lasting, mixed, gone
+            crossed = lasting[rows].T @ fast[rows]
+            of_lasting[k] = lasting[rows].T @ lasting[rows]
+            mixed[k] = crossed + crossed.T
+            of_fast[k] = fast[rows].T @ fast[rows]
+        return of_lasting, mixed, of_fast

@@ -45,15 +45,17 @@ def largest_gains(
 ) -> Array:
     """(draws,) nats, the largest gain over the effects, at least one, on each surrogate."""
     problem, blocks, size = parent.problem, parent.blocks, parent.fit.score.size
-    white = _drawn(problem, blocks.windows, draws, rng)
-    known = parent.white(size)[0]
+    white = _whitened_surrogates(problem, blocks.windows, draws, rng)
+    known = parent.whitened_columns(size)[0]
     added = whitened(problem, blocks, np.column_stack(list(slopes_v.values())), size)[0]
     sums = _Sums.over_blocks(blocks, np.column_stack([known, added]), white)
     ends = known.shape[1] + np.cumsum([0, *(slopes.shape[1] for slopes in slopes_v.values())])
-    return _gains(blocks, sums, known.shape[1], list(pairwise(ends.tolist()))).max(axis=0)
+    return _gains_by_effect(blocks, sums, known.shape[1], list(pairwise(ends.tolist()))).max(axis=0)
 
 
-def _drawn(problem: InverseProblem, windows: Windows | None, draws: int, rng: np.random.Generator) -> Array:
+def _whitened_surrogates(
+    problem: InverseProblem, windows: Windows | None, draws: int, rng: np.random.Generator
+) -> Array:
     """(n, draws) of model error and noise, whitened: standard normal numbers. Under a coarsened likelihood the rows of
     one independent sample share one draw; the part within seconds has a draw in each row, minus the mean of its
     window."""
@@ -64,8 +66,8 @@ def _drawn(problem: InverseProblem, windows: Windows | None, draws: int, rng: np
     lasting = root * rng.normal(size=(sample[-1] + 1, draws))[sample]
     if windows is None:
         return lasting
-    gone = rng.normal(size=lasting.shape) / root
-    return np.asarray(lasting + root * (gone - windows.means(gone)))
+    fast = rng.normal(size=lasting.shape) / root
+    return np.asarray(lasting + root * (fast - windows.means(fast)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,9 +96,9 @@ class _Sums:
         return _Sums(np.tensordot(kept, self.gram, axes=1), np.tensordot(kept, self.moment, axes=1))
 
 
-def _gains(blocks: Blocks, sums: _Sums, known: int, effects: Sequence[tuple[int, int]]) -> Array:
+def _gains_by_effect(blocks: Blocks, sums: _Sums, known: int, effects: Sequence[tuple[int, int]]) -> Array:
     """(e, s) gain on unseen data, nats, of each of e effects over none, on each of s surrogates, with blocks and
-    conditions weighted as in `gaussian.Weighed`.
+    conditions weighted as in `gaussian.ScoreAtSize`.
 
     sums : with the sensitivities of the `known` parameters first.  effects : first column of each and the one after its
     last.
@@ -105,22 +107,25 @@ def _gains(blocks: Blocks, sums: _Sums, known: int, effects: Sequence[tuple[int,
     conditions = [name for name in PARTITIONS_OF_CONDITIONS if name in blocks.folds]
     shares = {"block": 0.5} | {name: 0.5 / len(conditions) for name in conditions}
     for name, share in shares.items():
-        left = sums.without(blocks.folds[name])
-        root = np.linalg.cholesky(left.gram[:, :known, :known] + np.eye(known))
-        shadow = np.linalg.solve(root, left.gram[:, :known, known:])
-        said = np.linalg.solve(root, left.moment[:, :known])
-        across = np.swapaxes(shadow, -1, -2)
-        gram = left.gram[:, known:, known:] - across @ shadow
-        moment = left.moment[:, known:] - across @ said
+        kept = sums.without(blocks.folds[name])
+        # The effects' sums given the known parameters: Schur complement of these, by their Cholesky factor.
+        root = np.linalg.cholesky(kept.gram[:, :known, :known] + np.eye(known))
+        half_gram = np.linalg.solve(root, kept.gram[:, :known, known:])
+        half_moment = np.linalg.solve(root, kept.moment[:, :known])
+        transposed = np.swapaxes(half_gram, -1, -2)
+        gram = kept.gram[:, known:, known:] - transposed @ half_gram
+        moment = kept.moment[:, known:] - transposed @ half_moment
         for k, (first, end) in enumerate(effects):
             own = slice(first - known, end - known)
-            more = _explained(gram[:, own, own], moment[:, own])
-            out[k] += share * (len(more) - 1) * more[-1] - share * more[:-1].sum(axis=0)
+            evidence = _log_evidence_gain(gram[:, own, own], moment[:, own])
+            # Each fold: evidence of all blocks minus that of the blocks without the fold, eq. (2) of gaussian.py.
+            out[k] += share * (len(evidence) - 1) * evidence[-1] - share * evidence[:-1].sum(axis=0)
     return out
 
 
-def _explained(gram: Array, moment: Array) -> Array:
-    """(f, s) (b'A^-1 b - log|A|) / 2 with A = 1 + gram (f, k, k) and b the columns of moment (f, k, s)."""
+def _log_evidence_gain(gram: Array, moment: Array) -> Array:
+    """(f, s) gain in log evidence, nats, (b'A^-1 b - log|A|) / 2 with A = 1 + gram (f, k, k) and b the columns of
+    moment (f, k, s)."""
     root = np.linalg.cholesky(gram + np.eye(gram.shape[-1]))
     half = np.linalg.solve(root, moment)
     log_det = np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aesi.tracer.decide.verdict import Verdict
-from aesi.tracer.likelihood.credible import reaches
+from aesi.tracer.likelihood.credible import interval_distances
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.gaussian import Linearised, Posterior, block_sums
 from aesi.tracer.likelihood.growth import Explanation, Grown
@@ -114,13 +114,15 @@ def estimates(path: Path, one: Explanation, effect: str) -> dict[str, Estimate]:
     """Name -> estimate, for the parameters of one effect of a hypothesis. The 90 % interval is symmetric for a
     parameter inside its bounds, and begins at the bound for one that the data push onto it."""
     known = path.problem.parameters_of(effect)
-    reach, placed, out = _reach(path, one), one.placed, {}
+    reach, placed, out = _reach(path, one), one.values_by_key, {}
     for free in known:
         if free.key not in placed:  # keeps its value in the parent
             out[free.name] = estimates(path, _parent(path, one), effect)[free.name]
             continue
         x, (below, above) = free.coordinate(placed[free.key]), reach[free.key]
-        value, low, high = map(free.told, (placed[free.key], free.value(x - below), free.value(x + above)))
+        value, low, high = map(
+            free.reported, (placed[free.key], free.value(x - below), free.value(x + above))
+        )
         out[free.name] = Estimate(value, low, high, free.unit)
     return out
 
@@ -143,9 +145,9 @@ def _reach(path: Path, one: Explanation) -> dict[tuple[str, str], tuple[float, f
             point.residual_v,
             np.column_stack([point.jacobian_v, one.slopes_v[:, further]]),
             np.vstack([point.bounds, np.array([added[j].bounds for j in further]).reshape(-1, 2)]),
-            point.off_v,
+            point.fast_errors_v,
         )
     white, log_det = whitened(path.problem, path.blocks, point.table(), one.score.size)
     posterior = Posterior(block_sums(path.blocks, white, log_det), point.padded_x, ())
-    ends = reaches(posterior, point.padded_bounds, SHARE)[: len(keys)]
+    ends = interval_distances(posterior, point.padded_bounds, SHARE)[: len(keys)]
     return {key: (float(below), float(above)) for key, (below, above) in zip(keys, ends, strict=True)}

@@ -18,7 +18,7 @@ LIMIT_SHARE = 0.01
 class OwnParameter:
     """A declared parameter after a fit.
 
-    owner : id of the effect that restates it, or one of OF_ONE_RECORD; `name` is then that of the record.
+    owner : id of the effect that restates it, or one of RECORD_OWNERS; `name` is then that of the record.
     declared, value : in `unit`; a factor is declared as 1.  deviations : value - declared, in prior standard deviations
     of that fit.  one_sd : size of one standard deviation on the side to which it moved, in `unit`.
     at_limit : whether it ended at the end of its range.

@@ -53,7 +53,7 @@ def fitted_hypothesis(
         if near is None:
             x = _from_the_middle(fitter, prior)
         else:
-            x0, size = coordinates_of(fitter.free, near.placed), prior.nearest(near.score.size)
+            x0, size = coordinates_of(fitter.free, near.values_by_key), prior.nearest(near.score.size)
             x = fitter.descend(x0, size, FIT_ROUNDS, _slopes_v(near, fitter.free))
         archive.put(name, x)
     found = fitter.finished(x)
@@ -62,7 +62,7 @@ def fitted_hypothesis(
     return found
 
 
-def from_within(
+def refitted_off_bounds(
     problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis, archive: Archive
 ) -> FittedHypothesis:
     """The fit, or a better one that starts away from the bounds on which it ended: two parameters of an effect can hold
@@ -108,10 +108,12 @@ def _slopes_v(near: Explanation, free: Sequence[FreeParameter]) -> Array | None:
     return near.point.jacobian_v[:, [place[one] for one in free]]
 
 
-def as_declared(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis) -> FittedHypothesis | None:
+def linearised_as_declared(
+    problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis
+) -> FittedHypothesis | None:
     """The hypothesis linearised at the declared values of its own parameters, to grow effects from: a fit without the
-    right effect moves own parameters to make up for it. None where no parameter moved far, or where it cannot be
-    simulated there."""
+    right effect moves own parameters to make up for it. Initial states and effects keep their fitted values. None where
+    no parameter moved by more than `MOVED_SDS`, or where it cannot be simulated there."""
     own = np.array([f.own and f.record is None for f in fit.free])
     if not np.any(own & (np.abs(fit.point.x) > MOVED_SDS)):
         return None

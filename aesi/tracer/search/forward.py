@@ -18,11 +18,11 @@ from aesi.tracer.likelihood.fit import FittedHypothesis, held_out_residual
 from aesi.tracer.likelihood.growth import EffectGrowth, Explanation, Grown, Parent
 from aesi.tracer.likelihood.surrogates import admission_nats
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import as_declared, base_of, fitted_hypothesis, from_within
-from aesi.tracer.search.grown import ended, growths_on, promising_first
+from aesi.tracer.search.fitted import base_of, fitted_hypothesis, linearised_as_declared, refitted_off_bounds
+from aesi.tracer.search.grown import grow_all, growths_on, promising_first
 from aesi.tracer.search.path import Path, Report, Step, excess_mean_square_v2, unseen_rmse_v
 from aesi.tracer.search.plausible import most_plausible, plausibility
-from aesi.tracer.search.reach import REACH, within_reach
+from aesi.tracer.search.reach import REACH_FACTOR, reach_check
 
 FINALISTS = 6
 """Most effects that are fitted with the whole model in a step, the best ones. Growth is to first order in the parent's
@@ -32,7 +32,7 @@ fitted: three fits left 1.36 mV with a wrong name, six 1.006 of a noise of 1.01,
 FINALIST_SHARE = 0.5
 """Least share of the best gain to first order that an effect needs in order to be fitted. On six blind cases of
 seeds 0 and 12 those below ended at 2 to 27 % of the best one's full fit."""
-HOPELESS_SHARE = 0.7
+BEYOND_ONE_EFFECT_SHARE = 0.7
 """Share of the mean square error beyond noise, on unseen data, of the model without effects. Where two effects leave
 more than this, no third is tried and none is exchanged. A convention that saves time: on a measured cell, which no two
 effects explain, each further round takes minutes. One effect may leave all of it: on a blind case (a contact,
@@ -40,7 +40,7 @@ hysteresis and heat, seed 13) the first of three gained 256 nats and did not low
 found."""
 
 
-def searched(
+def forward_search(
     problem: InverseProblem,
     max_effects: int,
     archive: Archive,
@@ -62,23 +62,25 @@ def searched(
         )
     if shallower is not None and shallower.beyond_reach_v is not None:
         return shallower
-    taken_over = None if shallower is None else next(iter(shallower.steps), None)
+    known_first_step = None if shallower is None else next(iter(shallower.steps), None)
     first = (
-        growths_on([Parent(problem, blocks, base)], {}, archive) if max_effects and taken_over is None else []
+        growths_on([Parent(problem, blocks, base)], {}, archive)
+        if max_effects and known_first_step is None
+        else []
     )
     # With fewer effects, fitting them takes no longer than the check would save.
     if len(first) > FINALISTS and np.isfinite(allowed_v):
-        reach_v = REACH * allowed_v + problem.reduced_v
-        least_v, first = within_reach(problem, base, first, reach_v, archive)
+        reach_v = REACH_FACTOR * allowed_v + problem.reduced_v
+        least_v, first = reach_check(problem, base, first, reach_v, archive)
         if least_v > reach_v:
             return Path(problem, blocks, base, (), base, beyond_reach_v=least_v)
     first, slopes = promising_first(first, archive)
     notes = () if shallower is None else shallower.notes
     search = _ForwardSearch(problem, blocks, base, archive, report, slopes, notes)
-    chosen = search.add(max_effects, first, taken_over)
+    chosen = search.add(max_effects, first, known_first_step)
     least_nats = max((step.admission_nats for step in search.steps), default=0.0)
-    chosen = without_needless(problem, blocks, chosen, least_nats, archive, base, report)
-    if not search.hopeless(chosen):
+    chosen = without_unneeded(problem, blocks, chosen, least_nats, archive, base, report)
+    if not search.beyond_one_effect(chosen):
         chosen = search.exchange(chosen)
     return Path(problem, blocks, base, tuple(search.steps), chosen, tuple(dict.fromkeys(search.notes)))
 
@@ -106,17 +108,17 @@ class _ForwardSearch:
         self.steps: list[Step] = []
 
     def add(
-        self, max_effects: int, first: Sequence[EffectGrowth], taken_over: Step | None
+        self, max_effects: int, first: Sequence[EffectGrowth], known_first_step: Step | None
     ) -> FittedHypothesis:
-        """The hypothesis after steps of one effect each, until none is admitted or the case is `hopeless`.
+        """The hypothesis after steps of one effect each, until none is admitted or the case is `beyond_one_effect`.
 
-        first : growths of the first step; all effects where it is empty.  taken_over : the first step, where another
-        search made it already.
+        first : growths of the first step; all effects where it is empty.  known_first_step : the first step, where a
+        search with fewer effects made it already.
         """
         parents, chosen = [self.base], self.base
         for number in range(max_effects):
-            if number == 0 and taken_over is not None:
-                step = taken_over
+            if number == 0 and known_first_step is not None:
+                step = known_first_step
             else:
                 step, refused = self._step(parents, first if number == 0 else ())
                 self.notes += refused
@@ -126,7 +128,7 @@ class _ForwardSearch:
             if step.admitted is None:
                 break
             chosen = step.admitted
-            if len(chosen.hypothesis) > 1 and self.hopeless(chosen):
+            if len(chosen.hypothesis) > 1 and self.beyond_one_effect(chosen):
                 break
             parents = [chosen, *(f for f in step.fitted if f is not chosen)]
         return chosen
@@ -148,30 +150,33 @@ class _ForwardSearch:
                     continue
                 step, _ = self._step([fit])
                 self.steps.append(step)
-                others += [] if step.admitted is None else [step.admitted]
+                if step.admitted is not None:
+                    others.append(step.admitted)
             best = most_plausible([chosen, *others], len(self.problem.competing()))
             if best is None or best is chosen:
                 return chosen
             chosen = best
 
-    def hopeless(self, chosen: FittedHypothesis) -> bool:
+    def beyond_one_effect(self, chosen: FittedHypothesis) -> bool:
         """Whether the hypothesis leaves so large an error that one more effect cannot explain it."""
-        left, without = (excess_mean_square_v2(self.problem, self.blocks, fit) for fit in (chosen, self.base))
-        return left > HOPELESS_SHARE * without
+        remaining, without = (
+            excess_mean_square_v2(self.problem, self.blocks, fit) for fit in (chosen, self.base)
+        )
+        return remaining > BEYOND_ONE_EFFECT_SHARE * without
 
     def _step(
-        self, parents: Sequence[FittedHypothesis], begun: Sequence[EffectGrowth] = ()
+        self, parents: Sequence[FittedHypothesis], growths: Sequence[EffectGrowth] = ()
     ) -> tuple[Step, list[str]]:
         """(one step, sentences on effects that could not be tried).
 
-        parents : the hypothesis chosen so far, then others to grow from.  begun : growths on these; empty takes all
+        parents : the hypothesis chosen so far, then others to grow from.  growths : growths on these; empty takes all
         that are worth it.
         """
         best = parents[0]
         places = [Parent(self.problem, self.blocks, fit) for fit in parents]
-        grown, refused = _grown(begun or growths_on(places, self.slopes, self.archive), self.archive)
+        grown, refused = _grown(growths or growths_on(places, self.slopes, self.archive), self.archive)
         slopes = {**self.slopes, **{g.hypothesis[-1]: g.slopes_v for g in grown}}
-        declared = as_declared(self.problem, self.blocks, best)
+        declared = linearised_as_declared(self.problem, self.blocks, best)
         if declared is not None:
             place = Parent(self.problem, self.blocks, declared)
             again, more = _grown(growths_on([place], slopes, self.archive), self.archive)
@@ -181,8 +186,8 @@ class _ForwardSearch:
         ranked = _ranked(grown)
         least_nats = admission_nats(places[0], slopes)
         fitted = self._finalists_fitted(ranked, best)
-        may = [f for f in fitted if admissible(self.problem, self.blocks, best, f, least_nats)]
-        admitted = most_plausible(may, len(self.problem.competing()))
+        candidates = [f for f in fitted if admissible(self.problem, self.blocks, best, f, least_nats)]
+        admitted = most_plausible(candidates, len(self.problem.competing()))
         return Step(tuple(parents), tuple(ranked), tuple(fitted), admitted, least_nats), refused
 
     def _finalists_fitted(self, ranked: Sequence[Grown], best: FittedHypothesis) -> list[FittedHypothesis]:
@@ -195,14 +200,14 @@ class _ForwardSearch:
                 fitted.append(fit)
         fitted.sort(key=lambda f: -f.score.total)
         if fitted and fitted[0].at_bounds:
-            fitted[0] = from_within(self.problem, self.blocks, fitted[0], self.archive)
+            fitted[0] = refitted_off_bounds(self.problem, self.blocks, fitted[0], self.archive)
         return fitted
 
     def _fitted(self, hypothesis: Sequence[str], near: Explanation) -> FittedHypothesis | None:
         return fitted_hypothesis(self.problem, self.blocks, hypothesis, near, self.archive)
 
 
-def without_needless(
+def without_unneeded(
     problem: InverseProblem,
     blocks: Blocks,
     chosen: FittedHypothesis,
@@ -251,10 +256,10 @@ def refitted(problem: InverseProblem, path: Path, archive: Archive) -> Path | No
 def _grown(growths: Sequence[EffectGrowth], archive: Archive) -> tuple[list[Grown], list[str]]:
     """(growths at their ends, sentences on those that could not be simulated)."""
     grown, refused = [], []
-    for growth, one in zip(growths, ended(growths, archive), strict=True):
+    for growth, one in zip(growths, grow_all(growths, archive), strict=True):
         if one is None:
             names = (*growth.parent.fit.hypothesis, growth.effect)
-            refused.append(f"{' + '.join(names)}: not tried; {growth.problem.why_not(names)}")
+            refused.append(f"{' + '.join(names)}: not tried; {growth.problem.failure_reason(names)}")
         else:
             grown.append(one)
     return grown, refused

@@ -10,7 +10,7 @@ from aesi.numerics.threads import side_by_side
 from aesi.numerics.typing import Array
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.trust import MEASURED_CELL
-from aesi.tracer.likelihood.growth import EffectGrowth, Grown, Parent, promise
+from aesi.tracer.likelihood.growth import EffectGrowth, Grown, Parent, expected_score
 from aesi.tracer.likelihood.model_error import PRIORS, Size, replace_fast
 from aesi.tracer.search.archive import Archive, fit_name
 
@@ -37,7 +37,7 @@ def growths_on(
     if any(archive.get(_promise_key(*pair), 1) is None for pair in pairs):
         if archive.other_model is None and not best.fit.as_declared:
             slopes = {**slopes, **_first_slopes(growths)}
-        _put_promises(pairs, slopes, archive)
+        _store_expected_gains(pairs, slopes, archive)
     promised = [
         (parent, name, parent.fit.score.total + float(gain[0]))
         for parent, name in pairs
@@ -49,14 +49,16 @@ def growths_on(
     ]
 
 
-def _put_promises(pairs: Sequence[tuple[Parent, str]], slopes: Mapping[str, Array], archive: Archive) -> None:
+def _store_expected_gains(
+    pairs: Sequence[tuple[Parent, str]], slopes: Mapping[str, Array], archive: Archive
+) -> None:
     """Put into the archive the expected gain of each effect over its parent, nats: that with the other model of the
-    cell, else that to first order by its sensitivities; -inf without these."""
+    cell, else that to first order by its sensitivities, (n, k) V; -inf without these."""
     for parent, name in pairs:
         gain = archive.near(_promise_key(parent, name), 1)
         if gain is None:
-            said = promise(parent, slopes[name]) if name in slopes else -np.inf
-            gain = np.array([said - parent.fit.score.total])
+            score = expected_score(parent, slopes[name]) if name in slopes else -np.inf
+            gain = np.array([score - parent.fit.score.total])
         archive.put(_promise_key(parent, name), gain)
 
 
@@ -73,14 +75,16 @@ def promising_first(
         return list(growths), {}
     slopes = _first_slopes({growth.effect: growth for growth in growths})
 
-    def said(growth: EffectGrowth, gain: Array) -> float:
+    def larger_gain(growth: EffectGrowth, with_other: Array) -> float:
         own = slopes.get(growth.effect)
-        promised = np.inf if own is None else promise(growth.parent, own) - growth.parent.fit.score.total
-        return max(float(gain[0]), promised)
+        expected = (
+            np.inf if own is None else expected_score(growth.parent, own) - growth.parent.fit.score.total
+        )
+        return max(float(with_other[0]), expected)
 
     ranked = sorted(
         (
-            (said(growth, gain), growth)
+            (larger_gain(growth, gain), growth)
             for growth, gain in zip(growths, near, strict=True)
             if gain is not None
         ),
@@ -92,9 +96,10 @@ def promising_first(
 
 
 def _first_slopes(growths: Mapping[str, EffectGrowth]) -> dict[str, Array]:
-    """Effect -> sensitivities (n, k) V at the start of its descent. They predict its gain beside the effects found so
-    far much better than those at its end on the bare model, where it stood in for all that was missing. Only for the
-    model that is searched first; the other one uses the gains from there."""
+    """Effect -> sensitivities (n, k) V at the start of its descent; without effects that cannot be simulated there.
+
+    They predict the gain of an effect beside those found so far much better than the sensitivities at its end on the
+    bare model, where it stood in for all that was missing."""
     found = side_by_side(EffectGrowth.first_slopes, growths.values())
     return {name: slopes for name, slopes in zip(growths, found, strict=True) if slopes is not None}
 
@@ -108,11 +113,12 @@ def most_promising(promised: Sequence[tuple[Parent, str, float]]) -> list[tuple[
 
 
 def addable(parent: Parent) -> list[str]:
-    """Effects that may be added to a hypothesis."""
+    """Ids of the effects that may be added to a hypothesis: those that it may name, does not name yet, and that the
+    records can decide on."""
     return [
         name
         for name in parent.problem.competing()
-        if name not in parent.fit.hypothesis and _has_something_to_say(parent.problem, name)
+        if name not in parent.fit.hypothesis and _is_testable(parent.problem, name)
     ]
 
 
@@ -120,13 +126,13 @@ def grown_with(parent: Parent, names: Sequence[str], archive: Archive) -> list[G
     """The growths of these effects on a hypothesis, also of effects that do not compete; those that fail are left
     out."""
     growths = [_growth(parent, name, archive) for name in names]
-    return [one for one in ended(growths, archive) if one is not None]
+    return [one for one in grow_all(growths, archive) if one is not None]
 
 
-def _has_something_to_say(problem: InverseProblem, name: str) -> bool:
-    """Whether an effect may compete. It may not where it infers a quantity that every record holds, where it restates
-    parameters of a file that was fitted to this very cell, or where, beside good records, all records of a cell share
-    it."""
+def _is_testable(problem: InverseProblem, name: str) -> bool:
+    """Whether the records can decide on an effect. They cannot where it infers a quantity that every record holds,
+    where it restates parameters of a file that was fitted to this very cell, or where, beside good records, all records
+    of a cell share it."""
     effect = problem.effects[name]
     if effect.infers is not None and all(r.data.temperature_degc is not None for r in problem.records):
         return False
@@ -140,11 +146,12 @@ def _growth(parent: Parent, name: str, archive: Archive) -> EffectGrowth:
     return EffectGrowth(parent, name, _growth_size(parent), archive.get(key, size), archive.near(key, size))
 
 
-def ended(growths: Sequence[EffectGrowth], archive: Archive) -> Iterable[Grown | None]:
-    """The ends of the descents, in the order given."""
+def grow_all(growths: Sequence[EffectGrowth], archive: Archive) -> Iterable[Grown | None]:
+    """Each growth carried out (`EffectGrowth.grow`) in parallel threads, in the order given; None where the effect
+    cannot be simulated. Ends and gains are put into the archive."""
 
     def one(growth: EffectGrowth) -> Grown | None:
-        found = growth.ended()
+        found = growth.grow()
         if found is not None:
             archive.put(_key(growth.parent, growth.effect), found.u)
             gain = found.score.total - growth.parent.fit.score.total
@@ -159,7 +166,8 @@ def _promise_key(parent: Parent, name: str) -> str:
 
 
 def _key(parent: Parent, name: str, what: str = "grown") -> str:
-    """Name in the archive of a growth, of its promise or of its gain."""
+    """Name in the archive: of the end of a growth ("grown"), of its expected gain ("promised") or of its gain
+    ("said")."""
     kind = f"{what} as declared" if parent.fit.as_declared else what
     return fit_name(parent.problem, kind, (*parent.fit.hypothesis, name))
 
@@ -173,7 +181,6 @@ def _growth_size(parent: Parent) -> Size:
     one with 9 mV, and gain 10 nats with 4.5.
     """
     prior = PRIORS[parent.problem.trust]
-    open_wide = parent.problem.trust == "loose"
-    if open_wide:
+    if parent.problem.trust == "loose":
         return prior.nearest(Size(0.5 * parent.fit.score.delta_v))
     return prior.nearest(replace_fast(prior.median, parent.fit.score.size))

@@ -23,7 +23,7 @@ ALIKE_SDS = 1.64
 differences between blocks: one-sided 95 % of a normal distribution."""
 
 
-def lag(better: Explanation, other: Explanation) -> tuple[float, float]:
+def score_lag(better: Explanation, other: Explanation) -> tuple[float, float]:
     """(difference of the scores on unseen data `better` - `other`, its standard deviation over blocks), nats."""
     difference = better.score.log_density["block"] - other.score.log_density["block"]
     deviation = float(np.std(difference, ddof=1) * np.sqrt(len(difference))) if len(difference) > 1 else 0.0
@@ -31,13 +31,14 @@ def lag(better: Explanation, other: Explanation) -> tuple[float, float]:
 
 
 def sds_behind(nats: float, deviation: float, least_nats: float = ALIKE_NATS) -> float:
-    """A `lag` in standard deviations.  least_nats : smallest standard deviation that is used."""
+    """A `score_lag` in standard deviations.  least_nats : smallest standard deviation that is used."""
     return nats / max(deviation, least_nats)
 
 
 def alike(better: Explanation, other: Explanation, sds: float = ALIKE_SDS, nats: float = ALIKE_NATS) -> bool:
-    """True where the data do not tell the second hypothesis from the first."""
-    behind, deviation = lag(better, other)
+    """True where the data do not tell the second hypothesis from the first: it is behind by less than `nats`, or by
+    less than `sds` standard deviations of the difference."""
+    behind, deviation = score_lag(better, other)
     return behind < max(nats, sds * deviation)
 
 
@@ -56,6 +57,6 @@ def most_plausible(fits: Sequence[FittedHypothesis], competing: int) -> FittedHy
     """
     if not fits:
         return None
-    most = max(fit.score.total for fit in fits)
-    alike = [fit for fit in fits if fit.score.total > most - ALIKE_NATS]
-    return max(alike, key=lambda fit: plausibility(fit, competing))
+    highest = max(fit.score.total for fit in fits)
+    near_best = [fit for fit in fits if fit.score.total > highest - ALIKE_NATS]
+    return max(near_best, key=lambda fit: plausibility(fit, competing))

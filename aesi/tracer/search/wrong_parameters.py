@@ -12,11 +12,11 @@ from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.surrogates import FAMILY_WISE
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import fitted_hypothesis
-from aesi.tracer.search.forward import without_needless
+from aesi.tracer.search.forward import without_unneeded
 from aesi.tracer.search.path import Path, Step
 from aesi.tracer.search.plausible import ALIKE_NATS, most_plausible
 
-NINETY = 1.645
+NINETY_SDS = 1.645
 """Half width of a 90 % interval, in standard deviations."""
 
 
@@ -37,15 +37,15 @@ def with_wrong_parameters(path: Path, most: int, archive: Archive) -> Path:
         fits += [
             one for one in _with_another(path, chosen) if len(beyond_spread(path.problem, one)) < len(beyond)
         ]
-        said = chosen.score.total - ALIKE_NATS
-        better = [f for f in fits if f is not None and f.score.total > said and not f.at_bounds]
-        found = most_plausible(better, competing)
+        least = chosen.score.total - ALIKE_NATS
+        as_good = [f for f in fits if f is not None and f.score.total > least and not f.at_bounds]
+        found = most_plausible(as_good, competing)
         if found is None:
             break
         chosen = found
     if chosen is path.chosen:
         return path
-    chosen = without_needless(
+    chosen = without_unneeded(
         path.problem,
         path.blocks,
         chosen,
@@ -68,7 +68,7 @@ def beyond_spread(problem: InverseProblem, fit: FittedHypothesis) -> list[str]:
     """Ids of the effects whose own parameters are off by more than files are, with 95 % probability."""
     sds = np.sqrt(np.diagonal(fit.score.covariance))
     declared = [
-        (f.owner, abs(float(x)) - NINETY * float(sd))
+        (f.owner, abs(float(x)) - NINETY_SDS * float(sd))
         for f, x, sd in zip(fit.free, fit.point.x, sds, strict=True)
         if f.own and f.owner in problem.effects and problem.effects[f.owner].refines is None
     ]

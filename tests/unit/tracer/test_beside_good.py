@@ -9,7 +9,7 @@ import pytest
 from aesi.errors import DataError
 from aesi.physics.effects import CATALOGUE
 from aesi.tracer import discover
-from aesi.tracer.case.free_parameter import acting_on, of_all_records
+from aesi.tracer.case.free_parameter import acting_on, shared_owner
 from aesi.tracer.case.problem import BESIDE_TIMES
 from aesi.tracer.decide.beside import checked_against_ageing, error_beyond_noise_v, verdict_beside
 from aesi.tracer.decide.shared import in_all_records
@@ -17,7 +17,7 @@ from aesi.tracer.decide.verdict import Thresholds, Verdict
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.search.archive import context_of
 from aesi.tracer.search.grown import addable
-from aesi.tracer.search.plausible import lag
+from aesi.tracer.search.plausible import score_lag
 
 OFFSET_V = 8e-3
 TRIED = ("series_resistance", "current_sensor_gain", "voltage_sensor_offset", "ocv_hysteresis")
@@ -94,18 +94,18 @@ def test_what_is_open_in_all_records_may_go_as_far_as_where_it_is_tried(cell, ma
         opened = in_all_records(problem, name)
         tried = np.array([(f.sd, f.centre) for f in problem.parameters_of(name)])
         again = [(f.sd, f.centre) for f in opened.parameters_of(name)]
-        shared = [(f.sd, f.centre) for f in opened.free(()) if f.owner == of_all_records(name)]
+        shared = [(f.sd, f.centre) for f in opened.free(()) if f.owner == shared_owner(name)]
         assert np.array(again) == pytest.approx(tried)
         assert np.array(shared) == pytest.approx(tried)
 
 
 def test_a_good_record_only_has_what_all_records_share():
-    shared = of_all_records("clock_skew")
+    shared = shared_owner("clock_skew")
     values = {"soc0": {"0": 0.9}, shared: {"lag_s": 0.1}, "clock_skew": {"skew": 0.01, "lag_s": 0.3}}
     assert acting_on(CATALOGUE, values, good=True) == {"clock_skew": {"lag_s": 0.1}}
     there = acting_on(CATALOGUE, values, good=False)["clock_skew"]
     assert there == {"lag_s": pytest.approx(0.4), "skew": 0.01}
-    gains = {of_all_records("current_sensor_gain"): {"gain": 1.1}, "current_sensor_gain": {"gain": 1.02}}
+    gains = {shared_owner("current_sensor_gain"): {"gain": 1.1}, "current_sensor_gain": {"gain": 1.02}}
     assert acting_on(CATALOGUE, gains, good=False)["current_sensor_gain"]["gain"] == pytest.approx(1.122)
 
 
@@ -117,7 +117,7 @@ def test_effects_under_test_move_the_other_records_alone(cell, tried, erring):
     assert moved[problem.slices[0]] == pytest.approx(OFFSET_V)
     assert moved[problem.slices[1]] == pytest.approx(0.0)
     owners = {f.owner for f in problem.free(("voltage_sensor_offset",))}
-    assert {"voltage_sensor_offset", of_all_records("voltage_sensor_offset")} <= owners
+    assert {"voltage_sensor_offset", shared_owner("voltage_sensor_offset")} <= owners
 
 
 def test_every_simulation_of_a_good_record_was_kept_as_long_as_the_search_lasted(monkeypatch, cell, make):
@@ -138,7 +138,7 @@ def test_every_simulation_of_a_good_record_was_kept_as_long_as_the_search_lasted
 
     assert simulated(0.9, 0.0) == 2
     assert simulated(0.9, 1e-3) == 1  # an effect under test does not act on the good one
-    assert all(simulated(0.9 + 1e-4 * k, 0.0) == 2 for k in range(1, module.REMEMBERED + 1))
+    assert all(simulated(0.9 + 1e-4 * k, 0.0) == 2 for k in range(1, module.CACHED_VOLTAGES + 1))
     assert simulated(0.9, 0.0) == 2  # forgotten by now
 
 
@@ -271,7 +271,7 @@ def test_an_age_that_lags_less_than_any_other_rival_is_what_the_confidence_is_re
     believed = said("series_resistance", 40.0)
     assert checked_against_ageing(named, believed, [said("film_growth", 10.0)]).margin == 9.0
     scattered = said("film_growth", 10.0, scatter=3.0)
-    nats, deviation = lag(believed, scattered)
+    nats, deviation = score_lag(believed, scattered)
     assert checked_against_ageing(named, believed, [scattered]).margin == nats / deviation < 9.0
 
 

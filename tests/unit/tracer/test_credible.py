@@ -10,7 +10,7 @@ from aesi.physics.effects import CATALOGUE
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import prepare_all
 from aesi.tracer.decide.verdict import Thresholds, verdict_on
-from aesi.tracer.likelihood.credible import reaches
+from aesi.tracer.likelihood.credible import interval_distances
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.gaussian import BlockSums, Posterior
 from aesi.tracer.report.candidate_effects import (
@@ -21,7 +21,7 @@ from aesi.tracer.report.candidate_effects import (
     why_not_chosen,
 )
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.forward import searched
+from aesi.tracer.search.forward import forward_search
 
 
 def posterior(gram, moment, x):
@@ -34,7 +34,7 @@ GRAM = np.array([[4.0, 1.5], [1.5, 3.0]])
 
 def test_inside_the_bounds_an_interval_is_that_of_a_normal():
     one = posterior(GRAM, [0.5, -0.2], [0.1, 0.2])
-    below_above = reaches(one, np.tile([-9.0, 9.0], (2, 1)), 0.9)
+    below_above = interval_distances(one, np.tile([-9.0, 9.0], (2, 1)), 0.9)
     half = 1.6448536 * np.sqrt(np.diagonal(np.linalg.inv(GRAM + np.eye(2))))
     assert below_above == pytest.approx(np.column_stack([half, half]))
 
@@ -44,7 +44,7 @@ def test_inside_the_bounds_an_interval_is_that_of_a_normal():
 def test_on_a_bound_an_interval_begins_there_and_holds_its_share_of_the_density(pushed, side):
     moment = np.array([side * pushed, 0.7])
     bounds = np.array([sorted([0.0, side * 5.0]), [-9.0, 9.0]])
-    below_above = reaches(posterior(GRAM, moment, np.zeros(2)), bounds, 0.9)
+    below_above = interval_distances(posterior(GRAM, moment, np.zeros(2)), bounds, 0.9)
     inward = below_above[0, 0 if side < 0 else 1]
     assert below_above[0].min() == 0.0
 
@@ -64,7 +64,7 @@ def test_on_a_bound_an_interval_begins_there_and_holds_its_share_of_the_density(
 def test_a_parameter_that_ended_at_zero_has_an_interval_with_a_width_and_a_unit(cell, few, make):
     data = make((CATALOGUE["ocv_hysteresis"].activate(magnitude_v=0.006),))
     problem = InverseProblem(cell, prepare_all(cell, [data], 0.9, 0.3), few)
-    path = searched(problem, 2, Archive(None, ""))
+    path = forward_search(problem, 2, Archive(None, ""))
     rows = ranking(path, verdict_on(path, Thresholds()), lambda one: None)
     assert {row.effect for row in rows} == set(few)
     for row in rows:
@@ -110,7 +110,7 @@ def test_what_a_growth_left_on_a_bound_of_its_parent_has_an_interval_too(cell, m
     truth = [CATALOGUE[name].activate() for name in names[:2]]
     tried = {name: CATALOGUE[name] for name in names}
     problem = InverseProblem(cell, prepare_all(cell, [make(truth)], 0.9, 0.3), tried)
-    path = searched(problem, 2, Archive(None, ""))
+    path = forward_search(problem, 2, Archive(None, ""))
     grown = [
         (one, owner) for step in path.steps for one in step.grown for owner, _ in one.held if owner in names
     ]

@@ -50,7 +50,7 @@ from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.likelihood.surrogates import FAMILY_WISE, admission_nats, largest_gains
 from aesi.tracer.search.archive import Archive, context_of, identity
 from aesi.tracer.search.fitted import base_of, fitted_hypothesis, values_without
-from aesi.tracer.search.forward import searched
+from aesi.tracer.search.forward import forward_search
 from aesi.tracer.search.path import Path, Step
 from aesi.tracer.search.wrong_parameters import beyond_spread, with_wrong_parameters, wrong_sds
 
@@ -67,7 +67,7 @@ def archive():
 def path(cell, few, make, archive):
     data = make((CATALOGUE["ocv_hysteresis"].activate(magnitude_v=0.006),))
     problem = InverseProblem(cell, prepare_all(cell, [data], 0.9, 0.3), few)
-    return searched(problem, 2, archive)
+    return forward_search(problem, 2, archive)
 
 
 def test_a_search_leaves_what_a_verdict_needs(path):
@@ -115,7 +115,7 @@ def test_a_wrong_parameter_is_named_with_what_is_needed_beside_it(cell, few, mak
     hysteresis = CATALOGUE["ocv_hysteresis"].activate(magnitude_v=0.006)
     slow = CATALOGUE["solid_diffusivity"].activate(negative_factor=0.12, positive_factor=1.0)
     problem = InverseProblem(cell, prepare_all(cell, [make((hysteresis, slow))], 0.9, 0.3), few)
-    path = searched(problem, 0, archive)
+    path = forward_search(problem, 0, archive)
     one, two = (
         fitted_hypothesis(problem, path.blocks, names, path.base, archive)
         for names in (("ocv_hysteresis",), ("series_resistance", "ocv_hysteresis"))
@@ -133,7 +133,7 @@ def test_the_effect_that_wrong_parameters_made_up_for_is_named_in_their_place(ce
     coarse = CATALOGUE["particle_radius"].activate(negative_factor=1.9)
     effects = {**few, "particle_radius": CATALOGUE["particle_radius"]}
     problem = InverseProblem(cell, prepare_all(cell, [make((hysteresis, coarse))], 0.9, 0.3), effects)
-    path = searched(problem, 0, archive)
+    path = forward_search(problem, 0, archive)
     one, right, other = (
         fitted_hypothesis(problem, path.blocks, names, path.base, archive)
         for names in (
@@ -368,8 +368,8 @@ def test_all_that_may_be_written_is_held_against_each_other_on_the_same_rows(cel
     problem = InverseProblem(
         cell, prepare_all(cell, [make((effect,)), make((effect,), seed=2)], 0.9, 0.0), few
     )
-    tight = searched(problem, 1, archive)
-    measured = searched(replace(problem, trust="measured"), 0, archive)
+    tight = forward_search(problem, 1, archive)
+    measured = forward_search(replace(problem, trust="measured"), 0, archive)
     assert len(measured.blocks) != len(tight.blocks)
     declared = Option.of(problem, tight.blocks, None)
     options = named_options(measured, tight, tight.blocks, archive)
@@ -581,7 +581,7 @@ def test_the_resistance_that_a_file_is_off_by_does_not_come_from_the_joints_of_r
         return Measurement(time, current, voltage, name=f"{rate_c}")
 
     records = prepare_all(cell, [discharge(1.0, 0.6), discharge(0.5, 0.95)], None, 0.0)
-    contacts = InverseProblem(cell, records, few, trust="measured").off_at_seconds(())[:, 0]
+    contacts = InverseProblem(cell, records, few, trust="measured").file_errors_v(())[:, 0]
     assert np.abs(contacts).max() < 1e-6  # nothing steps within a record
 
 

@@ -11,14 +11,14 @@ from aesi.physics import simulate
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.model import activation_energies
 from aesi.tracer.case.energies import ACTIVATION_ENERGIES, energies_of
-from aesi.tracer.case.free_parameter import of_all_records
+from aesi.tracer.case.free_parameter import shared_owner
 from aesi.tracer.case.trust import MEASURED_CELL
 from aesi.tracer.decide.evidence import named_options
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.report.own_parameters import own_parameters
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.forward import searched
+from aesi.tracer.search.forward import forward_search
 
 FILE_K, COLD_DEGC, WARM_DEGC, SOC0 = 298.15, -10.0, 25.0, 0.9
 TRIED = {n: CATALOGUE[n] for n in ("series_resistance", "voltage_sensor_offset", "ambient_temperature")}
@@ -62,7 +62,7 @@ def test_energies_are_open_beyond_the_temperature_of_the_file_and_nowhere_else(c
     assert not open_energies(replace(inside, trust="measured"))
     both = inverse_problem(fitted, [cold], SOC0, 0.0, TRIED, good=[warm])
     owners = {f.owner for f in open_energies(replace(both, trust="beside")).values()}
-    assert owners == {of_all_records(ACTIVATION_ENERGIES)}
+    assert owners == {shared_owner(ACTIVATION_ENERGIES)}
 
 
 def test_a_temperature_that_was_not_measured_is_that_of_the_file_but_where_a_hypothesis_says_another(
@@ -98,7 +98,7 @@ def test_a_cold_cell_with_slower_kinetics_than_its_file_expects_gets_no_name(cel
 
     def path(file):
         problem = inverse_problem(file, [data], SOC0, 0.0, TRIED)
-        return searched(replace(problem, trust="measured"), 1, Archive(None, ""))
+        return forward_search(replace(problem, trust="measured"), 1, Archive(None, ""))
 
     known, unknown = path(cell), path(fitted)
     assert known.chosen.hypothesis == ("series_resistance",)  # energies as declared: a false name
@@ -112,9 +112,9 @@ def test_a_cold_cell_with_slower_kinetics_than_its_file_expects_gets_no_name(cel
 def test_what_is_written_of_a_temperature_may_have_the_energies_that_the_file_declares(fitted, recorded):
     untold = replace(recorded(fitted, COLD_DEGC), temperature_degc=None)
     problem, archive = inverse_problem(fitted, [untold], SOC0, 0.0, TRIED), Archive(None, "")
-    measured = searched(replace(problem, trust="measured"), 1, archive)
+    measured = forward_search(replace(problem, trust="measured"), 1, archive)
     assert measured.chosen.hypothesis == ("ambient_temperature",)
-    tight = searched(problem, 0, archive)
+    tight = forward_search(problem, 0, archive)
     options = named_options(measured, tight, tight.blocks, archive)
     assert [one.state.problem.energies for one in options] == [True, False, True]
     moved = [ACTIVATION_ENERGIES in one.state.values for one in options]

@@ -14,7 +14,7 @@ from aesi.tracer.likelihood.gaussian import block_sums
 from aesi.tracer.likelihood.growth import EffectGrowth, Parent
 from aesi.tracer.likelihood.model_error import MEASURED_V, PRIORS, Size, SplitTable, amplitude_v, whitened
 from aesi.tracer.likelihood.size_sums import SizeSums
-from aesi.tracer.likelihood.surrogates import _drawn
+from aesi.tracer.likelihood.surrogates import _whitened_surrogates
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import base_of, fitted_hypothesis
 
@@ -41,7 +41,7 @@ def test_what_lasts_counts_as_before_and_what_is_gone_by_its_own_size(problem):
     slow = np.full((len(problem.time_s), 1), 0.02)
     fast = 0.004 * np.where(np.arange(len(slow)) % 2, 1.0, -1.0)[:, None]
     fast = fast - blocks.windows.means(fast)
-    amplitude = amplitude_v(problem.steepness, SIZE.delta_v, "measured")
+    amplitude = amplitude_v(problem.ocv_slope_v, SIZE.delta_v, "measured")
     white = whitened(problem, blocks, slow, SIZE)[0]
     assert white[:, 0] == pytest.approx(np.sqrt(problem.independent) / amplitude * 0.02)
     gone = whitened(problem, blocks, fast, SIZE)[0]
@@ -56,7 +56,7 @@ def test_what_lasts_counts_as_before_and_what_is_gone_by_its_own_size(problem):
 def test_a_density_is_that_of_as_many_normal_samples_as_are_independent(problem, trust):
     problem = replace(problem, trust=trust)
     blocks = blocks_of(problem)
-    amplitude = amplitude_v(problem.steepness, SIZE.delta_v, trust)
+    amplitude = amplitude_v(problem.ocv_slope_v, SIZE.delta_v, trust)
     _, log_det = whitened(problem, blocks, np.zeros((len(problem.time_s), 1)), SIZE)
     normal = problem.independent @ np.log(2.0 * np.pi * amplitude**2)
     if trust == "measured":  # of k rows of a window, one degree of freedom is its mean's
@@ -109,26 +109,26 @@ def test_sizes_of_both_are_tried_together_where_they_are_told_apart():
 
 
 def test_the_file_may_be_off_in_contacts_and_in_what_careful_parametrisations_differ_by(problem):
-    off = problem.off_at_seconds(())
-    current = np.concatenate([data.current_a for data in problem.seen])
+    off = problem.file_errors_v(())
+    current = np.concatenate([data.current_a for data in problem.fit_parts])
     resistance = -off[:, 0] @ current / (current @ current) / OHMIC_SHARE
     assert 1e-4 < resistance < 1e-2  # ohm, of a cell of 30 Ah
     assert off.shape[1] == 3  # that, and the diffusivities of both electrodes
-    assert problem.off_at_seconds(("series_resistance",)).shape[1] == 2
+    assert problem.file_errors_v(("series_resistance",)).shape[1] == 2
     for other in ("tight", "loose", "beside"):
-        assert replace(problem, trust=other).off_at_seconds(()).shape[1] == 0
+        assert replace(problem, trust=other).file_errors_v(()).shape[1] == 0
 
 
 def test_an_ohmic_effect_takes_the_place_of_what_the_contacts_may_be_off_by_whatever_it_is_called(problem):
     own = replace(CATALOGUE["series_resistance"], id="busbar")
     problem = replace(problem, effects=problem.effects | {"busbar": own})
-    assert problem.off_at_seconds(("busbar",)).shape[1] == problem.off_at_seconds(()).shape[1] - 1
+    assert problem.file_errors_v(("busbar",)).shape[1] == problem.file_errors_v(()).shape[1] - 1
 
 
 def test_a_search_for_one_effect_alone_on_a_measured_cell_has_nothing_else_that_may_be_off(problem):
     alone = replace(problem, effects={"series_resistance": CATALOGUE["series_resistance"]})
     blocks, archive = blocks_of(alone), Archive(None, "")
-    assert alone.off_at_seconds(("series_resistance",)).shape == (len(alone.time_s), 0)
+    assert alone.file_errors_v(("series_resistance",)).shape == (len(alone.time_s), 0)
     fit = fitted_hypothesis(alone, blocks, ("series_resistance",), base_of(alone, blocks, archive), archive)
     assert np.isfinite(fit.score.total)
 
@@ -142,8 +142,8 @@ def test_a_lag_of_a_second_says_more_where_seconds_count(cell, few, make):
 
     def said(blocks):
         base = base_of(problem, blocks, Archive(None, ""))
-        grown = EffectGrowth(Parent(problem, blocks, base), "clock_skew", PRIORS["measured"].median).ended()
-        return grown.score.total - base.score.total, grown.placed["clock_skew", "lag_s"]
+        grown = EffectGrowth(Parent(problem, blocks, base), "clock_skew", PRIORS["measured"].median).grow()
+        return grown.score.total - base.score.total, grown.values_by_key["clock_skew", "lag_s"]
 
     fine, lag = said(blocks)
     coarse, _ = said(replace(blocks, windows=None))
@@ -153,7 +153,7 @@ def test_a_lag_of_a_second_says_more_where_seconds_count(cell, few, make):
 
 def test_draws_move_a_fast_column_by_as_much_as_it_weighs(problem):
     blocks = blocks_of(problem)
-    draws = _drawn(problem, blocks.windows, 2000, np.random.default_rng(0))
+    draws = _whitened_surrogates(problem, blocks.windows, 2000, np.random.default_rng(0))
     column = np.where(np.arange(len(draws)) % 2, 4e-3, -4e-3)[:, None]
     white = whitened(problem, blocks, column - blocks.windows.means(column), SIZE)[0][:, 0]
     assert np.var(white @ draws) == pytest.approx(white @ white, rel=0.1)

@@ -16,9 +16,9 @@ from aesi.tracer.case.free_parameter import (
     STATE_OF_CHARGE,
     acting_on,
     coordinates_of,
-    of_all_records,
-    of_effect,
-    own,
+    effect_parameters,
+    own_parameter,
+    shared_owner,
     starts,
     state_of_charge,
     values_of,
@@ -33,14 +33,17 @@ SPREAD = Parameter(0.3, "1", bounds=(0.0, 0.8), source="test", neutral=0.0, even
 
 @given(st.floats(0.1, 10.0))
 def test_a_value_comes_back_from_its_coordinate(value):
-    for free in (*of_effect("effect", {"factor": FACTOR}, 5.0), own("effect", "factor", FACTOR, 0.2)):
+    for free in (
+        *effect_parameters("effect", {"factor": FACTOR}, 5.0),
+        own_parameter("effect", "factor", FACTOR, 0.2),
+    ):
         inside = min(max(value, free.low), free.high)
         assert free.value(free.coordinate(inside)) == pytest.approx(inside)
 
 
 @given(st.floats(0.0, 2.0))
 def test_what_is_even_moves_by_its_square(x):
-    (spread,) = of_effect("effect", {"sd": SPREAD}, 5.0)
+    (spread,) = effect_parameters("effect", {"sd": SPREAD}, 5.0)
     assert spread.bounds == pytest.approx((0.0, 2.0))  # the end of a range is two deviations off
     assert spread.value(x) ** 2 == pytest.approx(x / 2.0 * 0.8**2)
     assert spread.coordinate(spread.value(x)) == pytest.approx(x)
@@ -48,10 +51,10 @@ def test_what_is_even_moves_by_its_square(x):
 
 def test_what_stood_on_its_bound_was_told_as_what_round_off_left():
     for parameter in (OHM, FACTOR, SPREAD):
-        (free,) = of_effect("effect", {"parameter": parameter}, 5.0)
-        assert free.told(free.low + 1e-12) == free.low
-        assert free.told(free.high - 1e-12) == free.high
-        assert free.told(0.3 * free.high) == 0.3 * free.high
+        (free,) = effect_parameters("effect", {"parameter": parameter}, 5.0)
+        assert free.reported(free.low + 1e-12) == free.low
+        assert free.reported(free.high - 1e-12) == free.high
+        assert free.reported(0.3 * free.high) == 0.3 * free.high
 
 
 def test_what_is_even_has_no_negative_values():
@@ -67,8 +70,8 @@ def test_the_currents_and_resistances_of_a_larger_cell_are_expected_to_be_so():
     )
     growth = replace(OHM, expected=0.04, capacity_power=-2)
     for capacity_ah in (1.0, 5.0):
-        (current,) = of_effect("effect", {"offset_a": amps}, capacity_ah)
-        (ohm,) = of_effect("effect", {"resistance_ohm": growth}, capacity_ah)
+        (current,) = effect_parameters("effect", {"offset_a": amps}, capacity_ah)
+        (ohm,) = effect_parameters("effect", {"resistance_ohm": growth}, capacity_ah)
         assert current.sd == pytest.approx(0.05 * capacity_ah)
         assert ohm.sd == pytest.approx(0.04 / capacity_ah**2)
     with pytest.raises(ParameterError, match="capacity_power"):
@@ -76,14 +79,17 @@ def test_the_currents_and_resistances_of_a_larger_cell_are_expected_to_be_so():
 
 
 def test_an_own_parameter_stays_within_its_spread_and_its_range():
-    narrow, wide = own("effect", "factor", FACTOR, 0.2), own("effect", "factor", FACTOR, 2.0)
+    narrow, wide = (
+        own_parameter("effect", "factor", FACTOR, 0.2),
+        own_parameter("effect", "factor", FACTOR, 2.0),
+    )
     assert narrow.bounds == pytest.approx((-FURTHEST_SDS, FURTHEST_SDS))
     assert (wide.low, wide.high) == FACTOR.bounds
     assert not any(narrow.on_bound(x) for x in narrow.bounds)
 
 
 def test_an_effect_ends_on_a_bound_but_not_on_its_neutral_point():
-    (ohm,) = of_effect("effect", {"resistance_ohm": OHM}, 5.0)
+    (ohm,) = effect_parameters("effect", {"resistance_ohm": OHM}, 5.0)
     low, high = ohm.bounds
     assert low == 0.0
     assert (ohm.on_bound(low), ohm.on_bound(high)) == (False, True)
@@ -97,7 +103,7 @@ def test_a_state_of_charge_is_known_to_its_deviation():
 
 
 def test_values_and_coordinates_are_one_anothers_inverse():
-    free = [*of_effect("a", {"resistance_ohm": OHM}, 5.0), state_of_charge(0, 0.5, 0.02)]
+    free = [*effect_parameters("a", {"resistance_ohm": OHM}, 5.0), state_of_charge(0, 0.5, 0.02)]
     known = {("a", "resistance_ohm"): 2e-3}
     x = coordinates_of(free, known, elsewhere=1.0)
     assert values_of(free, x, ("a", "without")) == {
@@ -111,20 +117,20 @@ def test_values_and_coordinates_are_one_anothers_inverse():
 def test_a_resistance_of_a_coin_cell_was_beyond_bounds_in_ohm(effect):
     """A prior that goes with one over the capacity came to a fortieth of a deviation, at 5 mAh."""
     for capacity_ah in (1e-3, 5e-3, 0.25, 5.0):
-        for free in of_effect(effect, CATALOGUE[effect].parameters, capacity_ah):
+        for free in effect_parameters(effect, CATALOGUE[effect].parameters, capacity_ah):
             assert free.bounds[1] >= FURTHEST_SDS
 
 
 def test_fits_start_a_third_of_the_way_to_what_is_typical():
-    (first,) = starts(of_effect("a", {"resistance_ohm": OHM}, 5.0))
-    (ohm,) = of_effect("a", {"resistance_ohm": OHM}, 5.0)
+    (first,) = starts(effect_parameters("a", {"resistance_ohm": OHM}, 5.0))
+    (ohm,) = effect_parameters("a", {"resistance_ohm": OHM}, 5.0)
     assert ohm.value(first[0]) == pytest.approx(OHM.default / 3.0)
 
 
 def test_what_is_under_test_acts_beside_what_all_records_share_and_not_on_good_ones():
     name = "solid_diffusivity"
     both = {
-        of_all_records(name): {"negative_factor": 2.0},
+        shared_owner(name): {"negative_factor": 2.0},
         name: {"negative_factor": 1.5},
         "soc0": {"0": 0.9},
     }
@@ -157,8 +163,8 @@ def test_how_far_a_parameter_went_was_told_in_deviations_whose_size_nobody_said(
     diffusivity = CATALOGUE["solid_diffusivity"].parameters["negative_factor"]
     offset = CATALOGUE["voltage_sensor_offset"].parameters["offset_v"]
     open_ones = [
-        own("solid_diffusivity", "negative_factor", diffusivity, 0.3),
-        own("voltage_sensor_offset", "offset_v", offset, 3e-4),
+        own_parameter("solid_diffusivity", "negative_factor", diffusivity, 0.3),
+        own_parameter("voltage_sensor_offset", "offset_v", offset, 3e-4),
     ]
     values = {
         "solid_diffusivity": {"negative_factor": float(np.exp(-0.6))},

@@ -14,9 +14,9 @@ from aesi.tracer.case.blocks import Blocks, blocks_of
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import prepare_all
 from aesi.tracer.likelihood.fit import HypothesisFitter, beyond_expected
-from aesi.tracer.likelihood.gaussian import LOG_2PI, Posterior, block_sums, held_at_bounds, weighed
+from aesi.tracer.likelihood.gaussian import LOG_2PI, Posterior, block_sums, held_at_bounds, score_at_size
 from aesi.tracer.likelihood.model_error import PRIORS, Size
-from aesi.tracer.likelihood.surrogates import _gains, _Sums
+from aesi.tracer.likelihood.surrogates import _gains_by_effect, _Sums
 
 from .conftest import steps
 
@@ -84,7 +84,7 @@ def test_what_the_data_push_beyond_a_bound_is_held_there_and_scored_as_if_it_wer
     assert held.tolist() == [True, False, False]
     assert to_bounds == pytest.approx([1.0, 0.0, 0.0])
 
-    score = weighed(BLOCKS, sums, x, bounds, Size(1.0), 0.0).score
+    score = score_at_size(BLOCKS, sums, x, bounds, Size(1.0), 0.0).score
     known = np.column_stack([residual - jacobian[:, 0], jacobian[:, 1:]])
     table, log_det = whiten(known, TIME, STARTS[:-1], AMPLITUDE, WHITE)
     two = Posterior(block_sums(BLOCKS, table, log_det), np.zeros(2), BLOCKS.folds["block"])
@@ -101,7 +101,7 @@ def test_the_evidence_of_what_is_held_on_a_bound_was_not_an_integral_over_what_i
     residual = jacobian @ [1.3, 0.2, -0.1] + 0.5 * rng.normal(size=N)
     white = whiten(np.column_stack([residual, jacobian]), TIME, STARTS[:-1], AMPLITUDE, WHITE)
     allowed = np.array([bounds, *[(-9.0, 9.0)] * (M - 1)])
-    held = weighed(BLOCKS, block_sums(BLOCKS, *white), np.zeros(M), allowed, Size(1.0), 0.0)
+    held = score_at_size(BLOCKS, block_sums(BLOCKS, *white), np.zeros(M), allowed, Size(1.0), 0.0)
     assert held.held.tolist() == [True, False, False]
 
     def with_first(z):
@@ -118,7 +118,7 @@ def test_the_evidence_of_what_is_held_on_a_bound_was_not_an_integral_over_what_i
 def samples_under_load(cell, data):
     problem = replace(InverseProblem(cell, prepare_all(cell, [data], 0.9, 0.0), {}), trust="measured")
     assert problem.independent.max() <= 1.0
-    return problem.independent[np.abs(problem.seen[0].current_a) > 0.3].sum()
+    return problem.independent[np.abs(problem.fit_parts[0].current_a) > 0.3].sum()
 
 
 def test_a_rest_and_a_pause_of_the_logger_took_the_evidence_from_the_load(cell, make):
@@ -179,10 +179,10 @@ def test_a_gain_on_a_surrogate_is_what_its_score_gains():
     white = RNG.normal(size=(N, 5))
     folds = FOLDS | {"charge": ((0, 2), (1, 3))}
     blocks = Blocks(STARTS, np.zeros(4, dtype=int), folds, np.ones(N, dtype=bool))
-    gains = _gains(blocks, _Sums.over_blocks(blocks, table, white), 2, [(2, 3)])
+    gains = _gains_by_effect(blocks, _Sums.over_blocks(blocks, table, white), 2, [(2, 3)])
     for surrogate, (gain,) in zip(white.T, gains.T, strict=True):
         total = [
-            weighed(
+            score_at_size(
                 blocks,
                 block_sums(blocks, np.column_stack([surrogate, table[:, :m]]), np.zeros(N)),
                 np.zeros(m),

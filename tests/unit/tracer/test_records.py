@@ -10,7 +10,7 @@ from aesi.data.thinning import averaged_over
 from aesi.physics import simulate
 from aesi.records import Measurement
 from aesi.tracer.case.checks import check_record
-from aesi.tracer.case.records import led_by, noise_floor_v, noise_of, prepare, prepare_test
+from aesi.tracer.case.records import leading_record, noise_floor_v, noise_of, prepare, prepare_test
 from aesi.tracer.case.thinned import thinned_record, thinned_together
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.model_state import ModelState
@@ -146,7 +146,7 @@ def test_the_resolution_of_a_voltage_was_averaged_away_as_white_noise(cell):
     assert record.white_v.min() > 0.99 * 5e-3 / np.sqrt(12.0)
     last = (record.thin.time_s > 3000.0) & (np.abs(record.thin.voltage_v - data.voltage_v[-1]) < 1e-3)
     assert np.count_nonzero(last) > 20  # rows of a rest that were rounded to one value
-    together = np.sum(record.as_white_v[last] ** -2.0) ** -0.5
+    together = np.sum(record.equivalent_white_v[last] ** -2.0) ** -0.5
     assert together > 0.9 * 5e-3 / np.sqrt(12.0)
 
 
@@ -156,7 +156,7 @@ def test_noise_of_half_a_step_lets_means_tell_more_than_the_step(rng):
     data = Measurement(time, np.full(len(time), 3.0), 2e-3 * np.round(voltage / 2e-3), name="scattered")
     noise = noise_of(data, 3.0)
     assert noise.sd_v == pytest.approx(np.hypot(1e-3, 2e-3 / np.sqrt(12.0)), rel=0.05)
-    assert noise.of_means_v(np.array([1.0, 100.0])) == pytest.approx(
+    assert noise.sd_of_means_v(np.array([1.0, 100.0])) == pytest.approx(
         noise.sd_v * np.array([1.0, 0.1]), rel=0.01
     )
 
@@ -175,7 +175,7 @@ def test_the_noise_of_a_filtered_or_held_channel_was_told_from_neighbouring_rows
     assert noise_of(channel, 30.0).rows > 2
     record = prepare(cell, channel, 0.9, 0.0)
     assert record.noise_v == pytest.approx(1e-3, rel=0.15)
-    assert record.as_white_v.min() > 1.4 * record.white_v.max()
+    assert record.equivalent_white_v.min() > 1.4 * record.white_v.max()
 
 
 def test_neither_white_noise_nor_a_relaxing_voltage_is_taken_for_that_of_a_filter(cell, make):
@@ -225,9 +225,11 @@ def test_of_two_fitted_records_that_lead_to_a_test_the_one_it_begins_with_was_ju
     time = np.arange(900.0)
     whole = measured(cell, time, np.where(time < 30, 0.0, 5.0))
     first, second = whole.between(0, 300), whole.between(300, 600)
-    assert led_by(whole.between(300, 900), [first, second])[0] == 1  # which continues the first one, too
-    assert led_by(whole, [first, whole.between(0, 600)])[0] == 1
-    index, data = led_by(whole.between(600, 900), [first, second])
+    assert (
+        leading_record(whole.between(300, 900), [first, second])[0] == 1
+    )  # which continues the first one, too
+    assert leading_record(whole, [first, whole.between(0, 600)])[0] == 1
+    index, data = leading_record(whole.between(600, 900), [first, second])
     assert (index, data.time_s[0]) == (1, 300.0)
 
 

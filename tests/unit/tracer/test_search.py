@@ -8,17 +8,17 @@ import pytest
 
 from aesi.physics.effects import CATALOGUE
 from aesi.tracer.case.blocks import blocks_of
-from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, of_effect
+from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, effect_parameters
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.growth import EffectGrowth, Parent
 from aesi.tracer.likelihood.model_error import PRIORS, Size
 from aesi.tracer.search import grown, reach
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import MOVED_SDS, as_declared, base_of, fitted_hypothesis
-from aesi.tracer.search.forward import FINALISTS, admissible, needed, searched
+from aesi.tracer.search.fitted import MOVED_SDS, base_of, fitted_hypothesis, linearised_as_declared
+from aesi.tracer.search.forward import FINALISTS, admissible, forward_search, needed
 from aesi.tracer.search.grown import PROMISING, growths_on, most_promising, promising_first
 from aesi.tracer.search.plausible import ALIKE_NATS, most_plausible
-from aesi.tracer.search.reach import REACH, least_left_v
+from aesi.tracer.search.reach import REACH_FACTOR, least_error_v
 
 ADDED_OHM = 2e-3
 ALLOWED_V = 0.6e-3
@@ -48,11 +48,11 @@ def test_an_effect_grows_about_the_declared_values_as_it_fits_though_the_rest_ha
     blocks, archive = blocks_of(problem), Archive(None, "")
     base = base_of(problem, blocks, archive)
     assert max(np.abs(own_coordinates(base))) > MOVED_SDS  # a resistance that is not there, as slow kinetics
-    there = as_declared(problem, blocks, base)
+    there = linearised_as_declared(problem, blocks, base)
     assert own_coordinates(there) == [0.0] * len(own_coordinates(base))
     whole = fitted_hypothesis(problem, blocks, ("series_resistance",), None, archive)
     gains = [
-        EffectGrowth(Parent(problem, blocks, one), "series_resistance", SIZE).ended().score.total
+        EffectGrowth(Parent(problem, blocks, one), "series_resistance", SIZE).grow().score.total
         for one in (base, there)
     ]
     off = [abs(gain - whole.score.total) for gain in gains]
@@ -62,7 +62,7 @@ def test_an_effect_grows_about_the_declared_values_as_it_fits_though_the_rest_ha
 def test_a_hypothesis_that_moved_nothing_far_is_grown_where_it_is(cell, few, make):
     problem = inverse_problem(cell, [make()], 0.9, effects=few)
     blocks = blocks_of(problem)
-    assert as_declared(problem, blocks, base_of(problem, blocks, Archive(None, ""))) is None
+    assert linearised_as_declared(problem, blocks, base_of(problem, blocks, Archive(None, ""))) is None
 
 
 def said(total, evidence, names=1):
@@ -103,12 +103,14 @@ def test_a_pair_is_grown_from_whichever_of_its_effects_says_more_with_the_other(
 
 
 def test_a_declared_parameter_under_test_is_expected_as_far_off_as_files_are():
-    kinetics = of_effect("charge_transfer_kinetics", CATALOGUE["charge_transfer_kinetics"].parameters, 30.0)
+    kinetics = effect_parameters(
+        "charge_transfer_kinetics", CATALOGUE["charge_transfer_kinetics"].parameters, 30.0
+    )
     loose = [p.spread.loose for p in CATALOGUE["charge_transfer_kinetics"].parameters.values()]
     assert [one.sd for one in kinetics] == loose
-    contact = of_effect("series_resistance", CATALOGUE["series_resistance"].parameters, 30.0)
+    contact = effect_parameters("series_resistance", CATALOGUE["series_resistance"].parameters, 30.0)
     assert contact[0].sd == CATALOGUE["series_resistance"].parameters["resistance_ohm"].spread.loose / 30.0
-    lost = of_effect("lithium_inventory_loss", CATALOGUE["lithium_inventory_loss"].parameters, 30.0)
+    lost = effect_parameters("lithium_inventory_loss", CATALOGUE["lithium_inventory_loss"].parameters, 30.0)
     assert lost[0].sd > CATALOGUE["lithium_inventory_loss"].parameters["loss"].spread.loose  # cells age
 
 
@@ -167,7 +169,7 @@ def test_nothing_is_fitted_where_all_effects_together_leave_far_more_than_a_righ
     strange = replace(right, voltage_v=right.voltage_v + 5e-3 * np.sin(right.time_s / 30.0))
     asked = ((right, many), (strange, many), (strange, few))
     problems = [inverse_problem(cell, [data], 0.9, effects=effects) for data, effects in asked]
-    paths = [searched(one, 1, Archive(None, ""), allowed_v=ALLOWED_V) for one in problems]
+    paths = [forward_search(one, 1, Archive(None, ""), allowed_v=ALLOWED_V) for one in problems]
     assert paths[0].chosen.hypothesis == ("series_resistance",)
     assert paths[0].beyond_reach_v is None
     assert paths[1].chosen is paths[1].base
@@ -183,7 +185,9 @@ def test_what_the_other_model_may_account_for_is_not_out_of_reach_of_this_one(ce
     strange = replace(data, voltage_v=data.voltage_v + 5e-3 * np.sin(data.time_s / 30.0))
     problem = inverse_problem(cell, [strange], 0.9, effects=many)
     for reduced_v, begun in ((1e-3, False), (4e-3, True)):  # 3.5 mV are left by all effects together
-        path = searched(replace(problem, reduced_v=reduced_v), 1, Archive(None, ""), allowed_v=ALLOWED_V)
+        path = forward_search(
+            replace(problem, reduced_v=reduced_v), 1, Archive(None, ""), allowed_v=ALLOWED_V
+        )
         assert bool(path.steps) == begun
 
 
@@ -191,10 +195,10 @@ def test_what_moves_the_voltage_far_is_followed_before_it_is_called_out_of_reach
     many = {name: CATALOGUE[name] for name in (*few, "leakage_current", "clock_skew")}
     data = make((CATALOGUE["clock_skew"].activate(lag_s=2.0),))
     problem = inverse_problem(cell, [data], 0.9, effects=many)
-    path = searched(problem, 1, Archive(None, ""), allowed_v=ALLOWED_V)
+    path = forward_search(problem, 1, Archive(None, ""), allowed_v=ALLOWED_V)
     growths = growths_on([Parent(problem, path.blocks, path.base)], {}, Archive(None, ""))
-    begun = least_left_v(path.base, [growth.marks() for growth in growths], problem.white_v)
-    assert begun > REACH * ALLOWED_V
+    begun = least_error_v(path.base, [growth.possible_changes_v() for growth in growths], problem.white_v)
+    assert begun > REACH_FACTOR * ALLOWED_V
     assert path.beyond_reach_v is None
     assert path.chosen.hypothesis == ("clock_skew",)
 
@@ -206,10 +210,10 @@ def test_what_was_within_reach_is_within_reach_with_more_names(cell, few, make, 
     archive = Archive(None, "")
 
     def looked(most, archive):
-        return searched(problem, most, archive, allowed_v=ALLOWED_V)
+        return forward_search(problem, most, archive, allowed_v=ALLOWED_V)
 
     once = looked(1, archive)
-    monkeypatch.setattr(reach, "least_left_v", lambda *_: np.inf)
+    monkeypatch.setattr(reach, "least_error_v", lambda *_: np.inf)
     again = looked(2, archive)
     assert once.chosen.hypothesis == again.chosen.hypothesis == ("series_resistance",)
     assert again.beyond_reach_v is None
@@ -221,7 +225,7 @@ def test_what_all_effects_leave_is_told_beyond_the_noise():
     even, odd = np.tile([1.0, 1.0], 50), np.tile([1.0, -1.0], 50)
     point = SimpleNamespace(residual_v=3e-3 * even + 4e-3 * odd, jacobian_v=np.zeros((100, 1)))
     left_v = [
-        least_left_v(SimpleNamespace(point=point), marks, np.full(100, 1e-3))
+        least_error_v(SimpleNamespace(point=point), marks, np.full(100, 1e-3))
         for marks in ([], [7.0 * odd[:, None]], [odd[:, None], even[:, None]])
     ]
     assert left_v == pytest.approx([np.sqrt(24.0) * 1e-3, np.sqrt(8.0) * 1e-3, 0.0], abs=1e-9)
@@ -238,7 +242,7 @@ def test_with_the_other_model_what_says_most_with_either_is_grown(monkeypatch):
         "_first_slopes",
         lambda growths: {n: np.array([[promised[n]]]) for n in growths if n in simulated},
     )
-    monkeypatch.setattr(grown, "promise", lambda parent, slopes_v: slopes_v[0, 0])
+    monkeypatch.setattr(grown, "expected_score", lambda parent, slopes_v: slopes_v[0, 0])
     parent = SimpleNamespace(fit=SimpleNamespace(score=SimpleNamespace(total=0.0)))
     growths = [SimpleNamespace(parent=parent, effect=name) for name in names]
     kept, slopes = promising_first(growths, SimpleNamespace(near=lambda name, size: np.array([said[name]])))

@@ -10,7 +10,7 @@ from aesi.records import Measurement
 from aesi.tracer import discover
 from aesi.tracer.case.blocks import blocks_of
 from aesi.tracer.case.free_parameter import CAPACITY_SHARE
-from aesi.tracer.case.problem import SHARE_SD, InverseProblem, share_of
+from aesi.tracer.case.problem import SHARE_SD, InverseProblem, record_capacity_share
 from aesi.tracer.case.records import prepare_all, prepare_test
 from aesi.tracer.decide.carry_over import LeftOut
 from aesi.tracer.decide.evidence import of_several_ages
@@ -46,7 +46,9 @@ def fitted(cell, few, records, trust):
 def test_each_of_several_records_of_a_measured_cell_has_a_capacity_of_its_own(cell, few, discharge):
     records = [discharge(0.96, name="later"), discharge(name="first")]
     problem, blocks, fit = fitted(cell, few, records, "loose")
-    assert share_of(fit.values, 0) / share_of(fit.values, 1) == pytest.approx(0.96, abs=4e-3)
+    assert record_capacity_share(fit.values, 0) / record_capacity_share(fit.values, 1) == pytest.approx(
+        0.96, abs=4e-3
+    )
     state = ModelState.of(problem, fit)
     runs = [state.simulated(one, k, thin=False) for k, one in enumerate(problem.records)]
     left = [
@@ -54,12 +56,17 @@ def test_each_of_several_records_of_a_measured_cell_has_a_capacity_of_its_own(ce
     ]
     assert max(left) < 1.5e-3
     told = {one.name: one.value for one in own_parameters(state) if one.owner == CAPACITY_SHARE}
-    assert told == {"later": share_of(fit.values, 0), "first": share_of(fit.values, 1)}
+    assert told == {
+        "later": record_capacity_share(fit.values, 0),
+        "first": record_capacity_share(fit.values, 1),
+    }
     declared = ModelState(problem)
     assert ages_told((declared,)) == ""
     assert f"{told['later']:.3f} in later, {told['first']:.3f} in first" in ages_told((declared, state))
     without = values_without(problem, blocks, fit, blocks.folds["record"][0])
-    assert share_of(without, 0) == pytest.approx(1.0, abs=1e-4)  # nothing but its own rows tells it
+    assert record_capacity_share(without, 0) == pytest.approx(
+        1.0, abs=1e-4
+    )  # nothing but its own rows tells it
     held = replace(problem, trust="tight")
     assert not any(one.owner == CAPACITY_SHARE for one in held.free(()))
     assert sum(one.owner == CAPACITY_SHARE and one.sd == SHARE_SD for one in problem.free(())) == 2
@@ -102,7 +109,7 @@ def test_errors_were_told_of_a_model_of_several_ages_that_nobody_can_write(cell,
 def test_of_one_record_alone_what_the_cell_has_lost_is_left_to_effects(cell, few, discharge):
     problem, _, fit = fitted(cell, few, [discharge(0.98)], "loose")
     assert not any(one.owner == CAPACITY_SHARE for one in problem.free(()))
-    assert share_of(fit.values, 0) == 1.0
+    assert record_capacity_share(fit.values, 0) == 1.0
 
 
 def test_records_are_of_several_ages_where_they_say_so(cell, few, discharge):
