@@ -12,6 +12,7 @@ from typing import Protocol, cast
 
 import numpy as np
 
+from aesi.numerics.blocks import block_means
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.records import Hold, Measurement
 
@@ -235,4 +236,4 @@ def _held(time_s: Array, current_a: Array, at_s: Array) -> Array:
 def means_of_rows(column: Array, rows: Array) -> Array:
     """(m,) means of a column (n,) over successive runs of `rows` (m,) rows."""
     starts = np.concatenate([[0], np.cumsum(rows[:-1])]).astype(int)
-    return np.add.reduceat(column, starts) / rows
+    return block_means(column, starts)

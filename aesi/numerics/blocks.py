@@ -23,6 +23,15 @@ Span = tuple[int, int]
 """First row, and the row after the last."""
 
 
+def block_means(values: Array, starts: IntArray) -> Array:
+    """(b,) or (b, columns) means of consecutive blocks of rows.
+
+    values : (n,) or (n, columns).  starts : (b,) first row of each block, which ends where the next one starts.
+    """
+    rows = np.diff(starts, append=len(values))
+    return np.asarray((np.add.reduceat(values, starts, axis=0).T / rows).T)
+
+
 def block_starts(spans: Sequence[Span], length: int) -> IntArray:
     """All rows at which a block of `length` rows can start in its record (the record's first row if it is shorter)."""
     return np.concatenate([np.arange(a, max(a, b - length) + 1) for a, b in spans])

@@ -25,11 +25,8 @@ def main(experiments: Sequence[str]) -> None:
         from aesi.pipeline.experiment.sources import cell_path, virtual_experiment
 
         for config in map(read_experiment, experiments):
-            if config.fallback is not None:
-                config = config.model_copy(
-                    update={"data": config.fallback.data, "cell": config.fallback.cell}
-                )
-            virtual_experiment(config, cell_path(config))
+            simulated = config.on_fallback()
+            virtual_experiment(simulated, cell_path(simulated))
         shutil.rmtree(cache.SHIPPED, ignore_errors=True)
         cache.SHIPPED.mkdir()
         for path in sorted((Path(folder) / "laboratory").glob("*.npz")):

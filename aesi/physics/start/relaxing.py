@@ -21,7 +21,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR, ZERO_CELSIUS_K
-from aesi.numerics.typing import Array, IntArray
+from aesi.numerics.blocks import block_means
+from aesi.numerics.typing import Array
 from aesi.physics.belongs import ROWS_APART
 from aesi.physics.rest.open_circuit import OpenCircuit
 from aesi.physics.simulation import ModelName, simulate
@@ -91,11 +92,11 @@ def settled_voltage(open_circuit: OpenCircuit, rest: Measurement, model: ModelNa
     """
     starts = np.linspace(0, len(rest), min(PARTS, len(rest)) + 1).astype(int)[:-1]
     last = float(rest.voltage_v[starts[-1] :].mean())
-    seen = _means(rest.voltage_v - last, starts)
+    seen = block_means(rest.voltage_v - last, starts)
     histories = list(_histories(open_circuit, rest.time_s - rest.time_s[0], open_circuit.soc_at(last), model))
     shape_v = np.hypot(RELAXED_SHAPE_V, RELAXED_SHAPE * seen)
     found = [
-        _explained(seen, _means(away, starts), rate_sd, shape_v)
+        _explained(seen, block_means(away, starts), rate_sd, shape_v)
         for away in histories
         for rate_sd in C_RATE_SDS
     ]
@@ -123,10 +124,6 @@ def _explained(seen: Array, away: Array, rate_sd: float, shape_v: Array) -> tupl
     left = seen / shape_v - slopes @ best
     volume = np.linalg.slogdet(covariance)[1] - 2.0 * np.log(rate_sd)
     return 0.5 * float(volume - left @ left - best @ prior @ best), float(best[0]), float(covariance[0, 0])
-
-
-def _means(values: Array, starts: IntArray) -> Array:
-    return np.asarray(np.add.reduceat(values, starts) / np.diff(np.append(starts, len(values))))
 
 
 def _histories(open_circuit: OpenCircuit, time_s: Array, soc: float, model: ModelName) -> Iterator[Array]:

@@ -325,10 +325,10 @@ def _step_resistance(found: Discovery) -> dict[str, list[dict[str, Any]]]:
         )
         for f in found.files
     ]
-    told = [one for one in records if one is not None]
-    if not told:
+    with_steps = [one for one in records if one is not None]
+    if not with_steps:
         return {"by_soc": [], "by_current": []}
-    steps = CurrentSteps.together(told)
+    steps = CurrentSteps.together(with_steps)
     return {
         "by_soc": _resistance_rows("soc", steps.by_soc()),
         "by_current": _resistance_rows("current_a", steps.by_current()),

@@ -149,6 +149,14 @@ class ExperimentConfig(Section):
             )
         return value
 
+    def on_fallback(self) -> ExperimentConfig:
+        """The experiment with the data and the cell of its fallback, and without its note, which is about the named
+        data; itself where it has no fallback."""
+        if self.fallback is None:
+            return self
+        changes = {"data": self.fallback.data, "cell": self.fallback.cell, "fallback": None, "note": ""}
+        return self.model_copy(update=changes)
+
     def path(self, name: str) -> Path:
         """The path of a file that the experiment reads; relative names start from the folder of the experiment file."""
         path = Path(name).expanduser()

@@ -101,9 +101,7 @@ def load(config: ExperimentConfig) -> Loaded:
     except DataError as error:
         if config.fallback is None:
             raise
-        fallback = config.model_copy(
-            update={"data": config.fallback.data, "cell": config.fallback.cell, "fallback": None, "note": ""}
-        )
+        fallback = config.on_fallback()
         why = (
             "no copy on this machine and no network"
             if isinstance(error, DataAway)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aesi.numerics.blocks import block_means
 from aesi.numerics.typing import Array, BoolArray
 
 WITHIN_S = 5.0
@@ -115,11 +116,11 @@ class CurrentSteps:
     def _in_bins(self, x: Array, edges: Array) -> StepResistance:
         number = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(edges) - 2)
         bins = [number == k for k in range(len(edges) - 1)]
-        told = [inside for inside in bins if np.count_nonzero(inside & self.is_step) >= LEAST_STEPS]
+        filled = [inside for inside in bins if np.count_nonzero(inside & self.is_step) >= LEAST_STEPS]
         return StepResistance(
-            np.array([np.mean(x[inside & self.is_step]) for inside in told]),
+            np.array([np.mean(x[inside & self.is_step]) for inside in filled]),
             {
-                name: np.array([_resistance_ohm(self.change_a[inside], change[inside]) for inside in told])
+                name: np.array([_resistance_ohm(self.change_a[inside], change[inside]) for inside in filled])
                 for name, change in self.change_v.items()
             },
         )
@@ -148,6 +149,4 @@ def _averaged(time_s: Array, table: Array) -> tuple[Array, Array]:
         return time_s, table
     number = np.floor((time_s - time_s[0]) / SHORTEST_ROW_S)
     starts = np.flatnonzero(np.diff(number, prepend=-1.0))
-    counts = np.diff(np.append(starts, len(time_s)))
-    means = np.add.reduceat(table, starts, axis=0) / counts[:, None]
-    return time_s[0] + (number[starts] + 0.5) * SHORTEST_ROW_S, means
+    return time_s[0] + (number[starts] + 0.5) * SHORTEST_ROW_S, block_means(table, starts)

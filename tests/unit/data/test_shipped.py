@@ -27,9 +27,7 @@ def test_a_shipped_entry_is_found_first_and_an_unknown_one_is_made(tmp_path, mon
 def test_virtual_records_that_take_long_are_shipped(name, monkeypatch, tmp_path):
     """A change of the laboratory asks for `docs/hooks/ship.py` again, with both; without it a first run takes minutes
     more, and that of the porous electrode with its heat hours."""
-    config = read_experiment(EXPERIMENTS / f"{name}.yaml")
-    if config.fallback is not None:
-        config = config.model_copy(update={"data": config.fallback.data, "cell": config.fallback.cell})
+    config = read_experiment(EXPERIMENTS / f"{name}.yaml").on_fallback()
     monkeypatch.setenv("AESI_CACHE", str(tmp_path))
     monkeypatch.setattr(cache, "_store", lambda path, arrays: pytest.fail(f"{path.name} is not shipped"))
     monkeypatch.setattr(simulator, "_simulate", lambda *_: pytest.fail("simulated: it is not shipped"))

@@ -7,14 +7,11 @@ from typing import TYPE_CHECKING
 
 from aesi.pipeline.report import style
 from aesi.pipeline.report.views import Row
+from aesi.tracer.report.step_resistance import WITHIN_S
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
-CAPTION = (
-    "Change of the voltage within 5 s of a step of the current, over that step, in bins of {by}. {reads} Bins with few "
-    "steps are left out."
-)
 READS = {
     "soc": (
         "A model whose resistance rises towards empty or full where the cell's does not has kinetics that slow down "
@@ -42,12 +39,11 @@ def figures(resistance: Mapping[str, Sequence[Row]], labels: Mapping[str, str]) 
 
 def _figure(rows: Sequence[Row], variable: str, labels: Mapping[str, str]) -> Figure:
     by, axis, scale = AXES[variable]
-    fig = style.figure(
-        f"Resistance within seconds, by {by}",
-        CAPTION.format(by=by, reads=READS[variable]),
-        340,
-        hovermode="x unified",
+    caption = (
+        f"Change of the voltage within {WITHIN_S:g} s of a step of the current, over that step, in bins of {by}. "
+        f"{READS[variable]} Bins with few steps are left out."
     )
+    fig = style.figure(f"Resistance within seconds, by {by}", caption, 340, hovermode="x unified")
     colours = {"measured": style.MEASURED, **style.STATE_COLOURS}
     for state, label in {"measured": "measured", **labels}.items():
         fig.add_scatter(
