@@ -2,8 +2,8 @@
 
 Both ask and tell the same number of candidates that cost nothing to evaluate, so what is left is the search:
 selection, crossover, and the storage of the trials. Processor milliseconds a candidate, of one run; `ratio` is
-the peer's over ours. `storage` is "memory", where an experiment keeps its own search, or "SQLite", which workers
-can share.
+the peer's over ours. `ours_stored` and `peer_stored` are the parameters and attributes that a candidate leaves in
+the storage. `storage` is "memory", where an experiment keeps its own search, or "SQLite", which workers can share.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from typing import Any, cast
 
 import numpy as np
 import optuna
+from optuna.storages import BaseStorage, InMemoryStorage
 from pydantic import NonNegativeInt, PositiveInt
 
 from aesi.sparse import Candidate, Genome, Problem
@@ -40,8 +41,10 @@ def run(
     )  # what loads at the first call is loaded before the clock starts
     for storage, number in (("memory", candidates), (SHARED, min(candidates, SHARED_CANDIDATES))):
         with tempfile.TemporaryDirectory(prefix="aesi-bench-") as folder:
-            ours = _ours(terms, number, population, seed, _url(storage, folder, "ours"))
-            peer = _peer(terms, number, population, seed, _url(storage, folder, "peer"))
+            ours_in, peer_in = _storage(storage, folder, "ours"), _storage(storage, folder, "peer")
+            ours = _ours(terms, number, population, seed, ours_in)
+            peer = _peer(terms, number, population, seed, peer_in)
+            stored = {"ours_stored": _stored(ours_in), "peer_stored": _stored(peer_in)}
         yield {
             "bench": "search",
             "storage": storage,
@@ -50,14 +53,23 @@ def run(
             "ours_ms": ours,
             "peer_ms": peer,
             "ratio": peer / ours,
+            **stored,
         }
 
 
-def _url(storage: str, folder: str, name: str) -> str | None:
-    return f"sqlite:///{folder}/{name}.db" if storage == SHARED else None
+def _storage(storage: str, folder: str, name: str) -> str | BaseStorage:
+    return f"sqlite:///{folder}/{name}.db" if storage == SHARED else InMemoryStorage()
 
 
-def _ours(terms: int, candidates: int, population: int, seed: int, url: str | None) -> float:
+def _stored(storage: str | BaseStorage) -> float:
+    """Parameters and attributes a trial, mean."""
+    trials = optuna.load_study(study_name=None, storage=storage).trials
+    return float(np.mean([len(t.params) + len(t.user_attrs) + len(t.system_attrs) for t in trials]))
+
+
+def _ours(
+    terms: int, candidates: int, population: int, seed: int, storage: str | BaseStorage | None
+) -> float:
     rng = np.random.default_rng(seed)
 
     def evaluate_many(genomes: Sequence[Genome]) -> list[tuple[int, Candidate]]:
@@ -66,7 +78,7 @@ def _ours(terms: int, candidates: int, population: int, seed: int, url: str | No
     problem = cast(Problem, SimpleNamespace(library=range(terms)))
     started = time.process_time()
     settings = SearchSettings(population, space=GenomeSpace(terms))
-    search(problem, candidates, seed, settings, storage=url, evaluate_many=evaluate_many)
+    search(problem, candidates, seed, settings, storage=storage, evaluate_many=evaluate_many)
     return 1e3 * (time.process_time() - started) / candidates
 
 
@@ -84,7 +96,7 @@ def _free_of_charge(genome: Genome, rng: np.random.Generator) -> Candidate:
     return cast(Candidate, SimpleNamespace(**figures))
 
 
-def _peer(terms: int, candidates: int, population: int, seed: int, url: str | None) -> float:
+def _peer(terms: int, candidates: int, population: int, seed: int, storage: str | BaseStorage) -> float:
     rng = np.random.default_rng(seed)
 
     def losses(trial: optuna.Trial) -> tuple[float, ...]:
@@ -99,6 +111,6 @@ def _peer(terms: int, candidates: int, population: int, seed: int, url: str | No
         warnings.simplefilter("ignore")
         sampler = optuna.samplers.NSGAIISampler(population_size=population, seed=seed)
     started = time.process_time()
-    study = optuna.create_study(storage=url, directions=["minimize"] * 3, sampler=sampler)
+    study = optuna.create_study(storage=storage, directions=["minimize"] * 3, sampler=sampler)
     study.optimize(losses, n_trials=candidates)
     return 1e3 * (time.process_time() - started) / candidates

@@ -1,7 +1,6 @@
 """Reading: what is accepted, what is refused, and with which words."""
 
 import gzip
-import time
 from pathlib import Path
 
 import numpy as np
@@ -752,13 +751,12 @@ def test_a_voltage_that_failed_could_not_be_left_out_of_a_current_to_simulate(tm
         read_measurement(path, {"voltage_v": None})
 
 
-def test_looking_for_gaps_in_a_slowly_sampled_record_took_longer_than_reading_it():
+def test_looking_for_gaps_in_a_slowly_sampled_record_took_longer_than_reading_it(calls_of):
     step = np.full(300_000, 10.0)
     step[[0, 5000, 5003, 299_999]] = 200.0
-    began = time.process_time()
-    found = find_gaps({"time_s": np.concatenate([[0.0], np.cumsum(step)])})
-    assert time.process_time() - began < 0.5  # it was 2.8 s, row by row
-    assert found == [0, 5000, 5003, 299_999]
+    columns = {"time_s": np.concatenate([[0.0], np.cumsum(step)])}
+    assert calls_of(lambda: find_gaps(columns)) < 1000  # not row by row
+    assert find_gaps(columns) == [0, 5000, 5003, 299_999]
     assert find_gaps({"time_s": np.array([0.0, 1e6])}) == []
 
 
