@@ -34,6 +34,8 @@ LEAST_SHARE = 0.8
 to its voltage limit. On development records of `aesi bench real` without their temperature, models
 that ran empty at 85 and 90 % of it left 7.1 and 5.0 mV of the last part (declared 22.9), those at 68 and 3 % left
 152 and 94 (what was named alone 78)."""
+AS_GOOD = 1.05
+"""A model is as good as another one where its error is at most this many times the other's. A convention."""
 STEP_S = 10.0
 """s between the rows of a full discharge or charge."""
 
