@@ -20,11 +20,11 @@ from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, BoolArray
 from aesi.over_time import stamp
 from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, initial_state, simulate
-from aesi.physics.belongs import check_belongs
 from aesi.physics.cell import Soh
 from aesi.physics.depletion import ran_out
 from aesi.physics.effects.self_heating import assumed, of_file
 from aesi.physics.model import case_k
+from aesi.physics.record_checks import check_belongs
 from aesi.physics.rest.open_circuit import GIVEN_SD
 from aesi.physics.simulation import model_with
 from aesi.pipeline.notes import (
