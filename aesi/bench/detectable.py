@@ -21,7 +21,7 @@ from aesi.tracer.case.reduction import with_fine_numerics
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import fitted_hypothesis
+from aesi.tracer.search.hypothesis_fits import fitted_hypothesis
 
 SEEN_NATS = 5.0
 """Gain in log likelihood, nats, above which an effect counts as detectable. It is about the gain that the tracer

@@ -34,8 +34,8 @@ from aesi.tracer.case.problem import OHMIC_SHARE
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.growth import Parent
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import base_of
-from aesi.tracer.search.grown import grow_all, growths_on
+from aesi.tracer.search.growths import grow_all, growths_on
+from aesi.tracer.search.hypothesis_fits import base_of
 
 RIGHT_TEMPERATURE = ("25degC", "drive_cycle")
 """Parts of the names of the records that were measured at the temperature of their cell file."""

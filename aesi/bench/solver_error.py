@@ -34,7 +34,7 @@ from aesi.tracer.likelihood.fit import point_score_at_size
 from aesi.tracer.likelihood.model_error import Size, SplitTable
 from aesi.tracer.likelihood.size_sums import SizeSums
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import fitted_hypothesis
+from aesi.tracer.search.hypothesis_fits import fitted_hypothesis
 
 SIZES_V = 1e-3 * np.geomspace(0.003125, 25.6, 14)
 """Sizes of the model error at which the likelihood is evaluated, V, a factor of two apart. The grid is two steps wider

@@ -57,11 +57,11 @@ from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError, FitError, InputError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
-from aesi.physics.belongs import check_voltage, other_materials_sentence
 from aesi.physics.cell import Cell
 from aesi.physics.cell.energies import SPAN_K
 from aesi.physics.cell.health import day_of
 from aesi.physics.depletion import ran_out
+from aesi.physics.record_checks import check_voltage, other_materials_sentence
 from aesi.records import Measurement, Spectrum, measured_on_case
 
 EVALUATIONS = 100

@@ -25,9 +25,9 @@ from aesi.errors import DataError, InputError
 from aesi.numerics.files.whole import write_whole
 from aesi.over_time import stamp
 from aesi.physics.arguments import check_temperature
-from aesi.physics.belongs import check_measured
 from aesi.physics.cell import Cell
 from aesi.physics.cell.bpx_values import check_values
+from aesi.physics.record_checks import check_measured
 from aesi.physics.simulation import MODEL_WORDS
 from aesi.pipeline.distinct import check_distinct, check_distinct_spectra
 from aesi.pipeline.impedance import SpectrumError, compared_spectra

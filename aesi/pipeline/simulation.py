@@ -1,4 +1,5 @@
-"""Files in, files out: the physics model alone, and a saved hybrid model with its intervals."""
+"""Files in, files out: the physics model alone, and a saved hybrid model with its intervals. What is said of a result
+is in simulation_words.py."""
 
 from __future__ import annotations
 
@@ -11,21 +12,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
+from aesi.constants import ZERO_CELSIUS_K
 from aesi.data.convert import write_csv
 from aesi.data.current import CurrentProfile, read_current
 from aesi.data.reading import Reading, record_name
 from aesi.errors import DataError, InputError, SimulationError
-from aesi.numerics.metrics import rms
-from aesi.numerics.typing import Array, BoolArray
-from aesi.over_time import stamp
+from aesi.numerics.typing import Array
 from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, initial_state, simulate
-from aesi.physics.belongs import check_belongs
 from aesi.physics.cell import Soh
 from aesi.physics.depletion import ran_out
 from aesi.physics.effects.self_heating import assumed, of_file
 from aesi.physics.model import case_k
-from aesi.physics.rest.open_circuit import GIVEN_SD
+from aesi.physics.record_checks import check_belongs
 from aesi.physics.simulation import model_with
 from aesi.pipeline.notes import (
     contradiction_sentences,
@@ -38,8 +36,13 @@ from aesi.pipeline.notes import (
 )
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
-from aesi.pipeline.product.prediction import Prediction
-from aesi.pipeline.product.trained import trained_figures, trained_sentence
+from aesi.pipeline.simulation_words import (
+    band_sentences,
+    effect_sentences,
+    exact_start_sentence,
+    first_error_sentences,
+    simulated_record_sentences,
+)
 from aesi.records import Hold, Measurement, Run, assumed_hold, hold_sentence
 
 if TYPE_CHECKING:
@@ -47,8 +50,6 @@ if TYPE_CHECKING:
 
 DIGITS = 9
 """Significant digits of what is written, except for the time (or the frequency)."""
-TOLD_SD = 0.01
-"""Change of state of charge for which a note gives the change of the voltage. A convention."""
 SayNotes = Callable[[Iterable[str]], None]
 
 
@@ -208,10 +209,10 @@ def predict_file(
     alone_v = None if hybrid.correction is None or measured else prediction.physics_v
     say(simulated_record_sentences(hybrid.cell, record, prediction.voltage_v, prediction.soc, alone_v))
     say(dry_collector_sentences(record.name, prediction, hybrid.model))
-    say(_first_error_sentences(record, prediction, hybrid, measured))
+    say(first_error_sentences(record, prediction, hybrid, measured))
     if hybrid.bands is not None and not measured and start.basis == "given" and asked.soc0_sd is None:
-        say([_exact_start_sentence(record, prediction, hybrid, start.soc)])
-    say(_band_sentences(record, prediction, hybrid, measured))
+        say([exact_start_sentence(record, prediction, hybrid, start.soc)])
+    say(band_sentences(record, prediction, hybrid, measured))
     return len(frame)
 
 
@@ -259,196 +260,12 @@ def _profiled_model(
             temperature_sentence(model.cell, record, model.effects),
             *temperature_range_sentences(model.cell, [record.temperature_degc], model.effects),
             *contradiction_sentences(model, record, start.soc, model.hold),
-            *_effect_sentences(record, model),
+            *effect_sentences(record, model),
             *cooling,
             *([f"when this model was made: {model.finding}"] if model.finding else []),
         ]
     )
     return _ProfiledModel(model, record, start)
-
-
-def _effect_sentences(record: Measurement, model: HybridModel) -> list[str]:
-    """A sentence on the effects that act, or that the cell holds, with their values, which may be defaults; of those
-    that were fitted beside what was found the names alone."""
-    acting = {
-        one.id: repr(one)
-        for one in model.effects
-        if record.temperature_degc is None or one.effect.infers != "temperature"
-    }
-    held = {words.partition("(")[0]: words for words in model.held}
-    told, inside = (
-        [words for id, words in each.items() if id not in model.beside] for each in (acting, held)
-    )
-    beside = [id for id in (acting | held) if id in model.beside]
-    said = [f"with {', '.join(told)}"] if told else []
-    said += [f"the saved model includes {', '.join(inside)}"] if inside else []
-    said += [f"and other parameters that were fitted together: {', '.join(beside)}"] if beside else []
-    return [f"{record.name}: {'; '.join(said)}."] if said else []
-
-
-def simulated_record_sentences(
-    cell: Cell, record: Measurement, voltage_v: Array, soc: Array, alone_v: Array | None = None
-) -> list[str]:
-    """Sentences on a simulated record: where it ended, its error, and how much lies outside what the file declares.
-
-    voltage_v, soc : (n,) simulated.  alone_v : (n,) V by the physics without a correction, where there is one.
-    A record without a voltage has no error.
-    """
-    said = [f"{record.name}: state of charge {soc[0]:.3f} at the start, {soc[-1]:.3f} at the end."]
-    if np.all(np.isfinite(record.voltage_v)):
-        error = MV_PER_V * (record.voltage_v - voltage_v)
-        said.append(
-            f"{record.name}: against the measured voltage {rms(error):.2f} mV RMSE, "
-            f"{np.mean(error):+.2f} mV in the mean (measured minus model), at most {np.max(np.abs(error)):.1f} mV"
-            f"{_physics_error_clause(record, rms(error), alone_v)}."
-        )
-    beyond = (soc < -GIVEN_SD) | (soc > 1.0 + GIVEN_SD)  # as closely as any is known
-    low, high = voltage_v < cell.lower_voltage_v, voltage_v > cell.upper_voltage_v
-    limits = f"the cell's {cell.lower_voltage_v:g} to {cell.upper_voltage_v:g} V"
-    left = [
-        f"{side} {limit:g} V first at {stamp(record.time_s[int(np.argmax(rows))])} s, {furthest} {voltage_v[at]:.3f} "
-        f"V at {stamp(record.time_s[at])} s"
-        for side, limit, rows, furthest, at in (
-            ("below", cell.lower_voltage_v, low, "down to", int(np.argmin(voltage_v))),
-            ("above", cell.upper_voltage_v, high, "up to", int(np.argmax(voltage_v))),
-        )
-        if np.any(rows)
-    ]
-    for rows, words in (
-        (beyond, f"a state of charge outside 0 to 1{_beyond_limits_clause(soc)}"),
-        (low | high, f"a voltage outside {limits}: {'; '.join(left)}"),
-    ):
-        if np.any(rows):
-            said.append(f"{record.name}: {_percent(rows)} of the simulated rows have {words}.")
-    return said
-
-
-def _physics_error_clause(record: Measurement, corrected_mv: float, alone_v: Array | None) -> str:
-    """Clause, from '; ' on, on the error of the physics without its correction, and on that being the smaller one."""
-    if alone_v is None:
-        return ""
-    alone, ours = f"{rms(MV_PER_V * (record.voltage_v - alone_v)):.2f}", f"{corrected_mv:.2f}"
-    better = (
-        ": without the correction the error on this record is lower" if float(alone) < float(ours) else ""
-    )
-    return f"; the physics alone {alone} mV RMSE{better}"
-
-
-def _beyond_limits_clause(soc: Array) -> str:
-    """A clause, beginning with ': ', on how far a record discharges or charges a cell beyond its limits.  soc : (n,)
-    simulated."""
-    said = []
-    if (low := -float(np.min(soc))) > GIVEN_SD:
-        said.append(f"asks for more charge than the cell has, by {100 * low:.1f} % of its capacity")
-    if (high := float(np.max(soc)) - 1.0) > GIVEN_SD:
-        asks = "starts with" if soc[0] == np.max(soc) else "brings"
-        said.append(f"{asks} more charge than the cell can hold, by {100 * high:.1f} %")
-    return f": the record {' and '.join(said)}" if said else ""
-
-
-def voltage_words(run: Run) -> str:
-    """Range of a run's voltage, '2.5 to 4.1 V'; of one that went on where it ran out, the range until then, and
-    beyond."""
-    voltage, depleted = run.voltage_v, run.series.get("depleted")
-    if depleted is None or not np.any(depleted):
-        return _range_v(voltage)
-    at = int(np.argmax(depleted))
-    until = f"{_range_v(voltage[:at])} until" if at else "no row before"
-    return f"{until} it ran out at {stamp(run.time_s[at])} s, {_range_v(voltage[at:])} beyond, of no cell"
-
-
-def _range_v(voltage_v: Array) -> str:
-    return f"{np.min(voltage_v):.3f} to {np.max(voltage_v):.3f} V"
-
-
-def _first_error_sentences(
-    record: Measurement, prediction: Prediction, model: HybridModel, measured: bool
-) -> list[str]:
-    """A sentence on the error that a free run of a corrected model begins with."""
-    if measured or model.correction is None:
-        return []
-    error_v = float(record.voltage_v[0] - prediction.physics_v[0])
-    if np.isfinite(error_v):
-        side = "below" if error_v < 0.0 else "above"
-        return [
-            f"{record.name}: its first voltage is {MV_PER_V * abs(error_v):.1f} mV {side} the model's; the prediction "
-            "starts with that error."
-        ]
-    words = "the prediction starts with the error that the correction predicts, since no voltage is measured there"
-    return [f"{record.name}: {words}; the band is that of a whole drive from its first row on."]
-
-
-def _exact_start_sentence(
-    record: Measurement, prediction: Prediction, model: HybridModel, soc0: float
-) -> str:
-    """A sentence that a band around a given start does not include an error of the start."""
-    worth_v = model.start_worth_v(record, soc0, TOLD_SD, prediction.physics_v)
-    return (
-        f"{record.name}: the band takes the initial state of charge of {soc0:.4g} as exact; an error of {TOLD_SD:g} in "
-        f"it changes the voltage by {MV_PER_V * rms(worth_v):.1f} mV RMS along this record. --soc0-sd widens the band "
-        "by the uncertainty of the initial state."
-    )
-
-
-def _band_sentences(
-    record: Measurement, prediction: Prediction, model: HybridModel, measured: bool
-) -> list[str]:
-    """Sentences on where the correction is applied, and on the share of rows within its band."""
-    if model.correction is None:
-        empty = ", and lower_v and upper_v are empty" if prediction.nominal is None else ""
-        said = [f"the model carries no learnt correction: one step ahead is the same as a free run{empty}."]
-    else:
-        figures = trained_figures(
-            prediction.outside,
-            prediction.temperature_degc,
-            model.correction,
-            model.visited,
-            prediction.weight,
-        )
-        said = [trained_sentence(record.name, figures, one_step=measured)]
-        if model.correction.fade is not None and model.correction.fade.amplitude == 0.0:
-            said.append("the correction improved no left-out training drive, so that it is applied nowhere.")
-    banded = np.isfinite(prediction.lower_v)
-    if prediction.nominal is not None and np.all(np.isfinite(record.voltage_v)):
-        low, high = prediction.lower_v[banded], prediction.upper_v[banded]
-        inside = _within(record.voltage_v[banded], low, high)
-        said.append(
-            f"{record.name}: the {100 * prediction.nominal:g} % band holds {100 * np.mean(inside):.1f} % of the "
-            f"measured voltage; it is {MV_PER_V * float(np.mean(high - low)):.1f} mV wide in the mean."
-        )
-        if measured:
-            said += _one_step_band_sentences(record, model, ~_within(prediction.voltage_v[banded], low, high))
-    return said
-
-
-def _one_step_band_sentences(record: Measurement, model: HybridModel, apart: BoolArray) -> list[str]:
-    """Sentences on predictions outside a band one step ahead, and on rows further apart than its step.
-
-    apart : True for those of the rows with a band that are predicted outside it.
-    """
-    said = []
-    if np.any(apart):
-        said.append(
-            f"{record.name}: in {_percent(apart)} of the rows voltage_v lies outside its own band, which follows the "
-            "errors of the rows before; the middle of lower_v and upper_v is the better estimate there."
-        )
-    if np.any(gaps := model.after_gap(record.time_s)):
-        said.append(
-            f"{record.name}: {_percent(gaps)} of the rows are more than a step of {model.dt_s:g} s after the one "
-            "before, from which they are predicted; the band is of a step."
-        )
-    return said
-
-
-def _within(voltage_v: Array, lower_v: Array, upper_v: Array) -> BoolArray:
-    """(n,) True where a voltage lies in its band."""
-    return (voltage_v >= lower_v) & (voltage_v <= upper_v)
-
-
-def _percent(rows: BoolArray) -> str:
-    """The share of True rows, '3.2 %'."""
-    share = 100.0 * float(np.mean(rows))
-    return f"{share:.2g} %" if share < 99.5 else "100 %"
 
 
 def with_self_heating(cell: Cell, effects: tuple[ActiveEffect, ...]) -> tuple[ActiveEffect, ...]:

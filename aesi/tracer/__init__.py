@@ -8,10 +8,10 @@ report, decide, search, likelihood, case.
     case/problem           records, cell, and the parameters that hypotheses may move   -> InverseProblem
     decide/model_choice    which model of the cell: single particle or porous electrode
     decide/evidence        searches at several trusts, verdict, and the written model   -> Evidence
-      (decide/beside         the same, where good records are given for comparison)
-      (decide/shared         effects that the good records show too are no difference)
+      (decide/good_records   the same, where good records are given for comparison)
+      (decide/shared_effects effects that the good records show too are no difference)
     search/forward         one search: effects grown, fitted, admitted, one by one      -> Path
-    search/grown           which effects are grown on which hypotheses
+    search/growths         which effects are grown on which hypotheses
     likelihood/growth      adds one effect to a hypothesis, the rest to first order     -> Grown
     likelihood/fit         fits a hypothesis with the whole model                       -> FittedHypothesis
     likelihood/gaussian    log predictive density of left-out data for either           -> PredictiveScore

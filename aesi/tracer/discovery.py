@@ -12,11 +12,11 @@ import numpy as np
 
 from aesi.errors import AesiError, DataError
 from aesi.numerics.metrics import rms
-from aesi.physics.belongs import check_voltage
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Effect
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.initial_state import REST_C_RATE
+from aesi.physics.record_checks import check_voltage
 from aesi.physics.simulation import ModelName
 from aesi.physics.start.temperature import OtherTemperature
 from aesi.records import Hold, Measurement
@@ -25,8 +25,8 @@ from aesi.tracer.case.energies import ACTIVATION_ENERGIES
 from aesi.tracer.case.free_parameter import RECORD_OWNERS, by_owner
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import PreparedRecord, prepare_all, prepare_test
-from aesi.tracer.decide.beside import searched_answer_beside
 from aesi.tracer.decide.evidence import Answer, Evidence, searched_answer
+from aesi.tracer.decide.good_records import searched_answer_beside
 from aesi.tracer.decide.model_choice import ModelChoice, with_model
 from aesi.tracer.decide.temperatures import (
     contradicting_unseen,

@@ -42,7 +42,8 @@ def simulate(
 ) -> None:
     """Simulate the voltage of a cell under a current profile with the physics model alone."""
     outputs.check_table(out, [cell, current, *(effect_file or [])])
-    from aesi.pipeline.simulation import ProfileRequest, simulate_file, voltage_words
+    from aesi.pipeline.simulation import ProfileRequest, simulate_file
+    from aesi.pipeline.simulation_words import voltage_words
 
     asked = ProfileRequest(soc0, hold, reading, self_heating, options.state_of_health(soh), run_on)
     added = options.added_effects(effect, effect_file)

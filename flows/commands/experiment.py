@@ -121,7 +121,8 @@ def compare(
     runs: Annotated[
         list[str],
         typer.Argument(
-            help="Ids of tracked runs, or their beginnings; a name of an experiment takes all its runs."
+            help="Ids of tracked runs, or their beginnings; a name of an experiment takes all its runs, and its "
+            "discoveries in tables of their own."
         ),
     ],
     out: Annotated[Path, typer.Option(help="HTML file to write.")] = Path("compare.html"),
@@ -129,11 +130,12 @@ def compare(
 ) -> None:
     """Compare tracked runs on one HTML page that opens offline: their settings, their figures, maps of their errors."""
     outputs.check_page(out)
+    from aesi.pipeline.report.compare import counted_jobs
     from flows.results.compare import compare as write
 
     _deliver(uri)
     shown = write(runs, out, uri)
-    typer.echo(f"{out}: {len(shown)} runs", err=True)
+    typer.echo(f"{out}: {counted_jobs(shown)}", err=True)
 
 
 def candidate(

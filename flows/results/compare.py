@@ -11,7 +11,7 @@ from typing import Any
 from aesi.errors import InputError
 from aesi.pipeline.report.compare import ComparedRun, write_comparison
 from aesi.pipeline.written import COMPARISON, FINDING
-from flows.tracking.store import Store, beginning
+from flows.tracking.store import Store, beginning, job_of
 from flows.tracking.tracker import was_cut
 
 OF_THE_RESULT = ("chosen_candidate", "chosen_model")
@@ -21,7 +21,8 @@ OF_THE_RESULT = ("chosen_candidate", "chosen_model")
 def compare(wanted: Sequence[str], out: Path, uri: str | None = None) -> list[ComparedRun]:
     """Write the page about the runs that are named; returns what it shows.
 
-    wanted : run ids or their beginnings, or names of experiments for all of their finished runs.
+    wanted : run ids or their beginnings, or names of experiments for all finished runs of the name: also discoveries,
+    batches and benchmarks, which stand in tables of their own.
     Raises InputError where a name stands for nothing that is tracked, or fewer than two runs are left.
     """
     store = Store.to_read(uri)
@@ -64,6 +65,7 @@ def _compared(store: Store, experiment: str, run: Any) -> ComparedRun:
         name=run.info.run_name or experiment,
         experiment=experiment,
         started=datetime.fromtimestamp(run.info.start_time / 1000, UTC).strftime("%Y-%m-%d %H:%M"),
+        job=job_of(run),
         settings={k: v for k, v in run.data.params.items() if k not in OF_THE_RESULT},
         metrics=run.data.metrics,
         chosen=run.data.params.get("chosen_model", ""),

@@ -40,8 +40,8 @@ NUMBER = "aesi.number"
 KIND = "aesi.kind"
 JOB, EXPERIMENT = "aesi.job", "experiment"
 """Tag of a whole run: experiment, discovery, batch or benchmark. Runs of earlier versions have none."""
-OTHER_JOBS = ("cases", "cells")
-"""Parameters of benchmarks and batches, and of no experiment, by which runs of earlier versions are told apart."""
+OTHER_JOBS = {"cases": "benchmark", "cells": "batch"}
+"""Parameter that no experiment has -> the job that has it, by which runs of earlier versions are told apart."""
 REACH_S = 5.0
 """Wait for the answer of a tracking server."""
 PASSING = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EAGAIN, errno.EMFILE)
@@ -56,12 +56,19 @@ def beginning(runs: Sequence[Any], begin: str) -> list[Any]:
     return [run for run in runs if run.info.run_id.startswith(begin)] if len(begin) >= SHORTEST_ID else []
 
 
-def is_of_experiment(run: Any) -> bool:
-    """Whether a whole run is that of an experiment, and no discovery, batch or benchmark of the same name."""
+def job_of(run: Any) -> str:
+    """What a whole run is: experiment, discovery, batch or benchmark, which may be tracked under one name."""
     tags, params = run.data.tags, run.data.params
     if JOB in tags:
-        return bool(tags[JOB] == EXPERIMENT)
-    return "verdict" not in tags and not any(name in params for name in OTHER_JOBS)
+        return str(tags[JOB])
+    if "verdict" in tags:
+        return "discovery"
+    return next((job for name, job in OTHER_JOBS.items() if name in params), EXPERIMENT)
+
+
+def is_of_experiment(run: Any) -> bool:
+    """Whether a whole run is that of an experiment, and no discovery, batch or benchmark of the same name."""
+    return job_of(run) == EXPERIMENT
 
 
 class StoreAway(AesiError):

@@ -29,8 +29,8 @@ from aesi.tracer.case.blocks import blocks_of
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.growth import Grown, Parent
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import base_of
-from aesi.tracer.search.grown import grow_all, growths_on
+from aesi.tracer.search.growths import grow_all, growths_on
+from aesi.tracer.search.hypothesis_fits import base_of
 
 ALIKE: dict[str, tuple[str, ...]] = {
     HG2: ("25degC_mixed1", "25degC_mixed2", "25degC_mixed3"),

@@ -15,9 +15,9 @@ from aesi.data.thinning import Averaged, Runs
 from aesi.errors import DataError
 from aesi.numerics.typing import Array, BoolArray
 from aesi.over_time import stamp
-from aesi.physics.belongs import SOC_MARGIN
 from aesi.physics.cell import Cell
 from aesi.physics.initial_state import InitialState, initial_state
+from aesi.physics.record_checks import SOC_MARGIN
 from aesi.physics.rest.open_circuit import GOOD_READING_V
 from aesi.physics.simulation import ModelName
 from aesi.records import Hold, Measurement, at_its_temperature, hold_sentence

@@ -15,7 +15,14 @@ from aesi.physics.dfn.stepping_kernels import (
     start_metal,
 )
 from aesi.physics.espm.kernels import FASTMATH, ROUND_OFF, compiled, lookup, parts_of, slot_of
-from aesi.physics.espm.transport_kernels import arrhenius, heated, mean_heat, renew_factors, solid_forcing
+from aesi.physics.espm.transport_kernels import (
+    arrhenius,
+    heated,
+    mean_heat,
+    renew_factors,
+    solid_forcing,
+    stepped_temperature,
+)
 
 SHORTER, SHORTEST = 0.25, 0.25**6
 """Factor on a step for whose end no reaction was found, and the smallest share of a step. At the edges of potentials,
@@ -40,9 +47,9 @@ def step_porous_record(  # type: ignore[no-untyped-def]
     salt_profile : (n or 0, nodes) mol/m3, from one collector to the other.
     Returns (sample, what) of the first fault: 1, 2 a surface, 3 the salt, 4 no solution.
     """
-    time, current, temperature = drive.time, drive.current, drive.temperature
+    time, current = drive.time, drive.current
     half = s.at.shape[0] // 2
-    t_k, t_weights, t_rates = temperature[0], -1.0, temperature[0]
+    t_k, t_weights, t_rates = drive.temperature[0], -1.0, drive.temperature[0]
     start_at_rest(p, s, e, state, t, half, theta0, t_k)
     set_rates(e, t, t_k)
     watts, last_dt = 0.0, 0.0
@@ -68,25 +75,12 @@ def step_porous_record(  # type: ignore[no-untyped-def]
             share = (reached + length) / parts
             i1 = current[k] if drive.backward else current[k - 1] + (current[k] - current[k - 1]) * share
             set_currents(t, i1, e.area)
-            start_k, around_k = t_k, e.heat[2]
-            if drive.has_temperature:
-                around_k = temperature[k - 1] + (temperature[k] - temperature[k - 1]) * share
-            if e.heat[0] > 0.0:
-                t_k = heated(start_k, watts, dt, e.heat, around_k)
-            elif drive.has_temperature:
-                t_k = around_k
-            t_weights = renew_factors(
-                t_k, t_weights, TEMPERATURE_STEP_K, e.energies, e.reference_k, t.faster, weights.keys
-            )
+            start_k = t_k
+            t_k, around_k = stepped_temperature(drive, k, share, start_k, watts, dt, e.heat)
             if t_k != t_rates:
                 t_rates = t_k
                 set_rates(e, t, t_k)
-            slot, missing = slot_of(dt, weights.keys)
-            renew_particles(
-                p, state.largest, t.near, t.faster, dt, missing, weights.particle[slot], weights.taken[slot]
-            )
-            if missing:
-                renew_salt(s, t.faster, dt, weights.salt[slot], weights.spread[slot])
+            slot, t_weights = renew_diffusion(p, s, e, state, t, weights, dt, t_k, t_weights)
             if e.has_layers:
                 start_layers(e, state, t, newton, dt)
             if e.plating[0] > 0.0:
@@ -107,11 +101,8 @@ def step_porous_record(  # type: ignore[no-untyped-def]
                 fault_at, fault = k, 4
             if e.heat[0] > 0.0:
                 power = 0.0
-                theta_n, theta_p = mean_surfaces(p, state.theta, half)
-                # Single full or empty units are no fault: their potentials continue beyond [0, 1].
-                if steps > 0 and fault_at < 0 and left_range(theta_n, theta_p, state.c, s.c0) == 0:
-                    voltage = voltage_of(s, e, state, t, phi_n, phi_p, t.total[0])
-                    power = heat_power(p, e, state, half, i1, voltage, t_k)
+                if steps > 0 and fault_at < 0:
+                    power = power_in_range(p, s, e, state, t, half, i1, phi_n, phi_p, t_k)
                 t_k = heated(start_k, mean_heat(watts, power, t.before[0], t.total[0]), dt, e.heat, around_k)
                 watts = power
         voltage = voltage_of(s, e, state, t, phi_n, phi_p, t.total[0])
@@ -134,6 +125,23 @@ def set_currents(t, current, area):  # type: ignore[no-untyped-def]
     t.before[0], t.before[1] = t.total[0], t.total[1]
     t.total[0], t.total[1] = current / area, -current / area
     t.change[0], t.change[1] = t.total[0] - t.before[0], t.total[1] - t.before[1]
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def renew_diffusion(p, s, e, state, t, weights, dt, t_k, t_weights):  # type: ignore[no-untyped-def]
+    """Compute the weights of particles and salt for a step of dt s at t_k where they are not kept; returns their slot
+    and the temperature (K) for which the factors on diffusion now hold.
+    """
+    t_weights = renew_factors(
+        t_k, t_weights, TEMPERATURE_STEP_K, e.energies, e.reference_k, t.faster, weights.keys
+    )
+    slot, missing = slot_of(dt, weights.keys)
+    renew_particles(
+        p, state.largest, t.near, t.faster, dt, missing, weights.particle[slot], weights.taken[slot]
+    )
+    if missing:
+        renew_salt(s, t.faster, dt, weights.salt[slot], weights.spread[slot])
+    return slot, t_weights
 
 
 @compiled
@@ -199,4 +207,17 @@ def heat_power(p, e, state, half, current, voltage, t_k):  # type: ignore[no-unt
         slope = row_lookup(e.entropic, side, state.mean[u])
         level = equilibrium(e.ocp, e.entropic, side, t_k - e.reference_k, state.mean[u])[0]
         power += e.area * state.y[u] * (t_k * slope - level)
+    return power
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def power_in_range(p, s, e, state, t, half, current, phi_n, phi_p, t_k):  # type: ignore[no-untyped-def]
+    """`heat_power` at the end of a step, 0 where an electrode or the salt has left its range. Single full or empty
+    units are no fault: their potentials continue beyond [0, 1].
+    """
+    theta_n, theta_p = mean_surfaces(p, state.theta, half)
+    power = 0.0
+    if left_range(theta_n, theta_p, state.c, s.c0) == 0:
+        voltage = voltage_of(s, e, state, t, phi_n, phi_p, t.total[0])
+        power = heat_power(p, e, state, half, current, voltage, t_k)
     return power

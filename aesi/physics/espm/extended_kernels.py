@@ -32,6 +32,7 @@ from aesi.physics.espm.transport_kernels import (
     renew_factors,
     renew_weights,
     solid_forcing,
+    stepped_temperature,
 )
 
 GAS_OVER_FARADAY = GAS_CONSTANT_J_MOL_K / FARADAY_C_MOL
@@ -48,15 +49,9 @@ def step_extended_record(  # type: ignore[no-untyped-def]
     plated lithium (mol/m3 of the negative electrode, mean).
     Returns (sample, what) of the first fault, see `plain_kernels`.
     """
-    time, current, temperature, area, heat = (
-        drive.time,
-        drive.current,
-        drive.temperature,
-        cell.area,
-        cell.heat,
-    )
+    time, current, area, heat = drive.time, drive.current, cell.area, cell.heat
     rest_particles(theta0, current[0] / area, particles, electrolyte, memory, modes, dissolved)
-    t_k, t_weights = temperature[0], -1.0
+    t_k, t_weights = drive.temperature[0], -1.0
     watts, last_j, last_step = 0.0, current[0] / area, 0.0
     fault_at, fault, voltage = -1, 0, 0.0
     for k in range(time.shape[0]):
@@ -64,7 +59,6 @@ def step_extended_record(  # type: ignore[no-untyped-def]
         parts = parts_of(whole, drive.substep, drive.most, drive.finer) if k > 0 else 1
         dt, slot = whole / parts, 0
         for part in range(parts):
-            end_share = (part + 1.0) / parts
             i0, i1 = ends_of_part(current, k, part, parts, drive.backward)
             j1 = i1 / area
             if k > 0:
@@ -85,12 +79,8 @@ def step_extended_record(  # type: ignore[no-untyped-def]
                 memory.region_salt,
             )
             start_k, around_k = t_k, heat[2]
-            if drive.has_temperature and k > 0:
-                around_k = temperature[k - 1] + (temperature[k] - temperature[k - 1]) * end_share
-            if k > 0 and heat[0] > 0.0:
-                t_k = heated(start_k, watts, dt, heat, around_k)
-            elif drive.has_temperature and k > 0:
-                t_k = around_k
+            if k > 0:
+                t_k, around_k = stepped_temperature(drive, k, (part + 1.0) / parts, start_k, watts, dt, heat)
             set_conductivities(
                 arrhenius(cell.energies[5], t_k, cell.reference_k), electrolyte, memory, dissolved.c
             )

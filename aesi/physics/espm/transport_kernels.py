@@ -178,6 +178,24 @@ def heated(t_k, watts, dt, heat, around_k):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", fastmath=FASTMATH)
+def stepped_temperature(drive, k, share, start_k, watts, dt, heat):  # type: ignore[no-untyped-def]
+    """(temperature at the end of a step of constant heating, or as measured; that of the surroundings), K.
+
+    share : of the way from sample k - 1 to k at the end of the step.  watts : released at its start.
+    """
+    measured, around_k = drive.temperature, heat[2]
+    if drive.has_temperature:
+        around_k = measured[k - 1] + (measured[k] - measured[k - 1]) * share
+    if heat[0] > 0.0:
+        t_k = heated(start_k, watts, dt, heat, around_k)
+    elif drive.has_temperature:
+        t_k = around_k
+    else:
+        t_k = start_k
+    return t_k, around_k
+
+
+@njit(inline="always", fastmath=FASTMATH)
 def renew_factors(t_k, t_weights, within_k, energies, reference_k, faster, keys):  # type: ignore[no-untyped-def]
     """Compute the factors of temperature on diffusion where the temperature has changed by more than `within_k` since
     `t_weights`; returns the temperature (K) for which they now hold.

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from aesi.numerics.typing import Array
-from aesi.physics.belongs import SOC_MARGIN
+from aesi.physics.record_checks import SOC_MARGIN
 from aesi.physics.start.state import InitialState
 from aesi.records import Hold, Measurement
 

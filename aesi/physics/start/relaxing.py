@@ -23,7 +23,7 @@ import numpy as np
 from aesi.constants import SECONDS_PER_HOUR, ZERO_CELSIUS_K
 from aesi.numerics.blocks import block_means
 from aesi.numerics.typing import Array
-from aesi.physics.belongs import ROWS_APART
+from aesi.physics.record_checks import ROWS_APART
 from aesi.physics.rest.open_circuit import OpenCircuit
 from aesi.physics.simulation import ModelName, simulate
 from aesi.physics.start.load import FLOWED_S, HISTORY_C_RATE, OTHER_C_RATES

@@ -17,9 +17,9 @@ from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import AesiError, DataError
 from aesi.numerics.metrics import rms
 from aesi.physics import initial_state, simulate
-from aesi.physics.belongs import check_measured
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.effects.ambient_temperature import depends_on_temperature
+from aesi.physics.record_checks import check_measured
 from aesi.pipeline.discovery.discover import Case
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Measurement

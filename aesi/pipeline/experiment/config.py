@@ -114,6 +114,11 @@ class ExperimentConfig(Section):
                 )
             if self.discover.hold is not None:
                 raise ValueError("discover: the hold of kind: virtual is known; leave out hold")
+        elif self.discover is not None and self.discover.ends_nothing:
+            raise ValueError(
+                "discover.until_s cuts test records, and discover.test names none; name them, or leave out until_s "
+                "(fit_until_s cuts the records of fit)"
+            )
         return self
 
     @model_validator(mode="after")

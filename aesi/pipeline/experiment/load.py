@@ -17,9 +17,9 @@ from aesi.data.resample import DENSE, is_sparse, off_rows, to_even
 from aesi.data.virtual import DEFAULT_MIX
 from aesi.errors import ConfigError, DataAway, DataError, InputError, SimulationError
 from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, simulate
-from aesi.physics.belongs import check_measured
 from aesi.physics.depletion import RUN_ON
 from aesi.physics.effects import activated
+from aesi.physics.record_checks import check_measured
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.drives import by_role, cut_short, training_drives
 from aesi.pipeline.experiment.left_out import TrainingDrives, series_under

@@ -479,7 +479,7 @@ class DiscoverConfig(Section):
     test : held-out records; a record that is in `fit` as well is tested on the part after `fit_until_s`.
     good : known-good records of the cell; the search is then for what differs in the records of `fit`.
     fit_until_s : s, time up to which a record of `fit` is fitted, as `{record: time}`.
-    until_s : s, time up to which every test record is used; those of kind `virtual`, too.
+    until_s : s, time up to which every record of `test` is used, or every test record of kind `virtual`.
     holdout : share of each record, at its end, that is held out if there are no test records; None takes 0.3.
     hold : current between rows, `backward` or `linear` (known with `data.kind: virtual`). None takes `data.hold` if the
     file gives it, else `backward` for a record with rows more than 5 s apart and `linear` for others.
@@ -499,6 +499,11 @@ class DiscoverConfig(Section):
     def listed(self) -> tuple[str, ...]:
         """All records that the section names, in any role."""
         return *self.fit, *self.test, *self.good
+
+    @property
+    def ends_nothing(self) -> bool:
+        """Whether `until_s` is given and `test` names no record that it ends; virtual records are not named."""
+        return self.until_s is not None and not self.test
 
     @model_validator(mode="after")
     def _cuts_what_is_there(self) -> DiscoverConfig:

@@ -6,7 +6,7 @@ from os import PathLike
 from pathlib import Path
 
 from aesi.physics import Cell
-from aesi.physics.belongs import check_measured
+from aesi.physics.record_checks import check_measured
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Measurement
 

@@ -22,10 +22,10 @@ from aesi.numerics.typing import Array, BoolArray, Numbers
 from aesi.numerics.visited import Visited
 from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
 from aesi.physics.arguments import check_cell, check_choice, check_soc, checked_effects
-from aesi.physics.belongs import check_voltage
 from aesi.physics.cell import Soh
 from aesi.physics.depletion import RUN_ON
 from aesi.physics.effects import active_effect, saved_effect
+from aesi.physics.record_checks import check_voltage
 from aesi.pipeline.product.deviations import PhysicsVariant, slopes_v, start_v
 from aesi.pipeline.product.error_series import error_series
 from aesi.pipeline.product.model_folder import part_file, read_model, write_model

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,11 +32,20 @@ COLUMNS = {
     "seconds": "fit and evaluation, s",
 }
 """MLflow's name of a metric -> heading; a column is shown where a run has it, in mV where it is tracked in V."""
+MACHINE = "system/"
+"""Beginning of MLflow's names for what the machine did meanwhile."""
 MSER = "MSER: by how much it lowers the mean squared error of the declared model, and of that model recalibrated."
 RANGES = (
     "Ranges below a figure: 90 % over resampled blocks of 60 s of the test records; they say how much the test itself "
     "scatters, not how much another seed would."
 )
+JOB_WORDS = {
+    "experiment": ("run", "runs"),
+    "discovery": ("discovery", "discoveries"),
+    "batch": ("batch", "batches"),
+    "benchmark": ("benchmark", "benchmarks"),
+}
+"""Kind of a tracked run -> what one is called, and what several are, in the order of the page."""
 MOST_COLUMNS = 40
 """Most runs that are shown side by side; more are summed up in one column."""
 
@@ -46,7 +55,7 @@ class ComparedRun:
     """One tracked run.
 
     settings : dotted key -> text.  metrics : by MLflow's names.  chosen : the model that a search ended with.
-    judged_on : the same text for runs whose errors are of the same test records at the same step.
+    judged_on : the same text for runs whose errors are of the same test records at the same step.  job : see JOB_WORDS.
     comparison : see `aesi.pipeline.experiment.comparison`.  discovery : content of discovery.json.
     """
 
@@ -61,6 +70,7 @@ class ComparedRun:
     tags: Mapping[str, str] = field(default_factory=dict)
     comparison: Mapping[str, Any] = field(default_factory=dict)
     discovery: Mapping[str, Any] = field(default_factory=dict)
+    job: str = "experiment"
 
     @property
     def label(self) -> str:
@@ -89,7 +99,7 @@ class PageTable:
 
 
 def write_comparison(path: Path, runs: Sequence[ComparedRun]) -> Path:
-    """Write the page; runs keep their order."""
+    """Write the page, with tables of their own for each kind of run; runs of a kind keep their order."""
     maps = [
         (f"{run.label}: {model}", content)
         for run in runs
@@ -101,14 +111,51 @@ def write_comparison(path: Path, runs: Sequence[ComparedRun]) -> Path:
         "compare.html",
         payload={"limit": limit, "maps": [content["mean_mv"] for _, content in maps]},
         scripts={"compare_js": "compare.js"},
-        title=f"{len(runs)} runs compared",
+        title=f"{counted_jobs(runs)} compared",
         heading=_finding(runs),
-        what=f"{len(runs)} runs",
+        what=counted_jobs(runs),
         experiments=list(dict.fromkeys(run.experiment for run in runs)),
-        tables=[table for make in TABLES if (table := make(runs)) is not None],
+        tables=_tables(runs),
         maps=[{"label": label, "range": _range_of(content)} for label, content in maps],
         limit_mv=limit,
     )
+
+
+def counted_jobs(runs: Sequence[ComparedRun]) -> str:
+    """How many there are of each kind, such as `3 runs, 1 discovery`."""
+    kinds = _by_job(runs)
+    return ", ".join(f"{len(alike)} {_called(job, len(alike))}" for job, alike in kinds.items())
+
+
+def _by_job(runs: Sequence[ComparedRun]) -> dict[str, list[ComparedRun]]:
+    """Kind -> its runs, of the kinds that there are."""
+    kinds: dict[str, list[ComparedRun]] = {job: [] for job in JOB_WORDS}
+    for run in runs:
+        kinds.setdefault(run.job, []).append(run)
+    return {job: alike for job, alike in kinds.items() if alike}
+
+
+def _called(job: str, count: int) -> str:
+    """What so many runs of a kind are called; a kind of a later version goes by its own name."""
+    one, several = JOB_WORDS.get(job, (job, job))
+    return one if count == 1 else several
+
+
+def _tables(runs: Sequence[ComparedRun]) -> list[PageTable]:
+    """The tables of each kind of run, as the kinds differ in settings and figures; of several kinds the titles say
+    which.
+    """
+    kinds = _by_job(runs)
+    tables = []
+    for job, alike in kinds.items():
+        of_kind = [table for make in TABLES if (table := make(alike)) is not None]
+        if len(kinds) > 1:
+            of_kind = [
+                replace(table, key=f"{job}-{table.key}", title=f"{table.title}: {_called(job, 2)}")
+                for table in of_kind
+            ]
+        tables += of_kind
+    return tables
 
 
 def differing_settings(runs: Sequence[ComparedRun]) -> list[str]:
@@ -120,7 +167,7 @@ def differing_settings(runs: Sequence[ComparedRun]) -> list[str]:
 def _finding(runs: Sequence[ComparedRun]) -> str:
     """A sentence on the runs: which errs least in free run, whether a correction helped, and the verdicts."""
     sentences = (_least(runs), _worse_than_declared(runs), _verdict_counts(runs))
-    return " ".join(filter(None, sentences)) or f"{len(runs)} runs compared."
+    return " ".join(filter(None, sentences)) or f"{counted_jobs(runs)} compared."
 
 
 def _least(runs: Sequence[ComparedRun]) -> str:
@@ -170,7 +217,9 @@ def _verdict_counts(runs: Sequence[ComparedRun]) -> str:
 
 
 def _settings(runs: Sequence[ComparedRun]) -> PageTable | None:
-    """The settings that differ, a run a row."""
+    """The settings that differ, a run a row; None for a single run."""
+    if len(runs) < 2:
+        return None
     keys = differing_settings(runs)
     shared = len({key for run in runs for key in run.settings}) - len(keys)
     return PageTable(
@@ -192,9 +241,13 @@ def _settings(runs: Sequence[ComparedRun]) -> PageTable | None:
 
 
 def _metrics(runs: Sequence[ComparedRun]) -> PageTable | None:
-    """The figures of COLUMNS on test records, a run a row."""
-    names = [name for name in COLUMNS if any(name in run.metrics for run in runs)]
+    """The figures of COLUMNS on test records, a run a row; without any (batches, benchmarks) all that were tracked."""
+    tracked = {name for run in runs for name in run.metrics if not name.startswith(MACHINE)}
+    on_test = [name for name in COLUMNS if name in tracked]
+    names = on_test or sorted(tracked)
     chosen = ("model",) if any(run.chosen for run in runs) else ()
+    if not names and not chosen:
+        return None
     rows = tuple(
         (
             ComparedCell(run.label),
@@ -204,25 +257,27 @@ def _metrics(runs: Sequence[ComparedRun]) -> PageTable | None:
         for run in runs
     )
     whose = "On test records" if _judged_alike(runs) else "On the test records of each run, which differ"
-    captions = [f"{whose}, of the model that a run chose." if chosen else f"{whose}."]
+    captions = []
+    if on_test:
+        captions.append(f"{whose}, of the model that a run chose." if chosen else f"{whose}.")
     if any("_mser_" in name for name in names):
         captions.append(MSER)
     if any(cell.range for row in rows for cell in row):
         captions.append(RANGES)
     captions.append("A click on a heading sorts.")
-    header = ("run", *chosen, *(COLUMNS[name] for name in names))
+    header = ("run", *chosen, *(COLUMNS.get(name, name) for name in names))
     return PageTable("metrics", "What came of it", " ".join(captions), header, rows)
 
 
 def _figure(run: ComparedRun, name: str) -> ComparedCell:
-    """The cell of a metric, in mV where it is tracked in V, with its 90 % range in free run."""
+    """The cell of a metric, of COLUMNS in mV where it is tracked in V, with its 90 % range in free run."""
     value = run.metrics.get(name)
     if value is None:
         return ComparedCell(ABSENT)
     regime, _, figure = name.partition("/")
     known = run.comparison.get("intervals", {}).get(run.chosen, {}) if regime == "free_run" else {}
     ends = known.get(figure)
-    if name.endswith("_v"):
+    if name in COLUMNS and name.endswith("_v"):
         value *= MV_PER_V
     return ComparedCell(_text(value), value, f"{_text(ends[0])} to {_text(ends[1])}" if ends else "")
 

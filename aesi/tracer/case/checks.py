@@ -8,9 +8,9 @@ import numpy as np
 
 from aesi.errors import AesiError, DataError
 from aesi.numerics.typing import Array
-from aesi.physics.belongs import SOC_MARGIN
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect
+from aesi.physics.record_checks import SOC_MARGIN
 from aesi.records import Run
 from aesi.records.checked import row_words
 from aesi.tracer.case.blocks import BLOCKS

@@ -20,7 +20,7 @@ from aesi.tracer.case.problem import INDEPENDENT_CHARGE, InverseProblem
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.model_error import MEASURED_V, MOST_MEASURED_V
 from aesi.tracer.likelihood.model_state import ModelState
-from aesi.tracer.search.fitted import values_without
+from aesi.tracer.search.hypothesis_fits import values_without
 
 ORDINARY_C = (1.0, -0.5)
 FAST_C = (2.0, 3.0)

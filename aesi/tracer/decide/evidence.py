@@ -33,8 +33,8 @@ from aesi.tracer.decide.verdict import (
 )
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import base_of
 from aesi.tracer.search.forward import forward_search, refitted
+from aesi.tracer.search.hypothesis_fits import base_of
 from aesi.tracer.search.path import Path, Report
 from aesi.tracer.search.plausible import most_plausible, plausibility
 from aesi.tracer.search.wrong_parameters import beyond_spread, with_wrong_parameters

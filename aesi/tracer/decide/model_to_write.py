@@ -12,7 +12,7 @@ from aesi.tracer.case.blocks import Blocks, blocks_of
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.trust import MEASURED_CELL, Trust
 from aesi.tracer.decide.carry_over import FAST_C, ORDINARY_C, LeftOut, left_out_errors, range_fault
-from aesi.tracer.decide.in_use import predicted_share_in_use
+from aesi.tracer.decide.prediction_in_use import predicted_share_in_use
 from aesi.tracer.decide.verdict import PREDICTED_SHARE, predicted_share
 from aesi.tracer.likelihood.fit import FittedHypothesis, scored
 from aesi.tracer.likelihood.gaussian import Linearised, bounds_of_own

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import fitted_hypothesis
+from aesi.tracer.search.hypothesis_fits import fitted_hypothesis
 from aesi.tracer.search.path import Path, Step
 from aesi.tracer.search.plausible import most_plausible
 

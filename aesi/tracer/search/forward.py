@@ -18,8 +18,13 @@ from aesi.tracer.likelihood.fit import FittedHypothesis, held_out_residual
 from aesi.tracer.likelihood.growth import EffectGrowth, Explanation, Grown, Parent
 from aesi.tracer.likelihood.surrogates import admission_nats
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import base_of, fitted_hypothesis, linearised_as_declared, refitted_off_bounds
-from aesi.tracer.search.grown import grow_all, growths_on, promising_first
+from aesi.tracer.search.growths import grow_all, growths_on, promising_first
+from aesi.tracer.search.hypothesis_fits import (
+    base_of,
+    fitted_hypothesis,
+    linearised_as_declared,
+    refitted_off_bounds,
+)
 from aesi.tracer.search.path import Path, Report, Step, excess_mean_square_v2, unseen_rmse_v
 from aesi.tracer.search.plausible import most_plausible, plausibility
 from aesi.tracer.search.reach import REACH_FACTOR, reach_check

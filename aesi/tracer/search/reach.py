@@ -13,7 +13,7 @@ from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.growth import EffectGrowth
 from aesi.tracer.search.archive import Archive, fit_name
-from aesi.tracer.search.grown import grow_all
+from aesi.tracer.search.growths import grow_all
 
 REACH_FACTOR = 2.0
 """Factor on the error that a right hypothesis may leave. Each effect has columns: the changes of voltage that it can

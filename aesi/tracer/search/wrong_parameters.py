@@ -11,8 +11,8 @@ from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.surrogates import FAMILY_WISE
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import fitted_hypothesis
 from aesi.tracer.search.forward import without_unneeded
+from aesi.tracer.search.hypothesis_fits import fitted_hypothesis
 from aesi.tracer.search.path import Path, Step
 from aesi.tracer.search.plausible import ALIKE_NATS, most_plausible
 

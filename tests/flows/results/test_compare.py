@@ -10,7 +10,7 @@ from aesi.errors import InputError
 from aesi.pipeline.report.compare import ComparedRun, differing_settings, write_comparison
 from flows.jobs.experiment import _uri_option
 from flows.results.compare import _judged_on, compare
-from flows.tracking.store import KIND, Store
+from flows.tracking.store import JOB, KIND, Store
 from flows.tracking.tracker import _texts
 from flows.tracking.whole_run import insert_run
 
@@ -128,6 +128,49 @@ def test_the_model_that_a_search_ended_with_is_no_setting(tracked):
     assert [run.chosen for run in shown] == ["ESPM + AESI I", "ESPM + AESI II"]
 
 
+@pytest.mark.parametrize("earlier", [False, True], ids=["now", "by an earlier version"])
+def test_runs_and_discoveries_of_one_name_stood_in_one_table(call, tracked, earlier):
+    store = Store()
+    asked = [
+        ("experiment", {"seed": 0, "data.dt_s": 1.0}, {"free_run/test_rmse_mv": 2.0}, {}),
+        ("discovery", {"seed": 3, "holdout": 0.3}, {"after/test_rmse_mv": 7.0}, {"verdict": "none"}),
+        ("experiment", {"seed": 1, "data.dt_s": 1.0}, {"free_run/test_rmse_mv": 4.0}, {}),
+        ("benchmark", {"seed": 0, "cases": 25}, {"right": 20.0}, {}),
+    ]
+    for job, settings, metrics, tags in asked:
+        noted = {KIND: "run", **tags, **({} if earlier else {JOB: job})}
+        run_id = store.create_run(store.experiment("both"), job, noted)
+        for name, value in settings.items():
+            store.client.log_param(run_id, name, value)
+        for name, value in metrics.items():
+            store.client.log_metric(run_id, name, value)
+        if "verdict" in tags:
+            found = {"verdict": tags["verdict"], "effects": [], "candidates": []}
+            store.client.log_dict(run_id, found, "discovery.json")
+        store.client.set_terminated(run_id)
+    code, _, err = call("compare", "both", "--out", tracked / "page.html")
+    assert (code, err.strip().endswith("page.html: 2 runs, 1 discovery, 1 benchmark")) == (0, True)
+    html = (tracked / "page.html").read_text()
+    tables = dict(re.findall(r'<section id="([^"]+)">(.*?)</section>', html, re.DOTALL))
+    assert list(tables) == [
+        "experiment-metrics",
+        "experiment-settings",
+        "discovery-metrics",
+        "discovery-verdicts",
+        "benchmark-metrics",
+    ]
+    assert '<th scope="col">right</th>' in tables["benchmark-metrics"]
+    assert "test records" not in tables["benchmark-metrics"]
+    assert "<h2>What was different: runs</h2>" in tables["experiment-settings"]
+    assert "Only the settings that differ; 1 are the same in all." in tables["experiment-settings"]
+    for key, own, other in (
+        ("experiment", "RMSE, free run, mV", "as written"),
+        ("discovery", "as written", "RMSE"),
+    ):
+        assert own in tables[f"{key}-metrics"]
+        assert other not in tables[f"{key}-metrics"]
+
+
 def test_the_page_needs_nothing_from_elsewhere(tmp_path):
     html = write_comparison(tmp_path / "page.html", [run_of(1), run_of(2)]).read_text()
     assert not re.search(r'(src|href)="(?!data:)', html)
@@ -144,7 +187,9 @@ def test_a_discovery_shows_its_verdict_and_parameters(tmp_path):
     }
     runs = [
         run_of(1),
-        ComparedRun("ab" * 16, "trace", "discover", "now", {}, {"confidence": 0.97}, discovery=found),
+        ComparedRun(
+            "ab" * 16, "trace", "discover", "now", {}, {"confidence": 0.97}, discovery=found, job="discovery"
+        ),
     ]
     html = write_comparison(tmp_path / "page.html", runs).read_text()
     assert "series_resistance.resistance_ohm" in html

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import DataError, InputError
 from aesi.physics import Cell, initial_state, simulate
-from aesi.physics.belongs import SOC_MARGIN
 from aesi.physics.cell.relations import LookupTable
 from aesi.physics.effect import Effect, Record, as_cell_saw
 from aesi.physics.effects import CATALOGUE
+from aesi.physics.record_checks import SOC_MARGIN
 from aesi.physics.rest.open_circuit import GOOD_READING_V, READING_V, OpenCircuit
 from aesi.physics.start.charge import truncated_by_charge
 from aesi.physics.start.state import InitialState

@@ -9,8 +9,8 @@ import pytest
 
 import aesi
 from aesi.errors import DataError
-from aesi.physics.belongs import check_measured
 from aesi.physics.effects import CATALOGUE
+from aesi.physics.record_checks import check_measured
 from aesi.pipeline.calibrate import start_at_size
 from aesi.pipeline.discovery import cold
 from aesi.pipeline.discovery.cases import case_of_files

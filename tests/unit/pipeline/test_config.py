@@ -136,6 +136,10 @@ def test_an_inadmissible_value_is_named(changes, words):
             "fit_until_s cuts a, which is not in fit",
         ),
         (
+            {"discover": {"fit": ["a.csv"], "until_s": 60}},
+            "discover.until_s cuts test records, and discover.test names none; name them, or leave out until_s",
+        ),
+        (
             {"data": FILES | {"from_s": {"c.csv": 60}}},
             "data.from_s cuts c.csv, which is no record here; there are: a",
         ),

@@ -22,13 +22,8 @@ from aesi.pipeline.export import export
 from aesi.pipeline.product.error_series import error_series
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.product.model_folder import SCHEMA
-from aesi.pipeline.simulation import (
-    ProfileRequest,
-    predict_file,
-    simulate_file,
-    simulated_record_sentences,
-    voltage_words,
-)
+from aesi.pipeline.simulation import ProfileRequest, predict_file, simulate_file
+from aesi.pipeline.simulation_words import simulated_record_sentences, voltage_words
 from aesi.records import Run
 from aesi.sparse import SparseModel
 from aesi.sparse.fade import Fade

@@ -11,12 +11,12 @@ from aesi.physics.effects import CATALOGUE
 from aesi.tracer import discover
 from aesi.tracer.case.free_parameter import acting_on, shared_owner
 from aesi.tracer.case.problem import BESIDE_TIMES
-from aesi.tracer.decide.beside import checked_against_ageing, error_beyond_noise_v, verdict_beside
-from aesi.tracer.decide.shared import in_all_records
+from aesi.tracer.decide.good_records import checked_against_ageing, error_beyond_noise_v, verdict_beside
+from aesi.tracer.decide.shared_effects import in_all_records
 from aesi.tracer.decide.verdict import Thresholds, Verdict
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.search.archive import context_of
-from aesi.tracer.search.grown import addable
+from aesi.tracer.search.growths import addable
 from aesi.tracer.search.plausible import score_lag
 
 OFFSET_V = 8e-3
@@ -195,7 +195,7 @@ def test_without_good_records_nothing_is_told_apart(cell, tried, make):
 
 def test_the_noise_of_one_kind_of_record_was_taken_off_the_error_of_the_other(monkeypatch):
     rows, residual_v = np.array([True, True, False, False]), np.array([5e-3, -5e-3, 13e-3, -13e-3])
-    monkeypatch.setattr("aesi.tracer.decide.beside.held_out_residual", lambda blocks, one: residual_v)
+    monkeypatch.setattr("aesi.tracer.decide.good_records.held_out_residual", lambda blocks, one: residual_v)
     problem = SimpleNamespace(white_v=np.array([3e-3, 3e-3, 5e-3, 5e-3]), noise_v=np.sqrt(17.0) * 1e-3)
     path = SimpleNamespace(blocks=None, problem=problem)
     assert [error_beyond_noise_v(path, None, kind) for kind in (rows, ~rows)] == pytest.approx([4e-3, 12e-3])
@@ -226,10 +226,10 @@ def test_what_leaves_more_than_the_good_records_has_to_say_it_at_that_error(monk
     )
     left = {base: 16e-3, chosen: 8e-3}
     monkeypatch.setattr(
-        "aesi.tracer.decide.beside.error_beyond_noise_v",
+        "aesi.tracer.decide.good_records.error_beyond_noise_v",
         lambda path, one, rows: 4e-3 if rows[0] else left[one],
     )
-    monkeypatch.setattr("aesi.tracer.decide.beside.look_alikes", lambda *given: ((), 1.0))
+    monkeypatch.setattr("aesi.tracer.decide.good_records.look_alikes", lambda *given: ((), 1.0))
     verdict = verdict_beside(path, Thresholds())
     assert (verdict.word, verdict.effects) == ("unknown", named)
     assert verdict.structured_v == (8e-3 if named else 16e-3)

@@ -49,8 +49,8 @@ from aesi.tracer.likelihood.model_error import MEASURED_V, PRIORS
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.likelihood.surrogates import FAMILY_WISE, admission_nats, largest_gains
 from aesi.tracer.search.archive import Archive, context_of, identity
-from aesi.tracer.search.fitted import base_of, fitted_hypothesis, values_without
 from aesi.tracer.search.forward import forward_search
+from aesi.tracer.search.hypothesis_fits import base_of, fitted_hypothesis, values_without
 from aesi.tracer.search.path import Path, Step
 from aesi.tracer.search.wrong_parameters import beyond_spread, with_wrong_parameters, wrong_sds
 

@@ -16,7 +16,7 @@ from aesi.tracer.likelihood.model_error import MEASURED_V, PRIORS, Size, SplitTa
 from aesi.tracer.likelihood.size_sums import SizeSums
 from aesi.tracer.likelihood.surrogates import _whitened_surrogates
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import base_of, fitted_hypothesis
+from aesi.tracer.search.hypothesis_fits import base_of, fitted_hypothesis
 
 SIZE = Size(9e-3, 3e-3)
 

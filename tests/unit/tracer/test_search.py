@@ -12,11 +12,11 @@ from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, effect_parameters
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.growth import EffectGrowth, Parent
 from aesi.tracer.likelihood.model_error import PRIORS, Size
-from aesi.tracer.search import grown, reach
+from aesi.tracer.search import growths, reach
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import MOVED_SDS, base_of, fitted_hypothesis, linearised_as_declared
 from aesi.tracer.search.forward import FINALISTS, admissible, forward_search, needed
-from aesi.tracer.search.grown import PROMISING, growths_on, most_promising, promising_first
+from aesi.tracer.search.growths import PROMISING, growths_on, most_promising, promising_first
+from aesi.tracer.search.hypothesis_fits import MOVED_SDS, base_of, fitted_hypothesis, linearised_as_declared
 from aesi.tracer.search.plausible import ALIKE_NATS, most_plausible
 from aesi.tracer.search.reach import REACH_FACTOR, least_error_v
 
@@ -236,18 +236,18 @@ def test_with_the_other_model_what_says_most_with_either_is_grown(monkeypatch):
     said = {name: 10.0 - k for k, name in enumerate(names)}
     promised = dict.fromkeys(names, 0.0) | {names[-1]: 50.0}  # by this model alone
     simulated = set(names) - {names[-2]}
-    monkeypatch.setattr(grown, "_key", lambda parent, name, what: name)
+    monkeypatch.setattr(growths, "_key", lambda parent, name, what: name)
     monkeypatch.setattr(
-        grown,
+        growths,
         "_first_slopes",
-        lambda growths: {n: np.array([[promised[n]]]) for n in growths if n in simulated},
+        lambda offered: {n: np.array([[promised[n]]]) for n in offered if n in simulated},
     )
-    monkeypatch.setattr(grown, "expected_score", lambda parent, slopes_v: slopes_v[0, 0])
+    monkeypatch.setattr(growths, "expected_score", lambda parent, slopes_v: slopes_v[0, 0])
     parent = SimpleNamespace(fit=SimpleNamespace(score=SimpleNamespace(total=0.0)))
-    growths = [SimpleNamespace(parent=parent, effect=name) for name in names]
-    kept, slopes = promising_first(growths, SimpleNamespace(near=lambda name, size: np.array([said[name]])))
+    offered = [SimpleNamespace(parent=parent, effect=name) for name in names]
+    kept, slopes = promising_first(offered, SimpleNamespace(near=lambda name, size: np.array([said[name]])))
     # What cannot be simulated is grown, too, so that it is told of.
     assert {g.effect for g in kept} == {*names[: PROMISING - 2], *names[-2:]}
     assert set(slopes) == set(names[PROMISING - 2 : -2])
-    alone, none = promising_first(growths, SimpleNamespace(near=lambda name, size: None))
-    assert (alone, none) == (growths, {})
+    alone, none = promising_first(offered, SimpleNamespace(near=lambda name, size: None))
+    assert (alone, none) == (offered, {})

@@ -14,13 +14,13 @@ from aesi.tracer.case.problem import SHARE_SD, InverseProblem, record_capacity_s
 from aesi.tracer.case.records import prepare_all, prepare_test
 from aesi.tracer.decide.carry_over import LeftOut
 from aesi.tracer.decide.evidence import of_several_ages
-from aesi.tracer.decide.in_use import predicted_share_in_use
 from aesi.tracer.decide.model_to_write import Option
+from aesi.tracer.decide.prediction_in_use import predicted_share_in_use
 from aesi.tracer.likelihood.model_error import MEASURED_V
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.report.own_parameters import ages_told, own_parameters
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import base_of, values_without
+from aesi.tracer.search.hypothesis_fits import base_of, values_without
 
 
 @pytest.fixture(scope="module")

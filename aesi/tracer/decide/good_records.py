@@ -21,14 +21,14 @@ from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.decide.carry_over import ORDINARY_C, range_fault
 from aesi.tracer.decide.evidence import MEASURED_EFFECTS, Answer, Evidence, with_confidence
 from aesi.tracer.decide.model_to_write import fast_load_limits
-from aesi.tracer.decide.shared import searched_unshared
+from aesi.tracer.decide.shared_effects import searched_unshared
 from aesi.tracer.decide.verdict import Thresholds, Verdict, best_gain, beyond_noise, look_alikes, tolerance_v
 from aesi.tracer.likelihood.fit import FittedHypothesis, held_out_residual
 from aesi.tracer.likelihood.growth import Explanation, Parent
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import fitted_hypothesis
-from aesi.tracer.search.grown import grown_with
+from aesi.tracer.search.growths import grown_with
+from aesi.tracer.search.hypothesis_fits import fitted_hypothesis
 from aesi.tracer.search.path import Path, Report
 from aesi.tracer.search.plausible import alike, score_lag, sds_behind
 from aesi.tracer.search.wrong_parameters import NINETY_SDS

@@ -13,8 +13,8 @@ from aesi.parameters import Parameter, Spread
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.trust import own_sd
 from aesi.tracer.search.archive import Archive, context_of
-from aesi.tracer.search.fitted import base_of
 from aesi.tracer.search.forward import forward_search
+from aesi.tracer.search.hypothesis_fits import base_of
 from aesi.tracer.search.path import Path, Report
 from aesi.tracer.search.plausible import most_plausible
 

@@ -8,7 +8,12 @@ import pytest
 
 import aesi
 from aesi.errors import DataError
-from aesi.physics.belongs import capacity_bounds, check_belongs, check_measured, other_materials_sentence
+from aesi.physics.record_checks import (
+    capacity_bounds,
+    check_belongs,
+    check_measured,
+    other_materials_sentence,
+)
 from aesi.records import Measurement
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
