@@ -293,11 +293,6 @@ class InverseProblem:
         return np.asarray(there - here)
 
     @cached_property
-    def declared_residual_v(self) -> Array:
-        """(n,) V, measured - the declared model."""
-        return np.asarray(self.measured - np.concatenate([run.voltage_v for run in self._declared]))
-
-    @cached_property
     def declared_soc(self) -> Array:
         """(n,) state of charge in the declared model, by coulomb counting."""
         return np.concatenate([run.series["soc"] for run in self._declared])

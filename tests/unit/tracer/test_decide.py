@@ -27,7 +27,6 @@ from aesi.tracer.decide.model_to_write import (
     Option,
     carries_best,
     model_to_write,
-    score_to_carry,
     stand_in_notes,
     why_not_refit,
 )
@@ -43,10 +42,11 @@ from aesi.tracer.decide.verdict import (
     unexplained_v,
     verdict_on,
 )
-from aesi.tracer.likelihood.fit import prediction_sd_v, scored
+from aesi.tracer.likelihood.fit import point_score_at_size, prediction_sd_v, scored
 from aesi.tracer.likelihood.growth import Parent
-from aesi.tracer.likelihood.model_error import MEASURED_V, PRIORS
+from aesi.tracer.likelihood.model_error import MEASURED_V, PRIORS, SplitTable
 from aesi.tracer.likelihood.model_state import ModelState
+from aesi.tracer.likelihood.size_sums import SizeSums
 from aesi.tracer.likelihood.surrogates import FAMILY_WISE, admission_nats, largest_gains
 from aesi.tracer.search.archive import Archive, context_of, identity
 from aesi.tracer.search.forward import forward_search
@@ -240,11 +240,12 @@ def test_at_one_current_there_are_no_ranges_of_it_and_own_parameters_are_not_wri
     held = replace(one, trust="measured")
     assert Option.of(held, blocks, base_of(held, blocks_of(held), archive)).tested(declared.usual_error_v)
     moved = Option.of(one, blocks, base)
-    declared = replace(declared, left_out=LeftOut((1.0,), (1.0,)), score=moved.score - 9.0)
+    declared = replace(declared, left_out=LeftOut((1.0,), (1.0,), moved.left_out.nats - 9.0))
     assert model_to_write(declared, [moved])[0] is declared.state
     assert why_not_refit(declared, [moved], [moved], declared.state) == f"the recalibrated model: {UNTESTED}"
     assert why_not_refit(declared, [moved], [moved], moved.state) is None
-    third = replace(declared, state=replace(declared.state), score=declared.score + 5.0)
+    better = replace(declared.left_out, nats=declared.left_out.nats + 5.0)
+    third = replace(declared, state=replace(declared.state), left_out=better)
     why = why_not_refit(declared, [moved], [moved, third], third.state)  # it was written without a reason
     assert why.startswith(f"the recalibrated model: {UNTESTED}; model/ holds another fit of its parameters")
     assert "predicts left-out data better than the declared model by 5.0 nats" in why
@@ -306,9 +307,11 @@ def test_harm_counts_as_far_as_the_start_of_a_record_left_out_is_known(cell, few
     shares = 1.0 / (1.0 + (worth_v / MEASURED_V) ** 2)
     ratios = np.square(told.by_range) / np.square(known.by_range)
     assert shares.min() < ratios.min() < ratios.max() < shares.max() < 0.9
-    assert (
-        left(0.02, prepared[:1])[1] == left(1e-6, prepared[:1])[1]
-    )  # begins where the rest of its record ends
+    unsure, known = (
+        left(0.02, prepared[:1])[1],
+        left(1e-6, prepared[:1])[1],
+    )  # begins where its record's rest ends
+    assert (unsure.by_record, unsure.by_range) == (known.by_record, known.by_range)
 
 
 def test_models_are_held_against_each_other_on_all_rows_where_a_lag_shows(cell, few):
@@ -337,16 +340,17 @@ def test_a_hypothesis_is_put_where_the_data_without_a_part_put_it(path):
 
 
 def test_the_model_that_predicts_left_out_data_best_is_written(path):
-    def option(score, left_mv=5.0):
+    def option(nats, left_mv=5.0):
         left_v = (1e-3 * left_mv,)
-        return Option(ModelState(path.problem), LeftOut(left_v, left_v), score)
+        return Option(ModelState(path.problem), LeftOut(left_v, left_v, nats))
 
     declared, refit, wide = option(40.0), option(43.0), option(42.0)
     assert carries_best([declared, refit, wide]) is refit
     assert model_to_write(declared, [wide, refit])[0] is refit.state
     assert model_to_write(option(43.5), [wide, refit])[0] is not refit.state
-    assert carries_best([option(1.0, np.inf), declared]) is declared
-    harmful = option(50.0, np.inf)  # cannot be simulated on a left-out record
+    nowhere = option(-np.inf, np.inf)
+    assert carries_best([nowhere, declared]) is declared
+    harmful = option(50.0, np.inf)
     assert model_to_write(declared, [harmful, wide])[0] is wide.state
     state, why = model_to_write(declared, [refit], [option(41.0)])
     assert state is refit.state
@@ -356,32 +360,51 @@ def test_the_model_that_predicts_left_out_data_best_is_written(path):
     assert model_to_write(declared, [refit], [named, option(43.5)]) == (named.state, None)
 
 
-def test_models_are_scored_alike_whatever_trust_they_were_fitted_at(cell, few, make, archive):
+def test_left_out_records_have_the_density_that_the_linear_model_gives_them(cell, few, make, archive):
+    lost = CATALOGUE["series_resistance"].activate(resistance_ohm=5e-4)
+    records = prepare_all(cell, [make((lost,)), make((lost,), seed=2)], 0.9, 0.0)
+    measured = replace(InverseProblem(cell, records, few), trust="measured")
+    fit, blocks = base_of(measured, blocks_of(measured), archive), blocks_of(measured)
+    point = replace(fit.point, fast_errors_v=fit.point.fast_errors_v[:, :0])
+    prior = PRIORS["measured"]
+    sums = SizeSums(SplitTable(measured, blocks, point.table()))
+    linear = max(
+        float(point_score_at_size(sums, point, size).log_density["record"].sum()) + prior.log_density(size)
+        for size in prior.sizes
+    )
+    assert left_out_errors(measured, blocks, fit).nats == pytest.approx(linear, abs=0.5)
+
+
+def test_models_are_scored_on_left_out_data_alike_whatever_trust_they_were_fitted_at(
+    cell, few, make, archive
+):
     lost = CATALOGUE["series_resistance"].activate(resistance_ohm=5e-4)
     records = prepare_all(cell, [make((lost,)), make((lost,), seed=2)], 0.9, 0.0)
     problem = InverseProblem(cell, records, few)
+    blocks = blocks_of(problem)
 
-    def score(trust):
-        held = replace(problem, trust=trust)
-        return score_to_carry(problem, base_of(held, blocks_of(held), archive))
+    def fitted(trust):
+        at_trust = replace(problem, trust=trust)
+        fit = base_of(at_trust, blocks_of(at_trust), archive)
+        return fit.score.total, left_out_errors(at_trust, blocks, fit).nats
 
-    declared = score_to_carry(problem, None)
-    assert declared == pytest.approx(score_to_carry(replace(problem, trust="loose"), None))
-    wide, tight = score("loose"), score("tight")
-    assert abs(wide - tight) < 30.0  # where the score of each at its own trust is hundreds of nats off
-    longer = tuple(replace(r, start=replace(r.start, sd=10.0 * r.start.sd)) for r in records)
-    assert score_to_carry(replace(problem, records=longer), None) != pytest.approx(declared)
+    (wide, wide_nats), (tight, tight_nats) = fitted("loose"), fitted("tight")
+    assert abs(tight - wide) > 1e3  # likelihoods of rows, and of independent samples
+    assert abs(tight_nats - wide_nats) < 0.05 * abs(tight - wide)
+    declared = left_out_errors(problem, blocks, None).nats
+    assert left_out_errors(replace(problem, trust="loose"), blocks, None).nats == pytest.approx(declared)
 
 
 def test_a_declared_model_is_scored_with_its_start_as_unsure_as_it_is(cell, few, make):
     measured = [make(), make(seed=2)]  # from 0.9
 
-    def score(soc0, sd):
+    def nats(soc0, sd):
         records = prepare_all(cell, measured, soc0, 0.0)
         unsure = tuple(replace(r, start=replace(r.start, sd=sd, doubt=0.0)) for r in records)
-        return score_to_carry(InverseProblem(cell, unsure, few), None)
+        problem = InverseProblem(cell, unsure, few)
+        return left_out_errors(problem, blocks_of(problem), None).nats
 
-    assert score(0.9, 1e-4) > score(0.85, 0.05) > score(0.85, 1e-4)
+    assert nats(0.9, 1e-4) > nats(0.85, 0.05) > nats(0.85, 1e-4)
 
 
 def test_all_that_may_be_written_is_held_against_each_other_on_the_same_rows(cell, few, make, archive):
@@ -401,7 +424,7 @@ def test_all_that_may_be_written_is_held_against_each_other_on_the_same_rows(cel
 
 def test_effects_that_stand_in_are_written_where_they_leave_less_and_are_said_to_be_no_finding(path):
     def option(score, *effects):
-        return Option(ModelState(path.problem, hypothesis=effects), LeftOut((0.01,), (0.01,)), score)
+        return Option(ModelState(path.problem, hypothesis=effects), LeftOut((0.01,), (0.01,), score))
 
     declared, plain, more = option(20.0), option(25.0), option(29.0, "series_resistance")
     assert model_to_write(declared, [plain, more])[0] is more.state
@@ -417,7 +440,7 @@ def test_effects_that_stand_in_are_written_where_they_leave_less_and_are_said_to
 def test_what_does_harm_in_a_range_of_charge_is_not_written(path):
     def option(score, *range_mv):
         ranges = tuple(1e-3 * v for v in range_mv)
-        return Option(ModelState(path.problem), LeftOut((0.02,), ranges), score)
+        return Option(ModelState(path.problem), LeftOut((0.02,), ranges, score))
 
     declared = option(20.0, 10.0, 30.0)
     chance = option(24.0, 10.0, 36.0)  # by a fifth an RMS of some seven independent samples may be off
