@@ -25,7 +25,7 @@ from aesi.physics import Cell
 from aesi.pipeline.discovery.discover import discovery_content
 from aesi.records import Measurement
 from aesi.tracer import discover
-from aesi.tracer.decide.carry_over import AS_GOOD
+from aesi.tracer.decide.model_to_write import AS_GOOD
 
 LIMIT_S = 900.0
 """Limit of the processor time of one case, s. A convention; the slowest case took 390 s."""

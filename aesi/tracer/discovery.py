@@ -102,8 +102,7 @@ class Discovery:
     written model depend on.
     effects : by id, all that may be tried or moved.  tried : ids of those that competed, empty where none may be added.
     experiments : (group of look-alikes, experiment that would tell them apart).  choice : which model of the cell.
-    not_adopted : why the written model lacks the effects of the verdict, or is not the refit that
-    predicts left-out data best.
+    not_adopted : why the written model lacks the effects of the verdict, or is not the refit with the smallest error.
     notes : assumptions, and remarks on the records and the search.
     contradicted : whether an explanation of the data leaves a larger error on the test part than a right one may.
     warnings : sentences on that; on records that contradict their own temperature; on a written model that is worse

@@ -16,7 +16,7 @@ from aesi.bench import CaseRow
 from aesi.bench.detectable import SEEN_NATS
 from aesi.bench.limit import NO_ANSWER, NOT_RUN
 from aesi.bench.scoring import rate
-from aesi.tracer.decide.carry_over import AS_GOOD
+from aesi.tracer.decide.model_to_write import AS_GOOD
 
 NEAR_K = 2.0
 """Largest error, K, of a temperature that counts as near. A convention."""

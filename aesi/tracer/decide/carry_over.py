@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -15,13 +15,10 @@ from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, BoolArray
 from aesi.physics.cell import Cell
 from aesi.records import Measurement
-from aesi.tracer.case.blocks import RANGES, Blocks, blocks_of
-from aesi.tracer.case.free_parameter import at_ends
+from aesi.tracer.case.blocks import RANGES, Blocks
 from aesi.tracer.case.problem import INDEPENDENT_CHARGE, InverseProblem
-from aesi.tracer.case.trust import Trust
 from aesi.tracer.likelihood.fit import FittedHypothesis
-from aesi.tracer.likelihood.gaussian import block_sums, log_density_refitted
-from aesi.tracer.likelihood.model_error import MEASURED_V, MOST_MEASURED_V, PRIORS, SplitTable
+from aesi.tracer.likelihood.model_error import MEASURED_V, MOST_MEASURED_V
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.search.hypothesis_fits import values_without
 
@@ -37,10 +34,6 @@ LEAST_SHARE = 0.8
 to its voltage limit. On development records of `aesi bench real` without their temperature, models
 that ran empty at 85 and 90 % of it left 7.1 and 5.0 mV of the last part (declared 22.9), those at 68 and 3 % left
 152 and 94 (what was named alone 78)."""
-AS_GOOD = 1.05
-"""A model is as good as another one where its error is at most this many times the other's. A convention."""
-SCORED_AT: Trust = "measured"
-"""Trust whose model error all models are scored with on left-out data."""
 STEP_S = 10.0
 """s between the rows of a full discharge or charge."""
 
@@ -49,18 +42,12 @@ STEP_S = 10.0
 class LeftOut:
     """Errors of one model on data that it has not seen, V RMS; infinite where it could not be simulated.
 
-    Taken with the model fitted to the other records, or of a single record to all but its last third.
-
     by_record : (k,) on each record, all rows as measured, with the model fitted to the other records.  by_range : (p,)
     on the thinned rows of each record by range of charge, down-weighted where the initial state is too uncertain.
-    nats : log predictive density of the left-out data, with the model error of a measured cell at its most likely size,
-    and with parameters as uncertain as the other data leave them. It compares models, whatever trust they were fitted
-    at. Errors within seconds that the file may have are not forgiven: the model that is written has them.
     """
 
     by_record: tuple[float, ...]
     by_range: tuple[float, ...]
-    nats: float
 
     @property
     def pooled_v(self) -> float:
@@ -84,45 +71,13 @@ def left_out_errors(problem: InverseProblem, blocks: Blocks, one: FittedHypothes
     charges = [np.isin(blocks.of_row, charge) for charge in blocks.folds["charge"]]
     weights = np.sqrt(_evidence_weights(problem))
     by_record, by_range = [], []
-    left_v = np.zeros(len(problem.measured))
     for k, fold in enumerate(folds):
         out = np.isin(blocks.of_row, fold)
         whole, seen = _left_out_residuals(problem, blocks, one, k, fold)
         by_record.append(rms(whole))
-        left_v[out] = seen
         weighted = weights[out] * seen
         by_range += [rms(weighted[charge[out]]) for charge in charges if charge[out].any()]
-    return LeftOut(tuple(by_record), tuple(by_range), _nats(problem, blocks, one, left_v, folds))
-
-
-def _nats(
-    problem: InverseProblem,
-    blocks: Blocks,
-    one: FittedHypothesis | None,
-    left_v: Array,
-    folds: tuple[tuple[int, ...], ...],
-) -> float:
-    """`LeftOut.nats`.  left_v : (n,) V, residual of the rows of each fold with the model fitted to the others."""
-    if not np.isfinite(left_v).all():
-        return -np.inf
-    common, prior = replace(problem, trust=SCORED_AT), PRIORS[SCORED_AT]
-    table = SplitTable(common, blocks_of(common), np.column_stack([left_v, _free_slopes_v(problem, one)]))
-    scores = []
-    for size in prior.sizes:
-        sums = block_sums(blocks, *table.whitened(size))
-        scores.append(float(log_density_refitted(sums, folds).sum()) + prior.log_density(size))
-    return max(scores)
-
-
-def _free_slopes_v(problem: InverseProblem, one: FittedHypothesis | None) -> Array:
-    """(n, k) V, sensitivities per prior standard deviation of the parameters that are not on a bound; of the declared
-    model those of the initial states of its records."""
-    if one is not None:
-        return one.point.jacobian_v[:, ~np.logical_or(*at_ends(one.point.x, *one.point.bounds.T))]
-    slopes_v = np.zeros((len(problem.measured), len(problem.records)))
-    for k, rows in enumerate(problem.slices):
-        slopes_v[rows, k] = problem.start_slope_v[rows]
-    return slopes_v
+    return LeftOut(tuple(by_record), tuple(by_range))
 
 
 def _evidence_weights(problem: InverseProblem) -> Array:

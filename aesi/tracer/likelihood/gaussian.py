@@ -206,21 +206,6 @@ class Posterior:
         return np.asarray(inverse.T @ inverse)
 
 
-def log_density_refitted(sums: BlockSums, folds: tuple[tuple[int, ...], ...]) -> Array:
-    """(f,) log p(y_F | y_-F) of each fold, nats, where r of each fold is that of the whole model fitted to the other
-    blocks: there b of these is zero.
-
-    sums : about these residuals, which differ from fold to fold.  folds : disjoint.
-    """
-    out = _left_out(folds, len(sums.square))
-    gram, still = sums.gram.sum(axis=0), np.zeros(sums.moment.shape[1])
-    by_fold = np.tensordot(out, sums.gram, axes=(1, 0))
-    whole = gains(np.broadcast_to(gram, by_fold.shape), out @ sums.moment, still)
-    without = gains(gram - by_fold, np.zeros((len(folds), len(still))), still)
-    by_data = out @ (sums.square + sums.log_det + LOG_2PI * sums.rows)
-    return np.asarray(-0.5 * (by_data - whole + without))
-
-
 @dataclass(frozen=True, eq=False)
 class Linearised:
     """A hypothesis linearised about a point.

@@ -9,7 +9,7 @@ import numpy as np
 
 from aesi.constants import MV_PER_V
 from aesi.numerics.metrics import rms
-from aesi.tracer.decide.carry_over import AS_GOOD
+from aesi.tracer.decide.model_to_write import AS_GOOD
 from aesi.tracer.decide.verdict import Verdict, beyond_noise
 from aesi.tracer.report.outcome import NAMES, FileOutcome, State
 

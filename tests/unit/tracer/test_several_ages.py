@@ -131,7 +131,7 @@ def test_what_says_nothing_of_ordinary_use_is_not_written(cell, few, discharge):
     declared = Option.of(problem, blocks, None)
     assert Option.of(problem, blocks, fit).tested(declared.usual_error_v)
     assert not Option.of(problem, blocks, untold).tested(declared.usual_error_v)
-    volts_off = replace(declared, left_out=LeftOut((10.0, 10.0), (10.0,), 0.0))
+    volts_off = replace(declared, left_out=LeftOut((10.0, 10.0), (10.0,)))
     assert Option.of(problem, blocks, untold).tested(volts_off.usual_error_v)  # it may err by as much
-    nowhere = replace(declared, left_out=LeftOut((10.0, np.inf), (10.0,), -np.inf))
+    nowhere = replace(declared, left_out=LeftOut((10.0, np.inf), (10.0,)))
     assert not Option.of(problem, blocks, untold).tested(nowhere.usual_error_v)

@@ -18,7 +18,7 @@ from aesi.pipeline.report.words.sizes import (
     unexplained_by,
     with_size,
 )
-from aesi.tracer.decide.carry_over import AS_GOOD
+from aesi.tracer.decide.model_to_write import AS_GOOD
 from aesi.tracer.likelihood.model_error import MEASURED_V
 
 LARGE_SHARE = 0.5
