@@ -20,6 +20,7 @@ BEGIN, END = "<!-- table of aesi bench left_out -->", "<!-- end of left_out -->"
 def run(
     cells: str = "experiments/cells",
     only: str | None = None,
+    development: bool = False,
     limit_s: PositiveFloat | None = LIMIT_S,
     workers: PositiveInt = 1,
     address: str | None = None,
@@ -28,12 +29,13 @@ def run(
 ) -> Iterator[dict[str, Any]]:
     """One dict a record as it is judged, and a last one with `summary`: true.
 
-    cells : folder of the declared cell files.  only : substring of the case, which is set/record.  limit_s : processor
+    cells : folder of the declared cell files.  only : substring of the case, which is set/record.  development : the
+    sets of development instead.  limit_s : processor
     seconds a case.  workers, address : processes here, or a Dask scheduler.  write : a page whose part between the two
     marks becomes the table.  keep : a folder for what each case gave; a case that is in it is not judged again by the
     same program, as it was asked, so that an interrupted run goes on.
     """
-    rows, specs = [], plan(only)
+    rows, specs = [], plan(only, development)
     judge = partial(
         judged_once,
         judge=partial(judged, cells=cells, limit_s=limit_s),

@@ -2,13 +2,24 @@
 
 import pytest
 
-from aesi.bench.left_out import SETS, judged, plan, summary, table
+from aesi.bench.left_out import DEVELOPMENT_SETS, SETS, judged, plan, summary, table
+from aesi.bench.real.plan import chosen
 
 
 def test_every_record_is_left_out_once():
     names = [case.name for case in plan()]
     assert len(names) == len(set(names)) == sum(len(one.slow) + len(one.drives) for one in SETS)
     assert [case.test for case in plan("nmc/C2")] == ["C20", "C2"]
+
+
+def test_development_sets_hold_development_records_of_several_kinds():
+    cases = plan(development=True)
+    assert {case.set for case in cases} == set(DEVELOPMENT_SETS)
+    for one in DEVELOPMENT_SETS:
+        assert one.slow
+        assert one.drives
+    development = {case.take.file for case in chosen(development=True) if case.take is not None}
+    assert {case.test for case in cases} <= development
 
 
 def test_records_that_cannot_be_had_are_not_run(tmp_path, monkeypatch):
