@@ -18,6 +18,9 @@ def test_development_sets_hold_development_records_of_several_kinds():
     for one in DEVELOPMENT_SETS:
         assert one.slow
         assert one.drives
+    assert ("panasonic_ncr18650pf", "25degC_hppc") not in {
+        (case.set.data, case.test) for case in cases
+    }  # fitted
     development = {case.take.file for case in chosen(development=True) if case.take is not None}
     assert {case.test for case in cases} <= development
 
