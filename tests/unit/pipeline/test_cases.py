@@ -81,7 +81,12 @@ def test_good_records_stand_beside_what_is_looked_at(tmp_path, shared_data, monk
     with pytest.raises(DataError, match="is there twice among the data; give it once"):
         case_of_files(BPX, [record], good=[record])
     monkeypatch.setenv("AESI_DATA", str(shared_data / "measured"))
-    overrides = ["discover.fit=[drive_cycle]", "discover.good=[C2, 1C]", "discover.test=[]"]
+    overrides = [
+        "discover.fit=[drive_cycle]",
+        "discover.good=[C2, 1C]",
+        "discover.test=[]",
+        "discover.until_s=null",
+    ]
     case = case_of_experiment(read_experiment(EXPERIMENTS / "measured_nmc.yaml", overrides))
     assert [m.name for m in case.good] == ["C2", "1C"]
     assert [m.name for m in case.records] == ["drive_cycle", "C2", "1C"]
@@ -97,6 +102,7 @@ def test_effects_of_the_cell_and_files_with_effects_were_passed_over_in_silence(
         "discover.fit=[C2]",
         "discover.fit_until_s={}",
         "discover.test=[]",
+        "discover.until_s=null",
         "cell.effect_files=[mine.py]",
     ]
     with pytest.raises(InputError, match=f"there is no effect file {EXPERIMENTS / 'mine.py'}"):
