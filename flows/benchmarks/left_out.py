@@ -30,10 +30,10 @@ def run(
     """One dict a record as it is judged, and a last one with `summary`: true.
 
     cells : folder of the declared cell files.  only : substring of the case, which is set/record.  development : the
-    sets of development instead.  limit_s : processor
-    seconds a case.  workers, address : processes here, or a Dask scheduler.  write : a page whose part between the two
-    marks becomes the table.  keep : a folder for what each case gave; a case that is in it is not judged again by the
-    same program, as it was asked, so that an interrupted run goes on.
+    sets of development instead.  limit_s : processor seconds a case.  workers, address : processes here, or a Dask
+    scheduler.  write : a page whose part between the two marks becomes the table.  keep : a folder for what each case
+    gave; a case that is in it is not judged again by the same program, as it was asked, so that an interrupted run goes
+    on.
     """
     rows, specs = [], plan(only, development)
     judge = partial(

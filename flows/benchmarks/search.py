@@ -36,9 +36,8 @@ def run(
     seed: NonNegativeInt = 0,
 ) -> Iterator[dict[str, Any]]:
     """One line a storage."""
-    _ours(
-        terms, population, population, seed, None
-    )  # what loads at the first call is loaded before the clock starts
+    # What loads at the first call is loaded before the clock starts.
+    _ours(terms, population, population, seed, InMemoryStorage())
     for storage, number in (("memory", candidates), (SHARED, min(candidates, SHARED_CANDIDATES))):
         with tempfile.TemporaryDirectory(prefix="aesi-bench-") as folder:
             ours_in, peer_in = _storage(storage, folder, "ours"), _storage(storage, folder, "peer")
@@ -67,9 +66,7 @@ def _stored(storage: str | BaseStorage) -> float:
     return float(np.mean([len(t.params) + len(t.user_attrs) + len(t.system_attrs) for t in trials]))
 
 
-def _ours(
-    terms: int, candidates: int, population: int, seed: int, storage: str | BaseStorage | None
-) -> float:
+def _ours(terms: int, candidates: int, population: int, seed: int, storage: str | BaseStorage) -> float:
     rng = np.random.default_rng(seed)
 
     def evaluate_many(genomes: Sequence[Genome]) -> list[tuple[int, Candidate]]:
