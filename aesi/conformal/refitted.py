@@ -112,7 +112,7 @@ class RefittedIntervals:
 
         Where the record is still short, it is extended to the front by the calibration residuals.
         """
-        known = np.concatenate([self.before_v, seen])
+        known = np.concatenate([self.before_v, [np.nan], seen])  # no window spans two records
         windows = sliding_window_view(known, self.window + 1)
         without_gap = windows[np.isfinite(windows).all(axis=1)][-(HISTORY_WINDOWS - 1) * self.window :]
         return _Forest.grown(without_gap[:, :-1], without_gap[:, -1], self.alpha, self.seed + start)

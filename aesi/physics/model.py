@@ -49,6 +49,7 @@ class Interface:
 
     transfer_coefficient : of delithiation, 0.5 for symmetric kinetics.  double_layer_f_m2 : F per m2 of reactive area.
     bins : (share of the reactive area, radius over the declared radius), one pair per particle size.
+    plating : of lithium metal; None for none.
     """
 
     transfer_coefficient: float = 0.5

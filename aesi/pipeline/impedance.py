@@ -178,7 +178,6 @@ class SpectrumError:
 def compared_spectra(
     cell: Cell,
     spectra: Sequence[Spectrum],
-    effects: Sequence[ActiveEffect] = (),
     model: ModelName = "espm",
     fitted: Sequence[Spectrum] = (),
 ) -> tuple[tuple[SpectrumError, ...], tuple[str, ...]]:
@@ -191,7 +190,7 @@ def compared_spectra(
     out = []
     for spectrum in kept:
         soc, seen = state_of(cell, spectrum), in_band(spectrum)
-        z = impedance(cell, spectrum.frequency_hz, soc, degc_of(spectrum), effects, model=model)
+        z = impedance(cell, spectrum.frequency_hz, soc, degc_of(spectrum), model=model)
         ratio = np.abs(z[seen]) / np.abs(spectrum.z_ohm[seen]) - 1.0
         ratio_error = rms(ratio) if seen.any() else None
         out.append(SpectrumError(spectrum, soc, z, ratio_error, any(spectrum is one for one in fitted)))

@@ -146,7 +146,9 @@ def band_sentences(
     """Sentences on where the correction is applied, and on the share of rows within its band."""
     if model.correction is None:
         empty = ", and lower_v and upper_v are empty" if prediction.nominal is None else ""
-        said = [f"the model carries no learnt correction: one step ahead is the same as a free run{empty}."]
+        said = [
+            f"the model carries no learnt correction: one step ahead it predicts the voltage of a free run{empty}."
+        ]
     else:
         figures = trained_figures(
             prediction.outside,

@@ -28,7 +28,7 @@ from aesi.records import ErrorSeries, FreeRun
 from aesi.sparse import free_run
 from aesi.sparse.fade import Fade
 from aesi.sparse.leverage import Leverage
-from aesi.sparse.terms.inputs import with_inputs
+from aesi.sparse.terms.inputs import model_variables
 from aesi.sparse.terms.library import Library, Term, evaluate_terms
 from aesi.sparse.terms.scaling import Scaling
 
@@ -195,12 +195,7 @@ class SparseModel:
         return np.unique(self.library.feedbacks)
 
     def _variables(self, series: ErrorSeries) -> Array:
-        if abs(series.dt_s / self.dt_s - 1.0) > 0.01:
-            raise DataError(
-                f"{series.name}: sampled every {series.dt_s:g} s, but the model steps {self.dt_s:g} s; "
-                f"resample the record to {self.dt_s:g} s."
-            )
-        return np.column_stack([series.error_v, with_inputs(series, self.input_names).inputs])
+        return model_variables(series, self.input_names, self.dt_s)
 
     def _leverage_excess(self, variables: Array) -> Array | None:
         if self.leverage is None:

@@ -30,4 +30,4 @@ class Bare:
 
     def _voltage_difference_v(self, series: ErrorSeries) -> Array:
         """(n,) V, voltage of this model minus that of the series' own."""
-        return series.error_v - series.left_by(self.name)
+        return series.physics.get(self.name, series.model_v) - series.model_v

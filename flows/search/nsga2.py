@@ -1,6 +1,6 @@
 """Evolutionary search over libraries and hyperparameters: NSGA-II, three losses, two correlation constraints.
 
-    minimise  loss_oob, loss_valid, loss_sparse    subject to  pearson_train > eps1, pearson_valid > eps2
+    minimise  loss_oob, loss_valid, loss_sparse    subject to  pearson_train >= eps1, pearson_valid >= eps2
 
 The front is kept whole; the paper's scalar fitness, 1 - (g1 L_oob + g2 L_valid + g3 L_sparse), picks from it.
 A candidate that fails is a pruned trial with its reason. How the term mask travels, and why, is told in
@@ -14,11 +14,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import optuna
-from optuna.storages import BaseStorage, JournalStorage, RDBStorage
-from optuna.storages.journal import JournalFileBackend
+from optuna.storages import BaseStorage
 from optuna.study import Study
 from optuna.trial import FrozenTrial, TrialState
 
@@ -45,8 +43,10 @@ class Constraints:
     def violations(self, one: Candidate) -> dict[str, float]:
         """What is asked for, in words -> by how much a candidate misses it; it is met at 0 and below."""
         return {
-            f"correlation on training above {self.pearson_train:g}": self.pearson_train - one.pearson_train,
-            f"correlation on validation above {self.pearson_valid:g}": self.pearson_valid - one.pearson_valid,
+            f"correlation on training of at least {self.pearson_train:g}": self.pearson_train
+            - one.pearson_train,
+            f"correlation on validation of at least {self.pearson_valid:g}": self.pearson_valid
+            - one.pearson_valid,
         }
 
 
@@ -72,15 +72,15 @@ def search(
     seed: int = 0,
     settings: SearchSettings | None = None,
     *,
-    storage: str | Path | BaseStorage | None = None,
+    storage: str | BaseStorage | None = None,
     name: str = "aesi",
     on_candidate: OnCandidate | None = None,
     evaluate_many: EvaluateMany | None = None,
 ) -> SearchResult:
     """Search until the study holds `n_trials` finished trials; continue what `storage` already holds.
 
-    storage : None keeps the study in memory; a path is a journal file; a URL (with ://) a database. Of one
-    process at a time; several share the evaluation of a study (`evaluate_many`), not the study.
+    storage : Optuna's, or the URL of a database; None keeps the study in memory. Of one process at a time; several
+    share the evaluation of a study (`evaluate_many`), not the study.
     on_candidate : called with index, genome and outcome as each is evaluated.
     evaluate_many : what evaluates a generation, by the weights of the settings; by default one candidate after the
     other is evaluated here.
@@ -157,21 +157,12 @@ def _finished(
     )
 
 
-def _open(storage: str | Path | BaseStorage | None, name: str, sampler: TermSampler) -> Study:
+def _open(storage: str | BaseStorage | None, name: str, sampler: TermSampler) -> Study:
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     return optuna.create_study(
-        storage=_storage(storage),
+        storage=storage,
         study_name=name,
         sampler=sampler,
         directions=["minimize"] * 3,
         load_if_exists=True,
     )
-
-
-def _storage(storage: str | Path | BaseStorage | None) -> BaseStorage | None:
-    if storage is None or isinstance(storage, BaseStorage):
-        return storage
-    if "://" in str(storage):
-        return RDBStorage(str(storage))
-    Path(storage).parent.mkdir(parents=True, exist_ok=True)
-    return JournalStorage(JournalFileBackend(str(storage)))

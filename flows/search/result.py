@@ -78,11 +78,12 @@ class SearchResult:
         told = [trial for trial in self.trials if trial.losses is not None]
         if len(told) < LEAST_TOLD:
             return {}
-        # Optuna warns of every target that low values of it are taken as good: of this one they are.
-        warnings.filterwarnings("ignore", "PedAnovaImportanceEvaluator computes the importances")
-        return dict(
-            get_param_importances(self.study, target=lambda trial: -trial.user_attrs[RECORD]["fitness"])
-        )
+        with warnings.catch_warnings():
+            # Optuna warns of every target that low values of it are taken as good: of this one they are.
+            warnings.filterwarnings("ignore", "PedAnovaImportanceEvaluator computes the importances")
+            return dict(
+                get_param_importances(self.study, target=lambda trial: -trial.user_attrs[RECORD]["fitness"])
+            )
 
     def best(self) -> Trial:
         """The trial of highest fitness; the earlier one on a tie.

@@ -27,8 +27,6 @@ from optuna.trial import FrozenTrial, TrialState, create_trial
 from aesi.sparse.search.genome import Genome
 from aesi.sparse.search.genome_space import GenomeSpace
 
-__all__ = ["GenomeSpace", "TermSampler", "distributions", "genome_of", "violation", "widened"]
-
 TERMS = "terms"
 INDEX = "index"
 """The user attributes that hold the mask, and the index of the candidate in the search."""

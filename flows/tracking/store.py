@@ -20,7 +20,6 @@ from typing import Any
 
 from aesi.errors import AesiError, InputError
 from aesi.numerics.files.whole import check_writable
-from flows.base import environment
 from flows.base.console import first_line
 from flows.base.databases import limits
 from flows.base.locks import ProcessLock
@@ -98,7 +97,7 @@ class Store:
             _reach(self.uri)
         elif not self.local and not self.uri.startswith(DATABRICKS):
             _reach_database(self.uri)
-        with _alone(self.local):
+        with _alone(self._path if self.local else None):
             if self.local:
                 self.notes = _opened(self._path, self.uri)
             try:
@@ -132,7 +131,7 @@ class Store:
 
     def experiment(self, name: str) -> str:
         """Id of the experiment of that name, made if it is not there."""
-        with _alone(self.local):
+        with _alone(self._path if self.local else None):
             found = self.client.get_experiment_by_name(name)
             if found is not None:
                 if found.lifecycle_stage == "deleted":
@@ -278,13 +277,16 @@ def now_ms() -> int:
 
 
 @contextmanager
-def _alone(local: bool) -> Iterator[None]:
-    """One process at a time makes tables and experiments in a SQLite store."""
-    if not local:
+def _alone(database: Path | None) -> Iterator[None]:
+    """One process at a time makes tables and experiments in a SQLite file, `database`; None for another store."""
+    if database is None:
         yield
         return
-    folder = environment.state()
-    lock = ProcessLock(folder / "mlflow.lock", str(folder), "setting up the tracking store at the same time")
+    lock = ProcessLock(
+        database.with_name(f"{database.name}.lock"),
+        str(database.parent),
+        "setting up the tracking store at the same time",
+    )
     lock.acquire(wait=True)
     try:
         yield

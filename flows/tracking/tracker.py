@@ -253,9 +253,9 @@ class Tracker:
 
         Raises OSError or MlflowException where the store does not; the run can be ended then.
         """
+        self._stop.set()
         self.flush(wait_s)
         self.store.client.delete_run(self.run_id)
-        self._stop.set()
         self._outbox.close()
 
     def _batch(

@@ -1,6 +1,7 @@
 """The same checks over every model of the voltage error."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "unit" / "sparse"))
 
 from sparse_records import make_record
 
+from aesi.errors import DataError
 from aesi.records import Split
 from aesi.sparse import Candidate, Genome, Options, Problem, evaluate
 from aesi.sparse.baselines import BASELINES, Tuning
@@ -50,9 +52,22 @@ def test_a_free_run_starts_where_it_is_told(models, name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_free_run_does_not_see_the_measurement(models, name):
-    from dataclasses import replace
+def test_a_free_run_without_any_measured_error_is_finite(models, name):
+    series = make_record(80, seed=5)
+    blind = replace(series, error_v=np.full(80, np.nan))
+    assert np.isfinite(models[name].free_run(blind).error_v).all()
+    assert np.isfinite(models[name].free_run(blind, 0.0).error_v).all()
 
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name != "ESPM"])
+def test_a_record_of_another_step_is_refused(models, name):
+    series = make_record(50)
+    with pytest.raises(DataError, match="sampled every 10 s, but the model steps 1 s"):
+        models[name].free_run(replace(series, dt_s=10.0))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_free_run_does_not_see_the_measurement(models, name):
     series = make_record(80, seed=5)
     blind = replace(series, error_v=np.append(series.error_v[:1], np.full(79, 9.0)))
     np.testing.assert_array_equal(models[name].free_run(series).error_v, models[name].free_run(blind).error_v)

@@ -38,7 +38,7 @@ class Scale:
     def fit(cls, scores: Array, alpha: float, current_a: Array | None) -> Self:
         """scores : (n,) |e - middle| / half-width of held-out samples.  current_a : (n,) A, or None for one
         group. The factor is the conformal quantile of the scores."""
-        log_ratio_of_all = float(np.log(conformal_quantile(scores, alpha)))
+        log_ratio_of_all = _log_factor(scores, alpha)
         if current_a is None:
             return cls(np.empty(0), np.array([log_ratio_of_all]))
         edges = _edges(current_a)
@@ -47,7 +47,7 @@ class Scale:
         for g in range(len(edges) + 1):
             own = scores[groups == g]
             if own.size >= max(ENOUGH_SCORES, 1 / alpha):
-                scale.log_ratio[g] = np.log(conformal_quantile(own, alpha))
+                scale.log_ratio[g] = _log_factor(own, alpha)
         return scale
 
     @property
@@ -67,6 +67,13 @@ class Scale:
     def from_state(cls, state: SavedState) -> Self:
         """Inverse of `to_state`."""
         return cls(np.asarray(state["edges_a"], dtype=float), np.asarray(state["log_ratio"], dtype=float))
+
+
+def _log_factor(scores: Array, alpha: float) -> float:
+    """Log of the factor that the scores ask for; minus infinity where they are zero, as in a rest of constant voltage
+    (`initial_log_ratio`)."""
+    with np.errstate(divide="ignore"):
+        return float(np.log(conformal_quantile(scores, alpha)))
 
 
 def _edges(current_a: Array) -> Array:

@@ -89,7 +89,6 @@ def whiten(
     starts: IntArray,
     amplitude: Array,
     white: Array,
-    correlation_lengths_s: tuple[float, ...] = CORRELATION_LENGTHS_S,
 ) -> tuple[Array, Array]:
     """Whitened columns (n, m), of unit variance, and the log-determinant of the covariance row by row (n,).
 
@@ -99,5 +98,5 @@ def whiten(
     opens = np.zeros(len(time_s), dtype=np.bool_)
     opens[starts] = True
     table = np.ascontiguousarray(columns, dtype=float)
-    out = _filter(table, time_s, opens, amplitude, white, np.array(correlation_lengths_s))
+    out = _filter(table, time_s, opens, amplitude, white, np.array(CORRELATION_LENGTHS_S))
     return out[0], out[1]

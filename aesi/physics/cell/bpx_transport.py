@@ -32,7 +32,7 @@ SHORTEST_DIFFUSION_S = 1.0
 """Least (radius squared over the median diffusivity in an electrode's window): 2.9 s in one (0.5 um, Kim 2011) and 100
 to 25,000 s in the others of the shipped files and the same sets; with a diffusivity in cm2/s, 1e-4 of that."""
 LARGEST_SOLID_DROP_V = 0.2
-"""Largest ohmic drop in an electrode's solid at 1C, I L / (3 A sigma): 0.7 uV to 7 mV in the shipped files and in
+"""Largest mean ohmic drop in an electrode's solid at 1C, I L / (3 A sigma): 0.7 uV to 7 mV in the shipped files and in
 twelve published sets (of PyBaMM). The largest is for the 0.18 S/m of Chen et al., J. Electrochem. Soc. 167 (2020)
 080534; its 0.0018 S/cm read as S/m would make 0.7 V."""
 LEAST_EXCHANGE_1_H = 2e-3
@@ -78,8 +78,8 @@ def check_transport(cell: CellParameters, where: str) -> None:
 
 
 def _check_solid(cell: CellParameters, electrode: Electrode, what: str) -> None:
-    """Raises CellError for a drop above LARGEST_SOLID_DROP_V: a current that decreases linearly to zero across the
-    electrode has a drop of a third of the solid's resistance times the current."""
+    """Raises CellError for a drop above LARGEST_SOLID_DROP_V: the mean one, which the cell's voltage has, of a current
+    that decreases linearly to zero across the electrode is a third of the solid's resistance times the current."""
     current_a_m2 = cell.nominal_capacity_ah / (cell.electrode_area_m2 * cell.electrode_pairs)
     drop_v = current_a_m2 * electrode.thickness_m / (3.0 * electrode.conductivity_s_m)
     if drop_v > LARGEST_SOLID_DROP_V:

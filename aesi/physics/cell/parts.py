@@ -144,7 +144,7 @@ class CellParameters:
     thermal_conductivity_w_m_k : from the inside of the winding to the case, see `winding_resistance_k_w`.
     initial_soc : as declared, for other programs; simulations take `soc0` instead.
     contact_resistance_ohm : in series with the whole cell, of metal, independent of temperature.
-    fitted_with : "espm" or "dfn", the model that the parameters were fitted with; None where they were not fitted.
+    fitted_with : "espm" or "dfn", the model that the parameters were fitted with; '' where they were not fitted.
     capacity_shares : (record, capacity of the cell then over the capacity in the file), for the records of that fit.
     tested_on : (record, day of its test), where known.  fitted_at_k : (record, its mean temperature, K).
     unread : sentences on declarations of the file that no simulation uses (a hysteresis, a state of ageing).

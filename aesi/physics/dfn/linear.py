@@ -83,17 +83,19 @@ def _place_impedance(
         rates[side] * float(x.diffusivity(rest[side : side + 1])[0]) / solid_diffusion(x.diffusivity).d0
         for side, x in enumerate(electrodes)
     ]
+    exchange = [  # over its value at unit occupancy and factor
+        float(x.rate_factor(at)[0]) * float(np.sqrt(at[0] * (1.0 - at[0])))
+        for x, at in zip(electrodes, rest[:, None], strict=True)
+    ]
+    film = [float(x.film_ohm_m2(at)[0]) for x, at in zip(electrodes, rest[:, None], strict=True)]
     admittance = s[:, None] * e.capacity[None, :].astype(complex)
     for u, place in enumerate(p.place):
         kind = p.kind[u]
         side = p.side[kind]
         modes = (p.gains / (s[:, None] + faster[side] * p.rates[kind])).sum(axis=1)
         surface = p.scale[u] * (3.0 / s + modes)
-        occupancy = float(np.sqrt(rest[side] * (1.0 - rest[side])))
-        factor = float(electrodes[side].rate_factor(rest[side : side + 1])[0])
-        film = float(electrodes[side].film_ohm_m2(rest[side : side + 1])[0])
-        resistance = thermal / (p.exchange[u] * rates[2 + side] * factor * occupancy)
-        resistance += film / (rates[6 + side] * p.reactive[u])
+        resistance = thermal / (p.exchange[u] * rates[2 + side] * exchange[side])
+        resistance += film[side] / (rates[6 + side] * p.reactive[u])
         admittance[:, place] += 1.0 / (resistance - slopes_v[side] * surface)
     return cast(ComplexArray, 1.0 / admittance)
 

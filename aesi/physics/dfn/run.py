@@ -9,7 +9,7 @@ from aesi.numerics.modes.collocation import gauss_layer
 from aesi.numerics.modes.galerkin import gauss_lobatto
 from aesi.numerics.typing import Array
 from aesi.physics.dfn.arguments import porous_arguments
-from aesi.physics.dfn.layout import DfnState, DfnTrial, Electrodes, NewtonScratch, Particles, Stack, Weights
+from aesi.physics.dfn.layout import DfnState, DfnTrial, NewtonScratch, Particles, Stack, Weights
 from aesi.physics.espm.layout import CACHE_SLOTS, VOLTAGE_ROWS, Drive
 from aesi.physics.model import EspmModel
 from aesi.records import Hold
@@ -40,7 +40,7 @@ def run_porous_electrode(
     particles, stack, electrodes = porous_arguments(model)
     out = np.empty((9, len(time)))
     kelvin = temperature_k if temperature_k is not None else np.array([model.cell.initial_temperature_k])
-    state, trial, newton, weights = _memory(particles, stack, electrodes)
+    state, trial, newton, weights = _memory(particles, stack)
     kept = 0 if profiles is None else len(time)
     profile = np.zeros((kept, 4, len(electrodes.node_share)))
     salt_profile = np.zeros((kept, len(stack.to_nodes)))
@@ -97,7 +97,7 @@ def _nodes(model: EspmModel) -> Array:
     return np.concatenate(out)
 
 
-def _memory(p: Particles, s: Stack, e: Electrodes) -> tuple[DfnState, DfnTrial, NewtonScratch, Weights]:
+def _memory(p: Particles, s: Stack) -> tuple[DfnState, DfnTrial, NewtonScratch, Weights]:
     """State and scratch at rest."""
     units, modes, kinds = len(p.place), len(p.gains), len(p.side)
     places, salt_modes = s.at.shape

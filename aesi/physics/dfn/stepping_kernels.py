@@ -145,7 +145,7 @@ def advance(  # type: ignore[no-untyped-def]
         if settled:
             break
     if steps > 0 or last_try:
-        commit(p, s, e, state, t, dt, w, t.change, varies)
+        commit(p, s, state, t, dt, w, t.change, varies)
         if e.plating[0] > 0.0:
             commit_metal(p, e, state, t, dt, t_k)
         if e.has_layers:
@@ -220,7 +220,7 @@ def end_flows(p, state, t, faster, dt, w, taken, more):  # type: ignore[no-untyp
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def commit(p, s, e, state, t, dt, w, change, varies):  # type: ignore[no-untyped-def]
+def commit(p, s, state, t, dt, w, change, varies):  # type: ignore[no-untyped-def]
     """Set the state to the end of the step."""
     half = s.at.shape[0] // 2
     for u in range(p.place.shape[0]):

@@ -86,8 +86,8 @@ class Surfaces(NamedTuple):
     """Constants of both electrodes' surfaces.
 
     ocp, entropic, rate, film : (2, table) V, V/K, factor of the rate constant, ohm m2 of surface.
-    alpha : (2,) transfer coefficients.  capacity : (2,) F/m2 of cell a region.  plating : rate, A/m2 of cell, and
-    transfer coefficient.
+    alpha : (2,) transfer coefficients.  capacity : (2,) F/m2 of cell a region.  plating : rate, A/m2 of cell per
+    mol/m3 of salt, and transfer coefficient.
     plating_to_c : mol/m3 per C/m2.
     solid : (2, regions, regions) ohm m2.  salt : the same times the conductivity, by region crossed.
     """
@@ -163,7 +163,7 @@ class Memory(NamedTuple):
 
 
 class Modes(NamedTuple):
-    """Constants of the particles for the steps of diffusion.
+    """State of the particles of one simulation, with scratch and kept weights of their steps of diffusion.
 
     z, means : (units, modes) and (units,).  nodes, force, force_end : scratch of the variable part.
     faster : (3,) factors of temperature, negative, positive, salt.

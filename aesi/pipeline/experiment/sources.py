@@ -54,7 +54,7 @@ def sources_of(config: ExperimentConfig, cell: Path) -> Sources:
     """The records that the experiment names.
 
     cell : the BPX file from which virtual records are simulated.
-    Raises DataError if two records have rows in common, unless both are test records.
+    Raises DataError if two records have rows in common.
     """
     if config.data.kind == "virtual":
         return _virtual(config, cell)
@@ -66,9 +66,7 @@ def sources_of(config: ExperimentConfig, cell: Path) -> Sources:
         for name, (path, record_name) in _files_and_names(where, data.listed).items()
     }
     train, valid, test = ([records[name][0] for name in roles[role]] for role in ROLES)
-    check_distinct(train, test)
-    check_distinct(valid, test)
-    check_distinct([*train, *valid])
+    check_distinct([*train, *valid], test)
     return Sources(records, roles)
 
 

@@ -37,6 +37,7 @@ from aesi.records import ErrorSeries, FreeRun, Hold, Measurement
 from aesi.records.checked import numbers, row_words
 from aesi.records.steps import after_gap, next_stamp
 from aesi.sparse import SparseModel
+from aesi.sparse.yardsticks import Bare
 
 END_BEFORE = ", or end the record before that (--to-s on the command line)."
 """End of a sentence on a record in which the cell runs out: correction and bands are meaningless from there on."""
@@ -119,7 +120,8 @@ class HybridModel:
         the band covers almost nothing.
 
         Raises DataError where the record cannot be simulated, where its first voltage does not belong to this cell,
-        where soc0 is unknown, and, one step ahead, for rows further apart than the correction's step.
+        where soc0 is unknown, and, one step ahead, for rows further apart than the step of a model that has a
+        correction or intervals.
         """
         free = voltage_v is None
         measured = np.full(np.shape(time_s), np.nan) if free else numbers(voltage_v, "voltage_v")
@@ -231,11 +233,16 @@ class HybridModel:
             raise DataError("a free run needs soc0, the state of charge at the first sample; give it.")
         return self.soc0, soc0_sd
 
+    @property
+    def _looks_back(self) -> bool:
+        """Whether one step ahead the voltage of the step before is used: by the correction, or by the intervals."""
+        return self.correction is not None or self.intervals is not None
+
     def _check_dense(self, record: Measurement) -> None:
-        if self.correction is not None and is_sparse(record.time_s, record.current_a, self.dt_s):
+        if self._looks_back and is_sparse(record.time_s, record.current_a, self.dt_s):
             apart_s = float(np.median(np.diff(record.time_s)))
             raise DataError(
-                f"{record.name}: its rows are {apart_s:g} s apart, and one step of the correction is {self.dt_s:g} s, "
+                f"{record.name}: its rows are {apart_s:g} s apart, and one step of the model is {self.dt_s:g} s, "
                 "so that no voltage is known a step before a row; leave out the measured voltage (--measured) for a "
                 "free run, or give a record of denser rows."
             )
@@ -245,14 +252,13 @@ class HybridModel:
 
         time_s : (n,) s of the rows.
         """
-        if self.correction is None:
+        if not self._looks_back:
             return np.zeros(len(time_s), dtype=bool)
         return after_gap(time_s, self.dt_s)
 
     def _even(self, record: Measurement) -> Measurement:
-        """The record resampled to the step of correction and bands; itself where it has that step, or none is used."""
-        stepping = self.correction is not None or self.bands is not None
-        if not stepping or is_even(record.time_s, self.dt_s):
+        """The record resampled to the model's step; itself where it has that step, or the physics is alone."""
+        if not (self._looks_back or self.bands) or is_even(record.time_s, self.dt_s):
             return record
         if len(record) > 1 and record.time_s[-1] - record.time_s[0] < self.dt_s:
             raise DataError(
@@ -315,26 +321,24 @@ class HybridModel:
     def _one_step(self, series: ErrorSeries) -> Prediction:
         """Prediction of the record's own rows. Each counts as the last row of its step, of which no earlier row is
         known."""
-        own = series if series.own is None else series.own
-        if self.correction is None:
-            n = len(own)
-            none = np.full(n, np.nan)
-            return Prediction.of(own, np.zeros(n), none, none, np.zeros(n, dtype=bool), none, None)
-        known, ahead = series.with_known_error, rows_ahead(self.correction, series)
+        own, known = series if series.own is None else series.own, series.with_known_error
         step = next_stamp(own.time_s, series.time_s)
-        error = self.correction.one_step(known)
-        error[0] = 0.0  # nothing was measured before the first sample
+        error, weight = np.zeros(len(known)), np.full(len(known), np.nan)
+        outside = np.zeros(len(known), dtype=bool)
+        if self.correction is not None:
+            error, weight = self.correction.one_step(known), self.correction.kept(known)
+            error[0] = 0.0  # nothing was measured before the first sample
+            outside = outside_trained(self.correction.outside(known), known, self.visited)
         low = high = np.full(len(own), np.nan)
         if self.intervals is not None:
+            ahead = rows_ahead(self.correction or Bare(), series)
             residual = ahead.residual_v
             residual[0] = np.nan
             band = self.intervals.intervals(residual, ahead.current_a)
             at = np.searchsorted(ahead.stamps, step)
             low, high = (np.where(step == 0, np.nan, bound[at]) for bound in (band.lower_v, band.upper_v))
         alpha = None if self.intervals is None else self.intervals.alpha
-        outside = outside_trained(self.correction.outside(known), known, self.visited)
-        kept = self.correction.kept(known)
-        return Prediction.of(own, error[step], low, high, outside[step], kept[step], alpha)
+        return Prediction.of(own, error[step], low, high, outside[step], weight[step], alpha)
 
 
 def _on_own_rows(prediction: Prediction, own: ErrorSeries) -> Prediction:

@@ -25,7 +25,7 @@ from aesi.sparse.fade import Fade
 from aesi.sparse.search.evaluate import fitness
 from aesi.sparse.search.judge import Fit, Judged, judged_on_validation, runs_without_feedback
 from aesi.sparse.search.problem import Problem
-from aesi.sparse.terms.inputs import with_inputs
+from aesi.sparse.terms.inputs import model_variables
 from aesi.sparse.terms.scaling import Scaling
 
 LEAVES = (4, 15)
@@ -40,6 +40,7 @@ class BoostedErrorModel:
     regressor: Any
     scaling: Scaling
     input_names: tuple[str, ...]
+    dt_s: float
     memory: float
     fade: Fade | None = None
     name: str = "gradient boosting"
@@ -49,11 +50,15 @@ class BoostedErrorModel:
         return self.k_step(series, 1)
 
     def free_run(self, series: ErrorSeries, error0_v: float | None = None) -> FreeRun:
-        """Prediction from `error0_v` (default: the measured error_v[0])."""
+        """Prediction from `error0_v` (V); None takes the measured error_v[0], or the value by the inputs where that is
+        NaN."""
         start = float(series.error_v[0]) if error0_v is None else error0_v
         variables = self._variables(series)
+        by_inputs = self._by_inputs(variables, series)
+        if np.isnan(start):
+            start = float(self.scaling.error_to_volts(by_inputs[:1])[0])
         scaled0 = float(self.scaling.error_to_scaled(np.array(start)))
-        scaled = free_run.autoregressive_run(self._by_inputs(variables, series), self.memory, scaled0)
+        scaled = free_run.autoregressive_run(by_inputs, self.memory, scaled0)
         error_v = np.append(start, self.scaling.error_to_volts(scaled))
         variables[:, 0] = error_v
         return FreeRun(error_v, None, self.scaling.is_outside(variables))
@@ -66,7 +71,7 @@ class BoostedErrorModel:
         return np.append(series.error_v[:1], self.scaling.error_to_volts(scaled))
 
     def _variables(self, series: ErrorSeries) -> Array:
-        return np.column_stack([series.error_v, with_inputs(series, self.input_names).inputs])
+        return model_variables(series, self.input_names, self.dt_s)
 
     def _by_inputs(self, variables: Array, series: ErrorSeries) -> Array:
         scaled = self.scaling.apply(variables)[:, 1:]
@@ -102,6 +107,7 @@ def _judged_models(problem: Problem, leaves: int, seed: int, judge: Judge) -> It
             regressor.fit(problem.inputs, problem.target, problem.row_weights),
             problem.scaling,
             problem.library.variables[1:],
+            problem.dt_s,
             memory,
             Fade(runs.amplitudes[0], problem.region) if problem.options.fade else None,
         )

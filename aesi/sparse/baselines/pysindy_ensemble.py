@@ -51,13 +51,17 @@ def _median_coefficients(theta: np.ndarray, target: np.ndarray, ridge: float, se
     """(m,) median over the members.  theta : (n, m).  target : (n, 1)."""
     import pysindy
 
-    np.random.seed(seed)  # PySINDy draws its rows by the global generator  # noqa: NPY002
     ensemble = pysindy.EnsembleOptimizer(
         pysindy.STLSQ(threshold=THRESHOLD, alpha=ridge, unbias=False), bagging=True, n_models=MEMBERS
     )
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        ensemble.fit(theta, target)
+    others = np.random.get_state()  # noqa: NPY002
+    np.random.seed(seed)  # PySINDy draws its rows by the global generator  # noqa: NPY002
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            ensemble.fit(theta, target)
+    finally:
+        np.random.set_state(others)  # noqa: NPY002
     return np.asarray(np.median([member[0] for member in ensemble.coef_list], axis=0), dtype=float)
 
 

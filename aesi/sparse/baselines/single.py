@@ -48,7 +48,7 @@ class Judge:
 
     def admits(self, tried: Tried) -> bool:
         """Whether a candidate meets the constraints."""
-        return tried.pearson_train > self.pearson_train and tried.valid.pearson > self.pearson_valid
+        return tried.pearson_train >= self.pearson_train and tried.valid.pearson >= self.pearson_valid
 
     def best(self, tried: Iterable[T]) -> T:
         """The fittest of those that meet the constraints, or of all where none does; of equal ones the first."""

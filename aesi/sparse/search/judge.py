@@ -143,10 +143,10 @@ def runs_without_feedback(problem: Problem, predictions: Array) -> tuple[FoldRun
 
     predictions : (n, 2) scaled predictions by the inputs alone, of rows that the models have not seen."""
     amplitudes = [1.0] * predictions.shape[1]
-    sums = _fold_sums(problem, predictions)
     if problem.options.fade:
         predictions = problem.nearness[:, None] * predictions
-        sums = _fold_sums(problem, predictions)
+    sums = _fold_sums(problem, predictions)
+    if problem.options.fade:
         amplitudes = [
             amplitude(problem.unseen_target, column, problem.folds, problem.fold_drives, problem.row_weights)
             for column in predictions.T

@@ -44,6 +44,19 @@ def with_inputs(series: ErrorSeries, names: Sequence[str]) -> ErrorSeries:
     return replace(series, inputs=np.column_stack(columns), input_names=tuple(names))
 
 
+def model_variables(series: ErrorSeries, names: Sequence[str], dt_s: float) -> Array:
+    """(n, 1 + n_inputs): the error (V) and the named inputs along a record, for a model that steps by `dt_s` (s).
+
+    Raises DataError for a record that is sampled at another step, else as `with_inputs`.
+    """
+    if abs(series.dt_s / dt_s - 1.0) > 0.01:
+        raise DataError(
+            f"{series.name}: sampled every {series.dt_s:g} s, but the model steps {dt_s:g} s; "
+            f"resample the record to {dt_s:g} s."
+        )
+    return np.column_stack([series.error_v, with_inputs(series, names).inputs])
+
+
 def _column(series: ErrorSeries, name: str) -> Array:
     if name in series.input_names:
         return series.inputs[:, series.input_names.index(name)]

@@ -3,6 +3,8 @@
 import numpy as np
 import optuna
 import pytest
+from optuna.storages import JournalStorage
+from optuna.storages.journal import JournalFileBackend
 
 from aesi.errors import FitError
 from aesi.records import Failed
@@ -28,7 +30,7 @@ def test_the_same_seed_gives_the_same_search(problem):
 
 def test_an_interrupted_search_goes_on_as_if_it_had_not_been(problem, tmp_path):
     whole = search(problem, 12, seed=3, settings=SearchSettings(4))
-    journal = tmp_path / "study" / "journal.log"
+    journal = JournalStorage(JournalFileBackend(str(tmp_path / "journal.log")))
     calls = 0
 
     def stops(genome):

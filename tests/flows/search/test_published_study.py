@@ -38,8 +38,8 @@ def test_the_study_died_with_the_process(publish, candidate, said):
     assert done.params["ridge (lambda1)"] == candidate.genome.lambda1
     assert done.user_attrs["coverage on validation, %"] == 91.0
     assert list(done.constraints) == [
-        "correlation on training above 0.5",
-        "correlation on validation above 0.9",
+        "correlation on training of at least 0.5",
+        "correlation on validation of at least 0.9",
     ]
     assert failed.user_attrs["failed"] == "took longer than 60 s"
     assert again.metric_names == list(LOSSES)

@@ -196,6 +196,26 @@ def test_the_band_of_physics_alone_counted_rows_of_any_length_as_steps(model, re
     np.testing.assert_allclose(often.voltage_v, often.physics_v, atol=1e-12)
 
 
+def test_saved_physics_alone_has_its_intervals_one_step_ahead(model, record, data, tmp_path):
+    _, _, models = fitted(record)
+    bare = next(each for each in models if each.model.name == "ESPM")
+    saved = replace(model, correction=None, intervals=bare.intervals, bands=bare.bands).save(
+        tmp_path / "model"
+    )
+    physics = HybridModel.load(saved)
+    ahead = physics.predict(data.time_s, data.current_a, SOC0, data.voltage_v)
+    np.testing.assert_array_equal(ahead.voltage_v, ahead.physics_v)
+    assert ahead.nominal == pytest.approx(1.0 - bare.intervals.alpha)
+    residual = data.voltage_v - ahead.physics_v
+    residual[0] = np.nan
+    band = bare.intervals.intervals(residual, data.current_a)
+    np.testing.assert_allclose(ahead.lower_v[1:] - ahead.physics_v[1:], band.lower_v[1:], atol=1e-12)
+    np.testing.assert_allclose(ahead.upper_v[1:] - ahead.physics_v[1:], band.upper_v[1:], atol=1e-12)
+    apart = data.take(slice(0, None, 2))
+    with pytest.raises(DataError, match="one step of the model is 1 s"):
+        physics.predict_record(apart, SOC0, one_step=True)
+
+
 def linear_drive(model, dt_s, every_s=1.0, seconds=900.0):
     """Time, current and voltage of the model's own physics on a drive that runs straight between points `every_s`."""
     rng = np.random.default_rng(0)
@@ -216,7 +236,7 @@ def test_a_current_that_runs_straight_came_early_where_a_record_was_brought_to_a
 
 def test_one_step_of_rows_further_apart_than_a_step_saw_the_row_that_it_predicts(model, tmp_path):
     time_s, current_a, voltage_v = linear_drive(model, 2.0)
-    with pytest.raises(DataError, match="its rows are 2 s apart, and one step of the correction is 1 s"):
+    with pytest.raises(DataError, match="its rows are 2 s apart, and one step of the model is 1 s"):
         model.predict(time_s, current_a, SOC0, voltage_v)
     model.predict(time_s, current_a, SOC0)  # a free run is none of its rows
 

@@ -49,6 +49,13 @@ def test_k_steps_lie_between_one_step_and_free_run():
             assert model.k_step(series, 5)[15] == pytest.approx(by_hand, abs=1e-15)
 
 
+def test_five_steps_ahead_a_measured_error_is_remembered_as_worked_by_hand():
+    error, current = np.random.default_rng(0).uniform(-0.9, 0.9, (2, 20))
+    by_inputs = 0.05 * current  # the prediction of the sample after each
+    ahead = by_inputs[14] + 0.9**5 * (error[10] - by_inputs[9])
+    assert linear(0.0, 0.05, 0.9).k_step(record(error, current), 5)[15] == pytest.approx(ahead, abs=1e-15)
+
+
 def test_divergence_is_found_and_held():
     run = linear(1.5, 0.0, outside="extrapolate").free_run(record([0.9] + [0] * 20, [0.0] * 21))
     # 0.9 * 1.5**n exceeds ten at n = 6.
