@@ -7,12 +7,12 @@ It is never guessed from the numbers.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR, ZERO_CELSIUS_K
-from aesi.errors import DataError
+from aesi.errors import DataError, did_you_mean
 from aesi.numerics.typing import Array
 
 SECONDS_PER_MINUTE, SECONDS_PER_DAY = 60.0, 24.0 * SECONDS_PER_HOUR
@@ -79,7 +79,9 @@ def spelt(quantity: str, text: str) -> str | None:
 def declared(quantity: str, text: str) -> str:
     """The unit that a user stated.  Raises DataError, with the known units, for an unknown one."""
     if quantity not in SI:
-        raise DataError(f"{quantity!r} has no unit to declare; those that have one: {', '.join(SI)}.")
+        raise DataError(
+            f"{quantity!r} has no unit to declare{did_you_mean(quantity, SI)} Those that have one: {', '.join(SI)}."
+        )
     if quantity == "time_s" and ("%" in text or text.strip().lower() == DATE):
         return text.strip() if "%" in text else DATE
     unit = spelt(quantity, text)
@@ -87,6 +89,13 @@ def declared(quantity: str, text: str) -> str:
         also = ", h:m:s, date, or a pattern such as '%d.%m.%Y %H:%M:%S'" if quantity == "time_s" else ""
         raise DataError(f"{quantity} in {text!r} is unknown; units: {', '.join(FACTORS[quantity])}{also}.")
     return unit
+
+
+def known_units(units: Mapping[str, str]) -> Mapping[str, str]:
+    """The user's units by quantity, as they are.  Raises DataError as `declared` does."""
+    for quantity, unit in units.items():
+        declared(quantity, unit)
+    return units
 
 
 def is_text(unit: str) -> bool:

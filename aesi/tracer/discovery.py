@@ -109,6 +109,7 @@ class Discovery:
     than another one, on the test part or on the fitted rows; and on a test part without load.
     other_temperature : names of the records, tests included, that contradict their temperature and that no model
     fitted at that temperature explains.
+    good : names of the records that are known to be good, from which the verdict says how the others differ.
     seconds : spent.  simulations : spent on the hypotheses that were tried, not on judging them.
     """
 
@@ -130,6 +131,7 @@ class Discovery:
     contradicted: bool = False
     warnings: tuple[str, ...] = ()
     other_temperature: tuple[str, ...] = ()
+    good: tuple[str, ...] = ()
     held: tuple[ActiveEffect, ...] = ()
     written: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     own: Mapping[State, tuple[OwnParameter, ...]] = field(default_factory=dict)
@@ -299,6 +301,7 @@ def _discovery_of(
             *warnings(files, verdict, REST_C_RATE * problem.cell.capacity_ah),
         ),
         other_temperature=tuple(at_other),
+        good=tuple(record.name for record in records if record.good),
         written={name: (evidence.after.values or {})[name] for name in evidence.after.hypothesis},
         own={state: own_parameters(fits[state]) for state in ("recalibrated", "after")},
         tried=problem.competing(),

@@ -186,7 +186,7 @@ def result_line(row: Mapping[str, Any]) -> str:
     beyond = free.get("test_mser_recalibrated_pct")
     if beyond is not None and isfinite(beyond):
         line += f", {reduced(beyond)} than recalibrated"
-    if step:
+    if step.get("coverage_pct") is not None:
         line += f"; {step['coverage_pct']:.1f} % covered one step ahead at {step['nominal_pct']:g} %"
     return f"{line}."
 

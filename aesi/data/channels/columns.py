@@ -19,7 +19,7 @@ from aesi.data.channels import headers
 from aesi.data.readers.formats.format import Sign
 from aesi.data.readers.heading import NUMBER
 from aesi.data.readers.table import TableFile, names_listed
-from aesi.errors import DataError
+from aesi.errors import DataError, did_you_mean
 
 REQUIRED = ("time_s", "current_a", "voltage_v")
 QUANTITIES = (*REQUIRED, "temperature_degc")
@@ -101,6 +101,18 @@ def map_columns(
     return finder.mapped()
 
 
+def known_quantities(columns: Mapping[str, str | None]) -> Mapping[str, str | None]:
+    """The user's columns by quantity, as they are.  Raises DataError for a name that is neither a quantity nor a
+    selector."""
+    known = (*QUANTITIES, *SELECTORS)
+    for name in columns:
+        if name not in known:
+            raise DataError(
+                f"{name!r} is not a quantity to map{did_you_mean(name, known)} There are {', '.join(known)}."
+            )
+    return columns
+
+
 class _Finder:
     """Looks up quantities in one table and stores the columns found."""
 
@@ -113,11 +125,7 @@ class _Finder:
     ) -> None:
         self._table, self.given, self._declared, self._required = table, given, declared, required
         self._file = table.path.name
-        for quantity in given:
-            if quantity not in (*QUANTITIES, *SELECTORS):
-                raise DataError(
-                    f"{quantity!r} is not a quantity to map; there are {', '.join((*QUANTITIES, *SELECTORS))}."
-                )
+        known_quantities(given)
         self.position: dict[str, int] = {}
         self.unit: dict[str, str] = {}
         self.notes: list[str] = []

@@ -122,9 +122,17 @@ def replaced_relation_sentences(cell: CellParameters) -> tuple[str, ...]:
         )
         ocp = electrode.ocp
         if isinstance(ocp, LookupTable) and (ocp.x[0] > 0.0 or ocp.x[-1] < 1.0):
+            low, high = electrode.theta_min, electrode.theta_max
+            constant = (
+                f"its stoichiometry limits are {low:.4g} and {high:.4g}, so that at rest, too, it stays at the last "
+                "value between the two, and no state of charge there can be told from a voltage: give a table over all "
+                "of that"
+                if low < ocp.x[0] or ocp.x[-1] < high
+                else "where surfaces leave that under load it stays at the last value, and the voltage falls or rises "
+                "late"
+            )
             sentences.append(
-                f"the potential of the {side} electrode is a table from {ocp.x[0]:.4g} to {ocp.x[-1]:.4g}; "
-                "where surfaces leave that under load it stays at the last value, and the voltage falls or rises late."
+                f"the potential of the {side} electrode is a table from {ocp.x[0]:.4g} to {ocp.x[-1]:.4g}; {constant}."
             )
     electrolyte = cell.electrolyte
     salt = electrolyte.c0_mol_m3 * np.linspace(*WORKING_SPAN, POINTS)

@@ -289,6 +289,12 @@ def _check_electrode(electrode: Electrode, what: str) -> None:
     if not np.isfinite(potential).all():
         x = inside[int(np.argmin(np.isfinite(potential)))]
         raise CellError(f"{what}: the open-circuit potential is not finite at a stoichiometry of {x:.3g}.")
+    if potential[-1] > potential[0]:
+        raise CellError(
+            f"{what}: the open-circuit potential rises from {potential[0]:.4g} V at a stoichiometry of {inside[0]:.3g} "
+            f"to {potential[-1]:.4g} V at {inside[-1]:.3g}; that of an electrode falls as it takes up lithium: the "
+            "stoichiometry may be counted the other way round."
+        )
 
 
 def _check_share(what: str, name: str, value: float) -> None:

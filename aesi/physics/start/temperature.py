@@ -49,12 +49,14 @@ FURTHER_K = 8.0
 @dataclass(frozen=True)
 class OtherTemperature:
     """degc, left_v : mean temperature of the rows, and the RMS error of the declared cell at it, V.  there_degc,
-    there_v : temperature with the smallest RMS error, and that error, V."""
+    there_v : temperature with the smallest RMS error, and that error, V.  constant : whether all rows have the same
+    temperature, which no sensor on a cell under load tells."""
 
     degc: float
     left_v: float
     there_degc: float
     there_v: float
+    constant: bool = False
 
     def sentence(
         self,
@@ -66,12 +68,18 @@ class OtherTemperature:
     ) -> str:
         """The sentence for a reader.  name : of the record.  model : the simulated one, in words.  otherwise : clause
         on the cause if the temperature is right.  given : True for a temperature by --temperature, without a column."""
-        wrong = (
-            "what was given is not the cell's (correct --temperature FILE=DEGC)"
-            if given
-            else "it is in another unit (--unit temperature_degc=degF), its sensor is at fault or not on the cell "
-            "(--column temperature_degc= leaves it out)"
-        )
+        if given:
+            wrong = "what was given is not the cell's (correct --temperature FILE=DEGC)"
+        elif self.constant:
+            wrong = (
+                "it is the same in all rows: stated or of a chamber, and not the cell's, of a dead sensor, or in "
+                "another unit (--column temperature_degc=DEGC states another, --column temperature_degc= leaves it out)"
+            )
+        else:
+            wrong = (
+                "it is in another unit (--unit temperature_degc=degF), its sensor is at fault or not on the cell "
+                "(--column temperature_degc= leaves it out)"
+            )
         return (
             f"{name}: its voltage contradicts its temperature. The error of {model} is {MV_PER_V * self.left_v:.1f} mV "
             f"at {self.degc:.4g} degC, which it is taken at, and {MV_PER_V * self.there_v:.1f} mV at "
@@ -148,4 +156,4 @@ def other_temperature(
     best = min(tried, key=lambda degc: tried[degc])
     if not (tried[best] <= FOLLOWS_V and left_v >= TIMES * tried[best]):
         return None
-    return OtherTemperature(mean, left_v, best, tried[best])
+    return OtherTemperature(mean, left_v, best, tried[best], bool(np.ptp(column_degc) == 0.0))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -43,7 +43,9 @@ from aesi.pipeline.product.contents import contents
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.deviations import PhysicsVariant
 from aesi.pipeline.product.hybrid import HybridModel
+from aesi.pipeline.product.one_step import LEAST_ROWS
 from aesi.records import ErrorSeries, Hold, LeftOutDrives, Measurement, Role, Split, hold_sentence
+from aesi.records.steps import after_gap
 
 DFN_NOTE = "The physics is the porous electrode: DFN in tables and figures, where others have ESPM."
 
@@ -56,6 +58,7 @@ class Loaded:
     """The loaded data of an experiment.
 
     cell : of the physics that is corrected (`cell.start`).  cell_name : its name in reports.  effects : added to it.
+    cells : name of each physics model -> its cell.
     split : error series by role.
     left_out : the training drives under physics that was fitted without a part of one (`cuts`), or without a whole one,
     in turn.
@@ -79,6 +82,7 @@ class Loaded:
     fallback: str = ""
     model: ModelName = "espm"
     files: str = ""
+    cells: Mapping[str, Cell] = field(default_factory=dict)
 
     @property
     def setting(self) -> str:
@@ -163,6 +167,7 @@ def _load(config: ExperimentConfig) -> Loaded:
         config=config,
         model=given.model,
         files=_cell_files_digest(path, config),
+        cells={name: variant.cell for name, variant in physics.by_name.items()},
     )
 
 
@@ -287,6 +292,11 @@ def _on_grid(
         held = hold_sentence(measurement.name, data.hold, data.declared_hold is not None, "data.hold: {}")
         # Resampling comes first, since it refuses a time step that would make too many rows, or none.
         even = to_even(measurement, data.dt_s, data.hold)
+        if name in judging and len(even) < LEAST_ROWS:
+            raise DataError(
+                f"{measurement.name} has {len(even)} steps of {data.dt_s:g} s (data.dt_s), and a test record needs "
+                f"{LEAST_ROWS}: give a longer one under data.test."
+            )
         sampled = _sampling_sentences(measurement, even, data.dt_s, judges=name in judging)
         notes += [
             held,
@@ -324,9 +334,16 @@ def _sampling_sentences(
         of_what = "voltages filled in between rows, which scatter less than rows do"
     else:
         return []
+    ahead = int(np.count_nonzero(~after_gap(time_s, dt_s)[1:]))
+    one_step = "one step ahead they are of rows as measured"
+    if ahead < LEAST_ROWS:
+        one_step = (
+            f"one step ahead, {ahead} of its rows lie a step after another one, and figures need {LEAST_ROWS} such "
+            "rows of all test records"
+        )
     return [
         f"{measurement.name}: its rows do not lie every {dt_s:g} s. In free run, errors and bands are of {of_what}; "
-        "one step ahead they are of rows as measured."
+        f"{one_step}."
     ]
 
 

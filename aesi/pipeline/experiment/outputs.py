@@ -87,6 +87,11 @@ class Result:
         return RECALIBRATED if self.loaded.config.cell.start == "recalibrated" else DECLARED
 
     @property
+    def saved_physics(self) -> str:
+        """Name of the physics in the saved model: the chosen model if that is one, else the one that is corrected."""
+        return self.best if self.best in self.loaded.cells else self.corrected
+
+    @property
     def kept(self) -> Fitted | None:
         """The chosen model if a model folder can hold it (a sparse model, or the corrected physics alone); else None.
         Its bands are saved with it."""
@@ -116,7 +121,8 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
         "models": rows,
     }
     # Predictions repeat the finding of the saved model; it is left out if it is about another model than the saved one.
-    replace(hybrid(result), finding=finding if result.kept else "").save(folder / MODEL)
+    about_saved = result.kept is not None or result.saved_physics == result.best
+    replace(hybrid(result), finding=finding if about_saved else "").save(folder / MODEL)
     for format, name in TABLES.items():
         write_whole(folder / name, tables.render(rows, format))
     write_run_report(folder / REPORT, view)
@@ -129,7 +135,12 @@ def notes(result: Result) -> tuple[str, ...]:
     """The notes of the report: sentences on the data, on terms and models that were left out, on failed candidates, and
     on intervals that could not be calibrated."""
     without_intervals = (note for one in result.fitted for note in one.notes)
-    alone = f"The saved model is the {result.corrected} alone, without bands: {result.best} cannot be kept with it."
+    because = (
+        f"bands of physics are kept for the {result.corrected} alone (cell.start)"
+        if result.saved_physics == result.best
+        else f"{result.best} cannot be kept with it"
+    )
+    alone = f"The saved model is the {result.saved_physics} alone, without bands: {because}."
     told = () if result.kept else (alone,)
     failed = candidates_failed(result.failed, result.evaluated)
     return together(
@@ -155,16 +166,16 @@ def _published_trace(trace: RecordTrace, shown: Callable[[str], str]) -> RecordT
 def hybrid(result: Result) -> HybridModel:
     """The hybrid model that is saved: physics, effects, the chosen ensemble with its intervals and bands; the physics
     alone, without bands, if the chosen model cannot be saved."""
-    one = result.kept
+    one, physics = result.kept, result.saved_physics
     return HybridModel(
-        cell=result.loaded.cell,
+        cell=result.loaded.cells.get(physics, result.loaded.cell),
         effects=result.loaded.effects,
         correction=one.model if one and isinstance(one.model, SparseModel) else None,
         intervals=one.intervals if one else None,
         bands=one.bands if one else None,
         dt_s=result.loaded.config.data.dt_s,
         hold=result.loaded.config.data.hold,
-        soc0=next(iter(result.loaded.soc0.values()), None),
+        soc0=next(iter(result.loaded.soc0.values()), None) if physics == result.corrected else None,
         model=result.loaded.model,
     )
 

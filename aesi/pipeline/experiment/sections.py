@@ -20,7 +20,9 @@ from pydantic import (
     model_validator,
 )
 
+from aesi.data.channels.columns import known_quantities
 from aesi.data.reading import Reading, column_name
+from aesi.data.units import known_units
 from aesi.physics import ModelName
 from aesi.physics.cell import Soh, checked_soh
 from aesi.records import Hold
@@ -174,8 +176,10 @@ class DataConfig(Section):
     test: tuple[str, ...] = ()
     dt_s: Positive = 1.0
     hold: Hold = "backward"
-    columns: dict[str, Annotated[str | None, BeforeValidator(column_name)]] = {}
-    units: dict[str, str] = {}
+    columns: Annotated[
+        dict[str, Annotated[str | None, BeforeValidator(column_name)]], AfterValidator(known_quantities)
+    ] = {}
+    units: Annotated[dict[str, str], AfterValidator(known_units)] = {}
     sign: Literal["discharge-positive", "charge-positive"] | None = None
     state_words: dict[str, Literal["charge", "discharge", "rest"]] = {}
     duplicates: Literal["refuse", "first", "last"] | None = None

@@ -16,6 +16,10 @@ from aesi.records import ErrorModel, ErrorSeries
 from aesi.records.steps import after_gap, rows_until
 from aesi.sparse.yardsticks import Bare
 
+LEAST_ROWS = 100
+"""Fewest rows that figures of test records are given of. Of as many independent rows a coverage of 90 % is uncertain by
+3 points. A convention."""
+
 
 @dataclass(frozen=True, eq=False)
 class RowsAhead:

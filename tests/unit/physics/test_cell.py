@@ -260,7 +260,19 @@ def test_a_relation_that_does_not_hold_where_surfaces_and_salt_come_was_replaced
     solid, table, salt = Cell.from_bpx(content).unread
     assert "of the negative electrode is no positive number at stoichiometries of 0.95 to 1:" in solid
     assert "of the positive electrode is a table from 0.1 to 0.95" in table
+    assert "under load" in table
     assert "conductivity of the electrolyte is no positive number at 1668 to 2000 mol/m3" in salt
+    parts["Positive electrode"]["OCP [V]"] = {"x": [0.4, 0.8], "y": [4.3, 3.0]}
+    short = Cell.from_bpx(content).unread[1]
+    assert "its stoichiometry limits are" in short
+    assert "so that at rest, too, it stays at the last value" in short
+
+
+def test_a_potential_over_the_lithium_that_was_taken_out_is_refused(content):
+    side = content["Parameterisation"]["Positive electrode"]
+    side["OCP [V]"] = {"x": [0.0, 1.0], "y": [3.0, 4.4]}
+    with pytest.raises(CellError, match="Positive electrode: the open-circuit potential rises from 3"):
+        Cell.from_bpx(content)
 
 
 @pytest.mark.parametrize("times", [3.0, 1.0 / 3.0])

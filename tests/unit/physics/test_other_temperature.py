@@ -21,7 +21,11 @@ def test_a_dead_column_is_told_with_the_temperature_that_the_record_shows():
         "error of the declared model is 110.0 mV at 0 degC, which it is taken at, and 10.0 mV at 25 degC"
         in (found.sentence("drive"))
     )
-    assert "--column temperature_degc= leaves it out" in found.sentence("drive")
+    assert "it is the same in all rows: stated" in found.sentence("drive")
+    warming = other_temperature(np.linspace(-1.0, 1.0, 5), 25.0, error_of(25.0)).sentence("drive")
+    assert "its sensor is at fault" in warming
+    for told in (found.sentence("drive"), warming):
+        assert "--column temperature_degc= leaves it out" in told
 
 
 def test_of_a_temperature_that_was_given_the_column_was_to_be_left_out():

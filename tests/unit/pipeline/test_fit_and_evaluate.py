@@ -73,7 +73,8 @@ def test_the_error_of_a_record_on_which_the_model_ran_empty_was_told_without_a_t
 def test_a_record_that_is_trained_on_may_not_judge(record, tmp_path):
     same = tmp_path / "the_same.csv"
     same.write_bytes(record.read_bytes())
-    for train, valid, test in (([record], [], [record]), ([record], [], [same]), ([record], [same], [same])):
+    other = write_record(tmp_path, "other.csv", 3)
+    for train, valid, test in (([record], [], [record]), ([record], [], [same]), ([other], [same], [record])):
         roles = {"train": train, "valid": valid, "test": test}
         data = {"kind": "files", **{role: [str(path) for path in paths] for role, paths in roles.items()}}
         with pytest.raises(DataError, match="among the data and the tests; what is fitted cannot judge"):

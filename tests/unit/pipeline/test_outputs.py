@@ -56,20 +56,33 @@ def test_physics_was_saved_with_the_bands_of_other_physics(record):
     one = result(record, "ESPM", "ESPM recalibrated")
     assert one.best == "ESPM recalibrated"
     model = hybrid(one)
+    assert model.cell is one.loaded.cells["ESPM recalibrated"] is not one.loaded.cell
     assert model.bands is None
     assert model.intervals is None
     (told,) = [note for note in notes(one) if "saved model" in note]
+    assert told == (
+        "The saved model is the ESPM recalibrated alone, without bands: bands of physics are kept for the ESPM alone "
+        "(cell.start)."
+    )
+
+
+def test_a_model_that_cannot_be_kept_leaves_the_physics_that_it_corrects(record):
+    one = result(record, "ESPM", "gradient boosting")
+    assert hybrid(one).cell is one.loaded.cell
+    (told,) = [note for note in notes(one) if "saved model" in note]
     assert (
-        told == "The saved model is the ESPM alone, without bands: ESPM recalibrated cannot be kept with it."
+        told == "The saved model is the ESPM alone, without bands: gradient boosting cannot be kept with it."
     )
 
 
 def test_a_saved_model_told_the_finding_of_the_one_that_could_not_be_kept(record, tmp_path):
-    for models, kept in ((("ESPM", "ESPM recalibrated"), False), (("ESPM recalibrated", "ESPM"), True)):
-        one = result(record, *models)
-        assert bool(one.kept) is kept
-        summary = write_outputs(tmp_path, one)
-        assert HybridModel.load(tmp_path / MODEL).finding == (summary["finding"] if kept else "")
+    for models, about_it in (
+        (("ESPM", "gradient boosting"), False),
+        (("ESPM", "ESPM recalibrated"), True),
+        (("ESPM recalibrated", "ESPM"), True),
+    ):
+        summary = write_outputs(tmp_path, result(record, *models))
+        assert HybridModel.load(tmp_path / MODEL).finding == (summary["finding"] if about_it else "")
 
 
 def test_candidates_that_failed_were_told_nowhere(record):

@@ -90,6 +90,9 @@ def test_the_line_of_a_verdict():
     assert finding_line({**found, "verdict": "none", "effects": []}).startswith(
         "none: these data show nothing"
     )
+    nothing = {**found, "verdict": "none", "effects": []}
+    beside = finding_line({**nothing, "good": ["one", "two"]})
+    assert beside == "none: these data show no error that one and two, known to be good, do not show too"
     partly = finding_line({**found, "verdict": "unknown"})
     assert partly.startswith(
         "unknown: 8.00 mohm [7.90, 8.10] more series resistance explains a part of the error; a systematic error"

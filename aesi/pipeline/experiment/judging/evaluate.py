@@ -23,7 +23,7 @@ from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.intervals.bands import error_ahead, reach
 from aesi.pipeline.experiment.judging.reductions import AGAINST
 from aesi.pipeline.experiment.physics_models import DECLARED
-from aesi.pipeline.product.one_step import RowsAhead, rows_ahead
+from aesi.pipeline.product.one_step import LEAST_ROWS, RowsAhead, rows_ahead
 from aesi.pipeline.product.trained import outside_trained, trained_figures, trained_on
 from aesi.pipeline.report.views import ModelVoltage, RecordTrace
 from aesi.records import ROLES, ErrorSeries, FreeRun, Role, Split
@@ -279,10 +279,10 @@ def _left_out(band: HorizonBand) -> dict[str, float]:
 
 
 def _rms_mv(left_v: Iterable[Array]) -> float:
-    """RMS over all finite errors of all records, mV; NaN without any.  left_v : (n_i,) V per record."""
+    """RMS over all finite errors of all records, mV; NaN for fewer than `LEAST_ROWS`.  left_v : (n_i,) V per record."""
     joined = _joined(left_v)
     scored = joined[np.isfinite(joined)]
-    return MV_PER_V * rms(scored) if scored.size else float("nan")
+    return MV_PER_V * rms(scored) if scored.size >= LEAST_ROWS else float("nan")
 
 
 def _interval_figures(
@@ -291,8 +291,11 @@ def _interval_figures(
     residuals: Sequence[Array],
     alpha: float,
 ) -> dict[str, float]:
-    """Scores of intervals over all test records together: coverages in per cent, widths and scores in V. A bin of
-    current and state of charge can have samples of several records."""
+    """Scores of intervals over all test records together: coverages in per cent, widths and scores in V; NaN for fewer
+    rows than `LEAST_ROWS`. A bin of current and state of charge can have samples of several records."""
+    left_v = _joined(residuals)
+    if np.count_nonzero(np.isfinite(left_v)) < LEAST_ROWS:
+        left_v = np.full(len(left_v), np.nan)
     known = [each for each in intervals if each is not None]
     together = Intervals(
         lower_v=_joined(each.lower_v for each in known),
@@ -301,7 +304,7 @@ def _interval_figures(
     )
     scores = scores_of(
         together,
-        _joined(residuals),
+        left_v,
         alpha,
         current_a=_joined(r.current_a for r in test),
         soc=_joined(r.soc for r in test),

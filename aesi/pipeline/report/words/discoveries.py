@@ -14,8 +14,10 @@ from aesi.pipeline.report.views import DiscoveryView, Row
 from aesi.pipeline.report.words.sizes import (
     explain_part,
     finding_line,
+    listed,
     refit_does_as_well,
     unexplained_by,
+    what_good_records_lack,
     with_size,
 )
 from aesi.tracer.decide.model_to_write import AS_GOOD
@@ -108,7 +110,8 @@ def _left_mv(discovery: Mapping[str, Any], part: str) -> dict[str, float]:
 def _verdict(view: DiscoveryView) -> str:
     verdict, effects = view.discovery["verdict"], view.discovery["effects"]
     if verdict == "none":
-        return f'These data show nothing that the declared model of "{view.cell}" lacks.'
+        nothing = f'nothing that the declared model of "{view.cell}" lacks'
+        return f"These data show {what_good_records_lack(view.discovery) or nothing}."
     if verdict == "unknown":
         rest = unexplained_by(view.discovery)
         if not effects:
@@ -193,10 +196,12 @@ def reason_finding(discovery: Mapping[str, Any]) -> str:
     left, allowed = discovery["structured_mv"], discovery["tolerance_mv"]
     amount = f"the voltage error beyond sensor noise is {left:.2f} mV {UNSEEN}"
     if discovery["verdict"] == "none":
-        return (
-            f"Why: {amount}. The noise and the accuracy of any such model account for up to {allowed:.2f} mV, so "
-            "these data give no reason to change the model."
+        so = (
+            "; what the known-good records lack too, the verdict does not tell: leave --good out to ask for that."
+            if discovery.get("good")
+            else ", so these data give no reason to change the model."
         )
+        return f"Why: {amount}. The noise and the accuracy of any such model account for up to {allowed:.2f} mV{so}"
     if discovery["verdict"] == "found":
         return f"Why: with the finding added, {amount}; up to {allowed:.2f} mV count as explained."
     if left > allowed:
@@ -357,13 +362,6 @@ def rest_finding(discovery: Mapping[str, Any]) -> str:
             "unseen data. That points to a fault of an instrument, or to a state that the model lacks."
         )
     return text + "little systematic error remains for missing physics to explain."
-
-
-def listed(names: Sequence[str]) -> str:
-    """`a`, `a and b`, `a, b and c`."""
-    if len(names) < 2:
-        return "".join(names)
-    return f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _title(titles: Mapping[str, str], effect: str) -> str:

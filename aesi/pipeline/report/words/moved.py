@@ -6,8 +6,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from aesi.pipeline.report.views import Row
-from aesi.pipeline.report.words.discoveries import WITH_FINDING, capitalised, listed, states_of
-from aesi.pipeline.report.words.sizes import PERCENT, TELLING, name_words, resized, rounded, two_digits
+from aesi.pipeline.report.words.discoveries import WITH_FINDING, capitalised, states_of
+from aesi.pipeline.report.words.sizes import (
+    PERCENT,
+    TELLING,
+    listed,
+    name_words,
+    resized,
+    rounded,
+    two_digits,
+)
 
 MOST_NAMED = 3
 """Parameters that one sentence names."""

@@ -7,7 +7,7 @@ import numpy as np
 from aesi.over_time import stamp
 from aesi.pipeline.product.trained import ALL_PCT, trained_sentence
 from aesi.pipeline.report.views import Row, RunView
-from aesi.pipeline.report.words.discoveries import listed
+from aesi.pipeline.report.words.sizes import listed
 
 NEARLY = 0.98
 """A one-step error above this share of persistence's is called no better than it."""
@@ -79,12 +79,17 @@ def _gain_sentence(view: RunView) -> str:
     model, physics = view.model(view.chosen), view.model(view.physics)
     before, after = (_figure(row, "free_run", "test_rmse_mv") for row in (physics, model))
     reduction = _figure(model, "free_run", "test_mser_pct")
-    if before is None or after is None or reduction is None:
+    if after is None or reduction is None:
         return f"No model of the voltage error could be evaluated in free run on {view.cell}."
-    if view.chosen == view.physics:
+    if before is None:  # the physics as declared is not among the models of the experiment
+        before = float(after / np.sqrt(1.0 - reduction / 100.0))
+    if view.chosen in (view.physics, view.corrected):
+        declared = (
+            "" if view.chosen == view.physics else f", the {view.physics} as declared by {before:.1f} mV"
+        )
         return (
-            f"No correction of the voltage error was chosen: the {view.physics} alone errs by {before:.1f} "
-            "mV RMSE on the test records."
+            f"No correction of the voltage error was chosen: the {view.chosen} alone errs by {after:.1f} "
+            f"mV RMSE on the test records{declared}."
         )
     corrected = _figure(view.model(view.corrected), "free_run", "test_rmse_mv")
     if corrected is not None and view.corrected != view.chosen and corrected < min(before, after):

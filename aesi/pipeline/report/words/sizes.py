@@ -132,12 +132,28 @@ def two_digits(value: float) -> str:
     return f"{float(f'{value:.2g}'):g}"
 
 
+def listed(names: Sequence[str]) -> str:
+    """`a`, `a and b`, `a, b and c`."""
+    if len(names) < 2:
+        return "".join(names)
+    return f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def what_good_records_lack(discovery: Mapping[str, Any]) -> str:
+    """Words on a verdict `none` beside known-good records: 'no error that new_drive, known to be good, does not show
+    too'; '' without such records."""
+    good = discovery.get("good", ())
+    shows = "does" if len(good) == 1 else "do"
+    return f"no error that {listed(good)}, known to be good, {shows} not show too" if good else ""
+
+
 def finding_line(discovery: Mapping[str, Any]) -> str:
     """The verdict in one line, with what was found and how much of it; a confidence where it belongs to a name."""
     effects = [with_size(effect, discovery) for effect in discovery["effects"]]
     verdict = discovery["verdict"]
     if verdict == "none":
-        return "none: these data show nothing that the declared model lacks"
+        beside = what_good_records_lack(discovery)
+        return f"none: these data show {beside or 'nothing that the declared model lacks'}"
     if verdict == "unknown":
         remains = "a systematic error remains"
         named = f"{', '.join(effects)} {explain_part(effects)}; " if effects else ""
