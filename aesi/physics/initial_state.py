@@ -40,6 +40,7 @@ from aesi.physics.start.load import DROP_ERROR, FLOWED_S, LoadedStart
 from aesi.physics.start.relaxing import Rest, resting_rows, settled_voltage
 from aesi.physics.start.state import Basis, InitialState
 from aesi.records import Hold, Measurement
+from aesi.records.rows import written_decimals
 
 __all__ = ["Basis", "InitialState", "initial_state"]
 
@@ -53,6 +54,8 @@ The rests that measured records begin with move 1.6e-4 at most, and a cycler who
 of 1C off takes half an hour for it. Hours of C/50 and C/55 either way from 0.02, 0.5 and 0.97 of an LG M50 are off by
 0.49 points RMS and 1.2 deviations at most; with half, twice and four times of it by 0.28, 0.47 and 0.45 points and 0.6,
 1.5 and 1.1 deviations; as one rest, whatever they move, by 17 points and 120 deviations."""
+STEP_SD = 12.0**-0.5
+"""Standard deviation of a value that is rounded to steps of one."""
 OTHER_STATE = 0.05
 OTHER_STATE_LOADED = 0.15
 """A given state of charge further than this from that of a record's voltage is contradicted by it, at rest and under
@@ -214,7 +217,10 @@ class _StartReading:
         # Before what these rows move, the cell was as much fuller and higher.
         moved = float(rest.rows.discharged_ah(self.hold)[-1]) / capacity_ah
         ocv_rise_before_v = self._rise_v(ocv_v, moved)
-        voltage_sds_v = [self.open_circuit.potentials_v, settled_sd_v]
+        step_v = 10.0 ** -written_decimals(self.record.voltage_v)
+        # A finer one adds 4 % to the deviation at most. Of a constant voltage it is not known.
+        coarse = step_v > self.open_circuit.potentials_v and np.ptp(self.record.voltage_v) > 0.0
+        voltage_sds_v = [self.open_circuit.potentials_v, settled_sd_v, STEP_SD * step_v if coarse else 0.0]
         if rest.flows:
             voltage_sds_v += [self._long_drop_v(rest, ocv_v), ocv_rise_before_v]
         spread_v = float(np.linalg.norm(voltage_sds_v))
@@ -233,16 +239,26 @@ class _StartReading:
             self._in_declared_windows(soc + moved),
             sd,
             "rest",
-            self._rest_words(begins_v, settled_v, settled_sd_v, soc + moved, sd),
+            self._rest_words(begins_v, settled_v, settled_sd_v, soc + moved, sd, step_v if coarse else None),
             rest_voltage_v=settled_v + ocv_rise_before_v,
             ends=(self._in_declared_windows(low + moved), self._in_declared_windows(high + moved)),
         )
 
     def _rest_words(
-        self, begins_v: float, settled_v: float, settled_sd_v: float, soc: float, sd: float
+        self,
+        begins_v: float,
+        settled_v: float,
+        settled_sd_v: float,
+        soc: float,
+        sd: float,
+        coarse_step_v: float | None,
     ) -> str:
-        """The sentence on a rest: its voltages, V, and the state of charge with its standard deviation."""
+        """The sentence on a rest: its voltages, V, and the state of charge with its standard deviation.
+
+        coarse_step_v : step that voltages are written in, where that makes the reading less certain."""
         words = f"{self.record.name} rests at {begins_v:.3f} V"
+        if coarse_step_v is not None:
+            words += f", written in steps of {coarse_step_v:.3g} V"
         if max(abs(settled_v - begins_v), settled_sd_v) > GOOD_READING_V:
             words += f", relaxing to {settled_v:.3f} +/- {settled_sd_v:.3f} V"
         words += f": state of charge {soc:.4f} +/- {sd:.4f}"

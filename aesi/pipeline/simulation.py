@@ -38,6 +38,7 @@ from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.simulation_words import (
     band_sentences,
+    changed_cell_sentences,
     effect_sentences,
     exact_start_sentence,
     first_error_sentences,
@@ -132,6 +133,7 @@ def simulate_file(
     degc, of_case = _case_degc(used, run, profile.temperature_degc, declared.cell)
     _write_run(out, run, degc)
     say([f"{profiled.record.name}: {words}" for words in of_case])
+    say(changed_cell_sentences(profiled.record, used, profiled.start.soc, run.series["soc"]))
     say(simulated_record_sentences(used.cell, profiled.record, run.voltage_v, run.series["soc"]))
     say(dry_collector_sentences(profiled.record.name, run, used.model))
     if asked.run_on and np.any(run.series["depleted"]):
@@ -207,6 +209,7 @@ def predict_file(
     _write(out, frame)
     # One step ahead knows the voltage before each row, which the physics does not: its errors are no peers of these.
     alone_v = None if hybrid.correction is None or measured else prediction.physics_v
+    say(changed_cell_sentences(record, hybrid, start.soc, prediction.soc))
     say(simulated_record_sentences(hybrid.cell, record, prediction.voltage_v, prediction.soc, alone_v))
     say(dry_collector_sentences(record.name, prediction, hybrid.model))
     say(first_error_sentences(record, prediction, hybrid, measured))

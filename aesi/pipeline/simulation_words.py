@@ -15,6 +15,8 @@ from aesi.pipeline.product.prediction import Prediction
 from aesi.pipeline.product.trained import trained_figures, trained_sentence
 from aesi.records import Measurement, Run
 
+SOC_DIGITS = 3
+"""Decimals of a state of charge in a note."""
 TOLD_SD = 0.01
 """Change of state of charge for which a note gives the change of the voltage. A convention."""
 
@@ -46,7 +48,9 @@ def simulated_record_sentences(
     voltage_v, soc : (n,) simulated.  alone_v : (n,) V by the physics without a correction, where there is one.
     A record without a voltage has no error.
     """
-    said = [f"{record.name}: state of charge {soc[0]:.3f} at the start, {soc[-1]:.3f} at the end."]
+    said = [
+        f"{record.name}: state of charge {soc[0]:.{SOC_DIGITS}f} at the start, {soc[-1]:.{SOC_DIGITS}f} at the end."
+    ]
     if np.all(np.isfinite(record.voltage_v)):
         error = MV_PER_V * (record.voltage_v - voltage_v)
         said.append(
@@ -107,6 +111,21 @@ def voltage_words(run: Run) -> str:
     at = int(np.argmax(depleted))
     until = f"{_range_v(voltage[:at])} until" if at else "no row before"
     return f"{until} it ran out at {stamp(run.time_s[at])} s, {_range_v(voltage[at:])} beyond, of no cell"
+
+
+def changed_cell_sentences(record: Measurement, model: HybridModel, soc0: float, soc: Array) -> list[str]:
+    """A sentence where effects of the model change what the electrodes hold between empty and full, so that a state of
+    charge is not that of the cell file.
+
+    soc0 : at the first row, of the cell file.  soc : (n,) simulated, of the cell with its effects.
+    """
+    if abs(float(soc[0]) - soc0) < 0.5 * 10.0**-SOC_DIGITS:
+        return []
+    names = ", ".join(active.id for active in model.effects)
+    return [
+        f"{record.name}: the {soc0:.{SOC_DIGITS}f} it starts at is of the cell file; the cell with its effects "
+        f"({names}) rests at the same voltage at {soc[0]:.{SOC_DIGITS}f}, and all states of charge are of that."
+    ]
 
 
 def _range_v(voltage_v: Array) -> str:

@@ -48,7 +48,7 @@ class Rows:
 
     def __init__(self, record: Measurement) -> None:
         self.time_s, self.current_a, self.voltage_v = record.time_s, record.current_a, record.voltage_v
-        self.decimals = tuple(map(_decimals, (self.time_s, self.current_a, self.voltage_v)))
+        self.decimals = tuple(map(written_decimals, (self.time_s, self.current_a, self.voltage_v)))
         self.step_s = float(np.median(np.diff(self.time_s))) if len(self.time_s) > 1 else np.inf
         self._unique: dict[tuple[int, int], tuple[IntArray, IntArray]] = {}
 
@@ -88,7 +88,7 @@ class Rows:
         return current, voltage
 
 
-def _decimals(column: Array) -> int:
+def written_decimals(column: Array) -> int:
     """Number of decimals in which a column (n,) is written, at most MOST_DECIMALS."""
     known = column[np.isfinite(column)]
     for digits in range(MOST_DECIMALS):

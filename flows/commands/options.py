@@ -69,7 +69,10 @@ def state_of_health(text: str | None) -> Soh | None:
         raise InputError(f"--soh {text}: {error}") from None
 
 
-SOC0_HELP = "State of charge at the first row, 0 (empty) to 1 (full). Default: read from the measured voltage"
+SOC0_HELP = (
+    "State of charge of the cell file at the first row, 0 (empty) to 1 (full). Default: read from the measured "
+    "voltage"
+)
 Soc0 = Annotated[
     float | None,
     typer.Option(

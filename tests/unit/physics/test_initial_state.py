@@ -55,6 +55,20 @@ def test_a_rest_gives_its_state_of_charge_within_the_uncertainty_it_claims(soc):
     assert abs(found.soc - soc) < found.sd
 
 
+@pytest.mark.parametrize("soc", [0.3, 0.55, 0.8])
+def test_a_rest_voltage_is_known_to_the_step_that_it_is_written_in(soc):
+    time = np.arange(600.0)
+    current = np.where(time < 120.0, 0.0, 2.5)
+    voltage_v = simulate(LG_M50, time, current, soc0=soc).voltage_v
+    coarse, fine = (
+        initial_state(LG_M50, record(time, current, np.round(voltage_v, digits))) for digits in (1, 4)
+    )
+    assert abs(coarse.soc - soc) < 2.0 * coarse.sd
+    assert coarse.sd > 2.0 * fine.sd
+    assert "V, written in steps of 0.1 V" in coarse.sentence
+    assert "written in steps" not in fine.sentence
+
+
 @pytest.mark.parametrize(("rows", "step_s"), [(2, 10.0), (3, 60.0), (30, 10.0)])
 def test_a_rest_whose_last_row_held_the_voltage_of_the_load_relaxed_to_far_less(rows, step_s):
     """A logger that writes the current a row after its voltage."""
