@@ -19,7 +19,7 @@ from aesi.bench import CaseRow, some_chosen
 from aesi.bench.limit import LOST, NO_TIME, NOT_RUN, NoAnswer, Stopwatch, answer_of
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.data import read_measurement
-from aesi.data.catalogue import locate
+from aesi.data.catalogue import HG2, LFP, M50T, NMC, PANASONIC, locate
 from aesi.errors import DataError
 from aesi.physics import Cell
 from aesi.pipeline.discovery.discover import discovery_content
@@ -53,25 +53,25 @@ class MeasuredSet:
 
 
 SETS = (
-    MeasuredSet("about_energy_nmc", None, ("C20", "C2", "1C", "drive_cycle"), ()),
-    MeasuredSet("about_energy_lfp", None, ("C20", "C2", "1C", "2C", "drive_cycle"), ()),
-    MeasuredSet("lg_m50t_w8", "lg_m50_chen2020.bpx.json", ("n0_c20_discharge", "n0_hppc"), ("n0_udds",)),
+    MeasuredSet(NMC, None, ("C20", "C2", "1C", "drive_cycle"), ()),
+    MeasuredSet(LFP, None, ("C20", "C2", "1C", "2C", "drive_cycle"), ()),
+    MeasuredSet(M50T, "lg_m50_chen2020.bpx.json", ("n0_c20_discharge", "n0_hppc"), ("n0_udds",)),
     MeasuredSet(
-        "lg_18650hg2", "lg_18650hg2_25degc.bpx.json", ("25degC_cap_1c_b",),
+        HG2, "lg_18650hg2_25degc.bpx.json", ("25degC_cap_1c_b",),
         ("25degC_us06", "25degC_la92", "25degC_mixed2", "10degC_us06", "0degC_mixed1", "40degC_la92"),
     ),
     MeasuredSet(
-        "panasonic_ncr18650pf", "panasonic_ncr18650pf.bpx.json", ("25degC_1c_start",),
+        PANASONIC, "panasonic_ncr18650pf.bpx.json", ("25degC_1c_start",),
         ("25degC_us06", "25degC_la92", "25degC_hwfet", "10degC_cycle_1", "0degC_cycle_1", "n10degC_cycle_1"),
     ),
 )  # fmt: skip
 DEVELOPMENT_SETS = (
     MeasuredSet(
-        "lg_18650hg2", "lg_18650hg2_25degc.bpx.json", ("40degC_c20_ocv",),
+        HG2, "lg_18650hg2_25degc.bpx.json", ("40degC_c20_ocv",),
         ("25degC_us06", "25degC_mixed3", "40degC_la92", "0degC_mixed1"),
     ),
     MeasuredSet(
-        "panasonic_ncr18650pf", "panasonic_ncr18650pf_25degc.bpx.json", ("25degC_1c_end", "25degC_hppc", "0degC_hppc"),
+        PANASONIC, "panasonic_ncr18650pf_25degc.bpx.json", ("25degC_1c_end", "25degC_hppc", "0degC_hppc"),
         ("25degC_cycle_1", "25degC_la92", "10degC_cycle_1"), ("25degC_hppc",),
     ),
 )  # fmt: skip

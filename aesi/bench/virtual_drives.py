@@ -42,6 +42,8 @@ INPUTS = ("I", "I_next", "I_60s", "c_sp", "c_sn", "c_e0", "c_eL")
 """Inputs of the correction, those of the experiments on measured drives."""
 DT_S = 1.0
 """Time step of the drives, s."""
+REST_S = 60.0
+"""Length of the rest that a record begins with, s."""
 NOISE_V = 5e-4
 """Standard deviation of the white noise on the voltage, V."""
 OPEN_CIRCUIT_V = 3e-3
@@ -151,20 +153,20 @@ def _in_turn(
 
 
 def _one(capacity_ah: float) -> dict[str, tuple[Profile, ...]]:
-    bench = ProfileBuilder(capacity_ah, DT_S)
+    builder = ProfileBuilder(capacity_ah, DT_S)
     train, test = (
-        _emptying(name, N_REPEATS * [bench.drive(name)], capacity_ah) for name in ("wltc_3b", "udds")
+        _emptying(name, N_REPEATS * [builder.drive(name)], capacity_ah) for name in ("wltc_3b", "udds")
     )
     return {"train": (train,), "valid": (), "test": (test,)}
 
 
 def _emptying(name: str, drives: Sequence[Array], capacity_ah: float) -> Profile:
-    """The drives one after the other, after 60 s of rest, with the current scaled so that they discharge the cell from
+    """The drives one after the other, after a rest, with the current scaled so that they discharge the cell from
     SOC_START to SOC_END."""
-    bench = ProfileBuilder(capacity_ah, DT_S)
+    builder = ProfileBuilder(capacity_ah, DT_S)
     share = float(np.sum(np.concatenate(drives))) * DT_S / SECONDS_PER_HOUR / capacity_ah
     scale = (SOC_START - SOC_END) / share
-    return bench.profile(name, [bench.rest(60.0), *(scale * drive for drive in drives)], SOC_START)
+    return builder.profile(name, [builder.rest(REST_S), *(scale * drive for drive in drives)], SOC_START)
 
 
 PROFILES: dict[SplitLayout, Callable[[float], dict[str, tuple[Profile, ...]]]] = {
@@ -206,9 +208,8 @@ def _split(cell: Cell, declared: dict[str, list[_Declared]], rng: np.random.Gene
             continue
         if "record" not in series:
             return Split(series["train"], series["valid"], series["test"])
-        period = (len(series["record"][0]) - 60) * DT_S / N_REPEATS
-        rest = round(60 / DT_S)
-        drive = series["record"][0].take(slice(rest, None))
+        drive = series["record"][0].take(slice(round(REST_S / DT_S), None))
+        period = len(drive) * DT_S / N_REPEATS
         return cut_repeats(drive, RepeatsConfig(period_s=period, train=TRAIN_REPEATS, test=TEST_REPEATS))
     raise SimulationError(
         f"none of {MOST_TRIES} random cells can be driven like that; lower the differences."

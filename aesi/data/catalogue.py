@@ -59,9 +59,13 @@ def _about_energy(name: str, path: str, sha256: str) -> Remote:
     return Remote(name, ABOUT_ENERGY + path, sha256, columns, "charge-positive")
 
 
+NMC, NMC_2C, LFP = "about_energy_nmc", "about_energy_nmc_2c", "about_energy_lfp"
+HG2, PANASONIC, M50T = "lg_18650hg2", "panasonic_ncr18650pf", "lg_m50t_w8"
+"""Names of the data sets."""
+
 SETS = (
     DataSet(
-        "about_energy_nmc",
+        NMC,
         "12.5 Ah NMC111/graphite pouch cell, 25 degC",
         "C/20, C/2 and 1C discharges; drive cycle at 1 Hz; published porous-electrode parameters (BPX)",
         "About:Energy, github.com/About-Energy-OpenSource/About-Energy-BPX-Parameterisation, commit 8efd45a",
@@ -95,7 +99,7 @@ SETS = (
         ),
     ),
     DataSet(
-        "about_energy_nmc_2c",
+        NMC_2C,
         "12.5 Ah NMC111/graphite pouch cell, 25 degC",
         "2C discharge",
         "About:Energy, github.com/About-Energy-OpenSource/About-Energy-BPX-Parameterisation, commit 8efd45a",
@@ -109,7 +113,7 @@ SETS = (
         ),
     ),
     DataSet(
-        "about_energy_lfp",
+        LFP,
         "2 Ah LFP/graphite 18650 cell, 25 degC",
         "C/20, C/2, 1C and 2C discharges; drive cycle at 1 Hz; published porous-electrode parameters (BPX)",
         "About:Energy, github.com/About-Energy-OpenSource/About-Energy-BPX-Parameterisation, commit 8efd45a",
@@ -148,7 +152,7 @@ SETS = (
         ),
     ),
     DataSet(
-        "lg_18650hg2",
+        HG2,
         "LG 18650HG2, 3.0 Ah, NMC/graphite-SiO",
         "C/20, 1C capacity, US06, LA92 and mixed cycles at 10 Hz, -20 to 40 degC; case temperature",
         "Kollmeyer, Vidal, Naguib, Skells 2020, doi:10.17632/cp3473x7xv.3",
@@ -158,7 +162,7 @@ SETS = (
         published=r"(n?\d+degC)/(\d+_\w+)\.csv$",
     ),
     DataSet(
-        "panasonic_ncr18650pf",
+        PANASONIC,
         "Panasonic NCR18650PF, 2.9 Ah, NCA/graphite",
         "C/20, 1C, pulses (HPPC), US06, HWFET, LA92 and mixed cycles at 10 Hz; case temperature",
         "Kollmeyer 2018, doi:10.17632/wykht8y7tg.1",
@@ -171,7 +175,7 @@ SETS = (
         published=r"[ _](n?\d+degC_\w+)_Pan18650PF\.mat$",
     ),
     DataSet(
-        "lg_m50t_w8",
+        M50T,
         "LG INR21700-M50T, 4.85 Ah, NMC811/graphite-SiOx, 23 degC, cell W8 when fresh",
         "C/20, pulses (HPPC), UDDS from SOC 0.7816 at 1 Hz",
         "Pozzato, Allam, Onori 2022, Data in Brief, doi:10.1016/j.dib.2022.107995",

@@ -81,7 +81,7 @@ class Laboratory:
     def measure(self, profile: Profile) -> Measurement:
         """One record: the simulated profile as the instruments write it. The noise depends on seed and profile name.
 
-        Raises DataError or SimulationError as `laboratory.simulator.run` does.
+        Raises DataError or SimulationError as `laboratory.simulator.simulate_truth` does.
         """
         rng = np.random.default_rng([self.seed, *profile.name.encode()])
         mix = ", ".join(self.effects) or "nothing added"

@@ -1,12 +1,11 @@
 """Linear quantile regression by convolution smoothing and Newton's method.
 
-    minimise over b:   sum_i w_i rho(y_i - x_i b),     rho(r) = r (tau - 1[r < 0])                 (1)
+    minimise over b:   sum_i rho(y_i - x_i b),     rho(r) = r (tau - 1[r < 0])                 (1)
 
 The kink of rho is smoothed over a width h by a logistic kernel; h shrinks in stages to the rule of the
 source, where the bias is below the statistical error. Each Newton step costs one Gram matrix of the columns,
 so a hundred thousand rows of a few dozen columns take a fraction of a second where the linear programme
-takes minutes. Residuals with very unequal scale should be divided by it first (weights 1/scale), so that one
-h suits all rows.
+takes minutes. Residuals with very unequal scale should be divided by it first, so that one h suits all rows.
 
 He, Pan, Tan & Zhou, J. Econometrics 232 (2023) 367, doi:10.1016/j.jeconom.2021.07.010.
 """

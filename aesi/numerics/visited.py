@@ -48,7 +48,7 @@ class Visited:
         return cls(charge, (float(np.nanmin(temperature_degc)), float(np.nanmax(temperature_degc))))
 
     def distance(self, soc: Array) -> Array:
-        """(n,) distance of each state of charge to the nearest visited one; 0 within RESOLUTION, inf without any."""
+        """(n,) distance of each state of charge beyond RESOLUTION / 2 to the nearest visited one; inf without any."""
         if not len(self.charge):
             return np.full(len(soc), np.inf)
         last = len(self.charge) - 1

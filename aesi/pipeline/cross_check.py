@@ -9,6 +9,7 @@ calibrated cell that PyBaMM does not read are left out of both models, and named
 from __future__ import annotations
 
 import copy
+import os
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -136,6 +137,7 @@ def pybamm_run(
     breaks_s, current_a : (k,) s and A, break points from the first to the last of time_s (n,) s.  mesh : number of
     points by dimension.  graded : True for points in a particle that are closer towards its surface.
     """
+    os.environ.setdefault("PYBAMM_DISABLE_TELEMETRY", "true")  # of which it asks when it is imported
     import pybamm
 
     with warnings.catch_warnings():

@@ -61,7 +61,7 @@ def at_its_temperature(temperature_degc: Array) -> str:
 
 
 def digest(*arrays: Array | None) -> str:
-    """SHA-256 of the bytes of the arrays, 16 hexadecimal digits; None counts as an empty array."""
+    """SHA-256 of the bytes of the arrays, 16 hexadecimal digits; None differs from an empty array."""
     sha = hashlib.sha256()
     for array in arrays:
         sha.update(b"|" if array is None else np.ascontiguousarray(array, dtype=float).tobytes())

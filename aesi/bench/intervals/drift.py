@@ -15,13 +15,14 @@ from typing import Any
 import numpy as np
 from pydantic import NonNegativeInt, PositiveInt
 
+from aesi.bench.intervals.spci import NORMAL_95
 from aesi.conformal.online.scale import GROUP_LEVELS
 from aesi.conformal.online.tracker import replay
 from aesi.conformal.registry import RATE
 from aesi.conformal.scores import interval_score
 from aesi.numerics.typing import Array, IntArray
 
-ALPHA, NORMAL_95 = 0.1, 1.6448536269514722
+ALPHA = 0.1
 """Nominal share of misses, and the 95 % quantile of the standard normal distribution."""
 SIZE_V = 1e-3
 """Standard deviation of a residual in the range of the lowest current, V. A convention."""

@@ -33,6 +33,8 @@ WINDOW = 200
 """Number of past residuals that an interval is predicted from: the default of an experiment."""
 NORMAL_95 = 1.6448536269514722
 """95 % quantile of the standard normal distribution."""
+PHI, SCALE_V, SWING = 0.9, 1e-4, 0.8
+"""phi, s0 (V) and a of (1)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,21 +49,11 @@ class OracleSeries:
     upper: Array
 
 
-def oracle_series(
-    n: int,
-    rng: np.random.Generator,
-    phi: float = 0.9,
-    scale_v: float = 1e-4,
-    swing: float = 0.8,
-    period: int = 3000,
-) -> OracleSeries:
-    """A random series (1) of n samples.
-
-    phi : autocorrelation at a lag of one sample.  scale_v : s0, V.  swing : a.  period : samples of one period of s.
-    """
-    scale = scale_v * np.exp(swing * np.sin(2 * np.pi * np.arange(n) / period))
-    residuals: Array = _autoregression(phi, scale * rng.standard_normal(n))
-    middle = phi * np.concatenate([[0.0], residuals[:-1]])
+def oracle_series(n: int, rng: np.random.Generator, period: int = 3000) -> OracleSeries:
+    """A random series (1) of n samples.  period : samples of one period of s."""
+    scale = SCALE_V * np.exp(SWING * np.sin(2 * np.pi * np.arange(n) / period))
+    residuals: Array = _autoregression(PHI, scale * rng.standard_normal(n))
+    middle = PHI * np.concatenate([[0.0], residuals[:-1]])
     return OracleSeries(residuals, middle - NORMAL_95 * scale, middle + NORMAL_95 * scale)
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-HG2, NCR = "lg_18650hg2", "panasonic_ncr18650pf"
+from aesi.data.catalogue import HG2, PANASONIC
 
 ARCHIVE: Mapping[str, Mapping[str, str]] = {
     HG2: {
@@ -47,7 +47,7 @@ ARCHIVE: Mapping[str, Mapping[str, str]] = {
         "n20degC_611_mixed7": "2018-12-26",
         "n20degC_611_mixed8": "2018-12-26",
     },
-    NCR: {
+    PANASONIC: {
         "25degC_cycle_4": "2017-03-19",
         "25degC_hwftb": "2017-03-20",
         "25degC_nn": "2017-03-21",

@@ -33,10 +33,10 @@ from typing import Any
 import numpy as np
 
 from aesi.bench import some_chosen
-from aesi.bench.physics.archive import ARCHIVE, HG2, NCR
+from aesi.bench.physics.archive import ARCHIVE
 from aesi.bench.physics.tested import soh_on_its_day
 from aesi.constants import MV_PER_V
-from aesi.data.catalogue import locate
+from aesi.data.catalogue import HG2, LFP, M50T, NMC, PANASONIC, locate
 from aesi.data.read import read_measurement
 from aesi.errors import AesiError
 from aesi.numerics.metrics import rms
@@ -53,7 +53,6 @@ HELD_SHARE, HELD_FROM_THEN_ON = 0.01, 0.1
 """Least share of held rows among all rows, and among the rows from the first held one on, of a record that the tester
 held at the cut-off. Conventions: of 45 records of the Panasonic, 8 have 1 to 8 % of held rows among all; from the first
 of them on two of these have 30 and 40 %, and six have 3 to 4 %."""
-NMC, LFP, M50T = "about_energy_nmc", "about_energy_lfp", "lg_m50t_w8"
 START = "lg_m50_chen2020"
 ECM_UDE = (
     "circuit + neural ODE, trained on UDDS at 25 degC, windows of 1,024 rows with the state of charge given"
@@ -78,10 +77,16 @@ class MeasuredRecord:
     protocol: str = ""
 
 
-FILES = {NCR: (START, NCR), HG2: (START, HG2), NMC: (None, None), LFP: (None, None), M50T: (START, None)}
+FILES = {
+    PANASONIC: (START, PANASONIC),
+    HG2: (START, HG2),
+    NMC: (None, None),
+    LFP: (None, None),
+    M50T: (START, None),
+}
 """Data set -> (start file, calibrated file) of `experiments/cells`. None as the start file means the file published
 with the data, None as the calibrated file that there is none."""
-NOMINAL_AH = {NCR: 2.9, HG2: 3.0}
+NOMINAL_AH = {PANASONIC: 2.9, HG2: 3.0}
 """Nominal capacity as the maker states it, Ah, to which the start file of another cell is scaled."""
 
 COLD = "_cold"
@@ -91,16 +96,16 @@ RECORDS = (
     *(MeasuredRecord(NMC, name, others_mv=mv, protocol=PUBLISHED) for name, mv in (
         ("drive_cycle", 18.8), ("C20", 15.9), ("C2", 12.3), ("1C", 13.4))),
     *(MeasuredRecord(LFP, name) for name in ("drive_cycle", "C20", "C2", "1C", "2C")),
-    MeasuredRecord(NCR, "25degC_us06", others_mv=39.3, protocol=ECM_UDE),
-    MeasuredRecord(NCR, "25degC_la92", others_mv=19.4, protocol=ECM_UDE),
-    MeasuredRecord(NCR, "25degC_hwfet", others_mv=73.4, protocol=ECM_UDE),
-    *(MeasuredRecord(NCR, f"25degC_cycle_{k}") for k in (1, 2, 3)),
-    MeasuredRecord(NCR, "10degC_cycle_1", others_mv=43.5, protocol=f"UDDS; {ECM_UDE}"),
-    MeasuredRecord(NCR, "0degC_cycle_1", others_mv=71.0, protocol=f"UDDS; {ECM_UDE}"),
-    MeasuredRecord(NCR, "n10degC_cycle_1", others_mv=127.4, protocol=f"UDDS; {ECM_UDE}"),
-    *(MeasuredRecord(NCR, name, fitted=True)
+    MeasuredRecord(PANASONIC, "25degC_us06", others_mv=39.3, protocol=ECM_UDE),
+    MeasuredRecord(PANASONIC, "25degC_la92", others_mv=19.4, protocol=ECM_UDE),
+    MeasuredRecord(PANASONIC, "25degC_hwfet", others_mv=73.4, protocol=ECM_UDE),
+    *(MeasuredRecord(PANASONIC, f"25degC_cycle_{k}") for k in (1, 2, 3)),
+    MeasuredRecord(PANASONIC, "10degC_cycle_1", others_mv=43.5, protocol=f"UDDS; {ECM_UDE}"),
+    MeasuredRecord(PANASONIC, "0degC_cycle_1", others_mv=71.0, protocol=f"UDDS; {ECM_UDE}"),
+    MeasuredRecord(PANASONIC, "n10degC_cycle_1", others_mv=127.4, protocol=f"UDDS; {ECM_UDE}"),
+    *(MeasuredRecord(PANASONIC, name, fitted=True)
         for name in ("25degC_1c_start", "25degC_c20_ocv", "25degC_hppc", "10degC_hppc", "0degC_hppc")),
-    MeasuredRecord(NCR, "n10degC_hppc", fitted=True, until_s=78611.0),
+    MeasuredRecord(PANASONIC, "n10degC_hppc", fitted=True, until_s=78611.0),
     MeasuredRecord(HG2, "25degC_us06"),
     MeasuredRecord(HG2, "25degC_la92"),
     MeasuredRecord(HG2, "25degC_mixed2"),

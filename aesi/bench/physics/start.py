@@ -19,9 +19,8 @@ from typing import Any
 import numpy as np
 from pydantic import NonNegativeInt, PositiveInt
 
-from aesi.bench.physics.archive import HG2, NCR
-from aesi.bench.physics.cells import M50T, NMC, START, cell_of
-from aesi.data.catalogue import locate
+from aesi.bench.physics.cells import START, cell_of
+from aesi.data.catalogue import HG2, M50T, NMC, PANASONIC, locate
 from aesi.data.read import read_measurement
 from aesi.errors import AesiError, DataError
 from aesi.numerics.metrics import rms
@@ -29,7 +28,7 @@ from aesi.numerics.typing import Array
 from aesi.physics import Cell, initial_state
 from aesi.records import Measurement
 
-FITTED = ((NCR, NCR, "25degC_hppc"), (HG2, HG2, "25degC_cap_1c"), (HG2, HG2, "25degC_mixed1"))
+FITTED = ((PANASONIC, PANASONIC, "25degC_hppc"), (HG2, HG2, "25degC_cap_1c"), (HG2, HG2, "25degC_mixed1"))
 """(data set, cell file, record) of records that the file was fitted to: at 25 degC, where the capacity is that of the
 file, and without the slow discharges, whose cycler counts some per cent of charge too much."""
 PUBLISHED = ((NMC, None, "drive_cycle"), (M50T, START, "n0_hppc"), (M50T, START, "n0_udds"))

@@ -12,10 +12,11 @@ from __future__ import annotations
 from datetime import date
 
 from aesi.bench.physics.archive import ARCHIVE
+from aesi.data.catalogue import HG2, PANASONIC
 from aesi.physics import Cell
 
 TESTED = {
-    "panasonic_ncr18650pf": {
+    PANASONIC: {
         "25degC_1c_start": "2017-03-09",
         "25degC_hppc": "2017-03-11",
         "25degC_cycle_1": "2017-03-18",
@@ -32,7 +33,7 @@ TESTED = {
         "n10degC_hppc": "2017-06-07",
         "n10degC_cycle_1": "2017-06-10",
     },
-    "lg_18650hg2": {
+    HG2: {
         "25degC_c20_ocv": "2018-10-26",
         "25degC_cap_1c": "2018-10-28",
         "25degC_la92": "2018-10-29",

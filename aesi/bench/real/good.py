@@ -6,18 +6,19 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from aesi.bench.real.case import RealCase, Take
+from aesi.data.catalogue import HG2, NMC, PANASONIC
 
 GOOD: dict[str, tuple[str, ...]] = {
-    "lg_18650hg2": ("25degC_mixed3",),
-    "panasonic_ncr18650pf": ("25degC_cycle_3",),
-    "about_energy_nmc": ("C2", "1C"),
+    HG2: ("25degC_mixed3",),
+    PANASONIC: ("25degC_cycle_3",),
+    NMC: ("C2", "1C"),
 }
 """Data set -> its known-good records: another drive of the kind that the faults are added to, or discharges if there is
 no other."""
 WITHOUT_FAULT: dict[str, tuple[str, ...]] = {
-    "lg_18650hg2": ("25degC_la92", "25degC_us06", "25degC_cap_1c_b"),
-    "panasonic_ncr18650pf": ("25degC_hwfet", "25degC_cycle_2", "25degC_us06"),
-    "about_energy_nmc": (),
+    HG2: ("25degC_la92", "25degC_us06", "25degC_cap_1c_b"),
+    PANASONIC: ("25degC_hwfet", "25degC_cycle_2", "25degC_us06"),
+    NMC: (),
 }
 """Data set -> records for the cases without a fault. The record that the faults are added to is one in addition."""
 

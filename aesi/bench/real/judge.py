@@ -17,7 +17,7 @@ from aesi.bench.real.faults import declared_with_fault, soc0_with_fault, with_fa
 from aesi.bench.real.references import capacity_row, resistance_row, temperature_row
 from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.data import read_measurement
-from aesi.data.catalogue import locate
+from aesi.data.catalogue import M50T, NMC, locate
 from aesi.data.spectra import read_spectra
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
@@ -169,7 +169,7 @@ def record(take: Take) -> Measurement:
     """The record as the tracer is given it, with at most MOST_ROWS rows.  Raises DataError if it is not available."""
     columns: dict[str, str | None] | None = None if take.temperature else {"temperature_degc": None}
     path = locate(take.set, take.file)
-    if take.set in ("about_energy_nmc", "lg_m50t_w8"):
+    if take.set in (NMC, M50T):
         columns = None  # these data sets have no temperature column to leave out
     return read_measurement(path, columns, max_rows=MOST_ROWS, stop_s=take.stop_s)
 

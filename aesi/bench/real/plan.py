@@ -10,8 +10,8 @@ from aesi.bench.physics.archive import ARCHIVE
 from aesi.bench.real.case import Fault, RealCase, Take
 from aesi.bench.real.faults import FaultKind
 from aesi.bench.real.good import beside_good
+from aesi.data.catalogue import HG2, M50T, NMC, PANASONIC
 
-HG2, PANASONIC, NMC, M50T = "lg_18650hg2", "panasonic_ncr18650pf", "about_energy_nmc", "lg_m50t_w8"
 CELLS = {
     HG2: "lg_18650hg2_25degc.bpx.json",
     PANASONIC: "panasonic_ncr18650pf_25degc.bpx.json",

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from aesi.calibration.records.spectra import degc_of, state_of
 from aesi.constants import MILLI, ZERO_CELSIUS_K
 from aesi.errors import DataError
 from aesi.numerics.metrics import rms
@@ -91,7 +92,7 @@ def resistance_row(found: Discovery, declared: Cell, spectra: Sequence[Spectrum]
     spectrum = nearest_half_charge(spectra, declared)
     measured = measured_resistances(spectrum)
     ours, before = (
-        model_resistances(cell, effects, _soc(spectrum, declared), spectrum.temperature_degc)
+        model_resistances(cell, effects, state_of(declared, spectrum), degc_of(spectrum))
         for cell, effects in ((found.cell, found.model_effects), (declared, ()))
     )
     return {
@@ -109,13 +110,7 @@ def resistance_row(found: Discovery, declared: Cell, spectra: Sequence[Spectrum]
 def nearest_half_charge(spectra: Sequence[Spectrum], cell: Cell) -> Spectrum:
     """The spectrum whose state of charge is nearest to one half; without a stated one it follows from the charge passed
     since the full charge."""
-    return min(spectra, key=lambda spectrum: abs(_soc(spectrum, cell) - HALF_CHARGE))
-
-
-def _soc(spectrum: Spectrum, cell: Cell) -> float:
-    if spectrum.soc is not None:
-        return spectrum.soc
-    return 1.0 - (spectrum.discharged_ah or 0.0) / cell.capacity_ah
+    return min(spectra, key=lambda spectrum: abs(state_of(cell, spectrum) - HALF_CHARGE))
 
 
 def measured_resistances(spectrum: Spectrum) -> Resistances:
@@ -138,14 +133,8 @@ def measured_resistances(spectrum: Spectrum) -> Resistances:
     return Resistances(ohmic, float(np.interp(np.log(AT_HZ), np.log(hz), z.real)) - ohmic)
 
 
-def model_resistances(
-    cell: Cell, effects: Sequence[Any], soc: float, temperature_degc: float | None
-) -> Resistances:
-    """The resistances (1) of a model cell with effects at rest.
-
-    soc : state of charge, 0 to 1.  temperature_degc : degC; None takes 25.
-    """
-    degc = 25.0 if temperature_degc is None else temperature_degc
+def model_resistances(cell: Cell, effects: Sequence[Any], soc: float, degc: float) -> Resistances:
+    """The resistances (1) of a model cell with effects at rest, at a state of charge, 0 to 1, and a temperature."""
     fast = replace(
         cell,
         negative=replace(cell.negative, rate_constant=FAST * cell.negative.rate_constant),

@@ -22,8 +22,9 @@ import numpy as np
 
 from aesi.bench.real.case import Take
 from aesi.bench.real.judge import declared_cell, record
-from aesi.bench.real.plan import CELLS, HG2, NMC, PANASONIC, WINDOW_S
+from aesi.bench.real.plan import CELLS, WINDOW_S
 from aesi.constants import MV_PER_V
+from aesi.data.catalogue import HG2, NMC, PANASONIC
 from aesi.numerics.metrics import rms
 from aesi.tracer.case.blocks import blocks_of
 from aesi.tracer.discovery import inverse_problem

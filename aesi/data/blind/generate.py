@@ -20,6 +20,7 @@ from aesi.data.laboratory.simulator import Applied, LaboratoryModel, Setup, True
 from aesi.data.profiles.profile import Profile
 from aesi.data.virtual import nominal_capacity_ah
 from aesi.errors import DataError, did_you_mean
+from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
 from aesi.records import Measurement
 
@@ -106,7 +107,7 @@ def generate(spec: CaseSpec, cells: Mapping[str, Path]) -> BlindCase:
     for name in known:
         written = [RECIPES[name].instrument(one, sizes[name]) for one in written]
     written = [Written(w.time_s[::between], w.current_a[::between], w.voltage_v[::between]) for w in written]
-    truth["rms_mv"] = MV_PER_V * _rms(base.unexplained(written))
+    truth["rms_mv"] = MV_PER_V * rms(base.unexplained(written))
     label, also = _label(known, strange)
     neutral = (REDUCTION,) if spec.model == "DFN" else ()
     measurements = tuple(
@@ -119,7 +120,8 @@ def generate(spec: CaseSpec, cells: Mapping[str, Path]) -> BlindCase:
 def _base_showing_all(
     spec: CaseSpec, cells: Mapping[str, Path]
 ) -> tuple[_CaseBase, dict[str, dict[str, float]], np.random.Generator]:
-    """(bench, values of each recipe, generator in its present state) for the first cell that shows all effects.
+    """(what the case is made from, values of each recipe, generator in its present state) for the first cell that shows
+    all effects.
 
     The cells are tried from that of the specification on: a particle of 50 nm does not show its diffusivity. Where none
     shows them all, it is the specification's own.
@@ -190,7 +192,7 @@ def _scaled_values(recipe: Recipe, base: _CaseBase) -> tuple[dict[str, float], f
     magnitude = max(1.0, recipe.least)
     moved = 0.0
     for _ in range(MOST_TRIES):
-        moved = _rms(_effect_alone(recipe, values_at(magnitude), base))
+        moved = rms(_effect_alone(recipe, values_at(magnitude), base))
         wanted = magnitude * target / max(moved, 1e-6)
         another = float(np.clip(wanted, recipe.least, recipe.most))
         if abs(moved / target - 1) < CLOSE_ENOUGH or another == magnitude:
@@ -245,7 +247,7 @@ def _with_stranger(
 ) -> list[TrueRun]:
     """The records with a stranger of the target size, with the same constants in each record."""
     shifts = [STRANGERS[name].shift(trace, base.capacity_ah, np.random.default_rng(seed)) for trace in traces]
-    magnitude = base.spec.target_mv / MV_PER_V / _rms(np.concatenate(shifts))
+    magnitude = base.spec.target_mv / MV_PER_V / rms(np.concatenate(shifts))
     truth[f"{name}.magnitude"] = magnitude
     return [
         _with_added_voltage(trace, magnitude * shift) for trace, shift in zip(traces, shifts, strict=True)
@@ -268,7 +270,7 @@ def label_of(spec: CaseSpec) -> str:
 
 def _label(known: list[str], strange: list[str]) -> tuple[str, tuple[str, ...]]:
     if strange:
-        return "unknown", tuple(dict.fromkeys(a for name in strange for a in STRANGERS[name].also))
+        return "unknown", ()
     if not known:
         return "none", (REDUCTION,)
     also = tuple(dict.fromkeys(a for name in known for a in RECIPES[name].also))
@@ -282,7 +284,3 @@ def _as_measured(
     degc, soc = trace.temperature_degc[::between], trace.soc[::between]
     shown = TrueRun(written.time_s, written.current_a, written.voltage_v, degc, soc)
     return instrument.write(shown, spec.name, rng, spec.warmth != "none")
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))

@@ -21,7 +21,6 @@ class Stranger:
     """An unknown effect.  shift : (trace, capacity in Ah, generator) -> (n,) V added to the voltage at magnitude 1."""
 
     shift: Callable[[TrueRun, float, np.random.Generator], Array]
-    also: tuple[str, ...] = ()
 
 
 def _throughput(trace: TrueRun) -> Array:

@@ -8,7 +8,6 @@ the voltage by millivolts.
 
 from __future__ import annotations
 
-import os
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -205,7 +204,6 @@ def _simulate(setup: Setup, profile: Profile, time: Array, values: Any) -> dict[
     """values : PyBaMM's parameters, with the changes."""
     import pybamm
 
-    os.environ.setdefault("PYBAMM_DISABLE_TELEMETRY", "true")
     changes = setup.changes()
     capacity = float(values["Nominal cell capacity [A.h]"])
     declared = {"contact resistance": "true"} if values.get(CONTACT_RESISTANCE, 0.0) else {}

@@ -90,18 +90,17 @@ def with_pulses(
     schedules: Sequence[str],
     soc0: float,
     pulse_c: float = PULSE_C,
-    pulse_s: float = PULSE_S,
 ) -> Profile:
     """A rest, then each schedule followed by a rest, a charge pulse of `pulse_c` and a rest.
 
-    The default times add 220 s a schedule and 12 s at the start; a pulse of 0 leaves only the rests.
+    The times add 220 s a schedule and 12 s at the start; a pulse of 0 leaves only the rests.
     """
     pieces = [builder.rest(LEAD_S)]
     for one in schedules:
         pieces += [
             builder.drive(one),
             builder.rest(BEFORE_PULSE_S),
-            builder.pulse(-pulse_c, pulse_s),
+            builder.pulse(-pulse_c, PULSE_S),
             builder.rest(AFTER_PULSE_S),
         ]
     return builder.profile(name, pieces, soc0)

@@ -139,7 +139,7 @@ def temperatures_degc(problem: InverseProblem) -> tuple[float | None, ...]:
     known = [t for t in measured if t is not None]
     if not known:
         return (None,)
-    return tuple({float(min(t.min() for t in known)), float(max(t.max() for t in known))})
+    return tuple(dict.fromkeys((float(min(t.min() for t in known)), float(max(t.max() for t in known)))))
 
 
 def _course_end(state: ModelState, rate_c: float, degc: float | None) -> tuple[float, str | None]:

@@ -99,7 +99,7 @@ class Answer:
     """The answer of the searches with one model of the cell, before the written model is chosen.
 
     path : the search that is believed.  verdict : on it.  paths : all searches so far, by trust.
-    settled : verdict on that path -> evidence, with the written model.
+    evidence_for : verdict on that path -> evidence, with the written model.
     """
 
     path: Path

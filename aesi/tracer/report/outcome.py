@@ -108,10 +108,10 @@ def outcomes(
         runs = {name: _simulated(state, record, None) for name, state in states.items()}
         rows = slice(record.lead_rows, len(record.data))
         found = _outcome(record, "test", rows, runs, rng)
-        try:
-            slope_v = states["after"].start_slope_v(record)[rows]
-        except AesiError:
-            slope_v = None
+        slope_v = None
+        if record.continues is None:  # else it starts at the fitted state of the record that it continues
+            with suppress(AesiError):
+                slope_v = states["after"].start_slope_v(record)[rows]
         out.append(replace(found, start_slope_v=slope_v))
     return tuple(out)
 

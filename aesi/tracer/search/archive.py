@@ -169,12 +169,16 @@ def _value_text(value: object) -> str:
         return f"{value.co_code.hex()} {value.co_names} {[_value_text(one) for one in value.co_consts]}"
     if isinstance(value, frozenset):
         return repr(sorted(map(repr, value)))
+    if isinstance(value, dict):
+        return repr([(_value_text(key), _value_text(one)) for key, one in value.items()])
+    if isinstance(value, list | tuple):
+        return f"{type(value).__name__} {[_value_text(one) for one in value]}"
     return _code(value) if callable(value) else repr(value)
 
 
 def _code(function: Callable[..., object]) -> str:
     """Text of the file that defines a function; without a file, its compiled code."""
-    cells = [repr(cell.cell_contents) for cell in getattr(function, "__closure__", None) or ()]
+    cells = [_value_text(cell.cell_contents) for cell in getattr(function, "__closure__", None) or ()]
     try:
         module = inspect.getmodule(function)
         file = inspect.getsourcefile(function) if module is None else getattr(module, "__file__", None)

@@ -483,6 +483,7 @@ def _typed(text: str, **more: object):
     [
         lambda: (partial(np.multiply, 1.0), partial(np.multiply, 2.0)),
         lambda: (partial(np.full, shape=3), partial(np.full, shape=4)),
+        lambda: tuple(partial(np.stack, arrays=(np.eye(1, 3000, k)[0],)) for k in (1000, 1001)),
         lambda: (_typed("act = lambda x: x * 1.1"), _typed("act = lambda x: x * 1.2")),
         lambda: (_typed("act = lambda x: abs(x)"), _typed("act = lambda x: max(x)")),
         lambda: tuple(_typed("def made(k):\n return lambda x: k * x\nact = made(k)", k=k) for k in (1, 2)),

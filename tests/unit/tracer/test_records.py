@@ -14,6 +14,7 @@ from aesi.tracer.case.records import leading_record, noise_floor_v, noise_of, pr
 from aesi.tracer.case.thinned import thinned_record, thinned_together
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.model_state import ModelState
+from aesi.tracer.report.outcome import outcomes
 
 
 def measured(cell, time_s, current_a, soc0=0.8, **more):
@@ -204,6 +205,18 @@ def test_a_continuation_is_judged_only_after_what_was_seen(cell, degc):
     other = replace(rest, time_s=rest.time_s + 5000.0, current_a=np.zeros(300))
     stranger = prepare_test(cell, other, [seen], None)
     assert (stranger.lead_rows, stranger.continues) == (0, None)
+
+
+def test_an_error_that_only_another_start_explains_is_forgiven_where_the_start_is_not_that_of_a_fit(cell):
+    time = np.arange(900.0)
+    whole = measured(cell, time, np.where(time < 30, 0.0, 5.0))
+    seen = whole.between(0, 600)
+    problem = inverse_problem(cell, [seen])
+    states = dict.fromkeys(("before", "recalibrated", "after"), ModelState(problem))
+    tests = [prepare_test(cell, whole, given, None) for given in ([seen], [])]
+    continued, apart = outcomes(problem.records, states, tests, np.random.default_rng(0))[-2:]
+    assert continued.start_slope_v is None
+    assert np.abs(apart.start_slope_v).max() > 1e-4
 
 
 def test_a_continuation_was_said_to_start_at_the_first_row_of_what_it_continues(cell):

@@ -43,7 +43,10 @@ class ArrayStore:
 
 @dataclass(frozen=True)
 class Embedded:
-    """A figure ready for the page: plotly's JSON, and how far the display was thinned (1 means not)."""
+    """A figure ready for the page.
+
+    data : plotly's JSON.  samples, kept, drawn : rows of its series as they were, as stored for zooming, and as drawn.
+    """
 
     data: dict[str, Any]
     samples: int

@@ -16,15 +16,15 @@ from aesi.pipeline.report.words.sizes import (
     rounded,
     two_digits,
 )
+from aesi.tracer.case.free_parameter import CAPACITY_SHARE, STATE_OF_CHARGE
 
 MOST_NAMED = 3
 """Parameters that one sentence names."""
 MOST_DIGITS = 6
 """Most digits: a state of charge is known to a ten-thousandth at best."""
-STATE_OF_CHARGE = "soc0"
 OF_A_RECORD = {
     STATE_OF_CHARGE: "the initial state of charge of {}",
-    "capacity_share": "the share of its capacity that the cell had in {}",
+    CAPACITY_SHARE: "the share of its capacity that the cell had in {}",
 }
 """Owner of a parameter that belongs to a record -> words in place of an effect."""
 PURE = ("dimensionless", "1")
