@@ -52,7 +52,7 @@ from aesi.calibration.start import (
     with_activation,
     with_area_factor,
 )
-from aesi.calibration.written_cell import capacities, written_cell
+from aesi.calibration.written_cell import capacities, start_soc, written_cell
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError, FitError, InputError
 from aesi.numerics.metrics import rms
@@ -76,6 +76,9 @@ NOTED_AGE = 0.01
 """Relative difference of a record's active material from the file's above which a note reports it."""
 NOTED_SILICON = 0.05
 """The same for the silicon, which holds a sixth of such a cell's charge."""
+MOVED_SOC = 1e-3
+"""Least change of a given state of charge between the windows of the start file and of the written cell that a note
+tells. A convention."""
 NOTED_DEVIATIONS = 2.0
 """A fit that ends more than this many standard deviations from a prior that the user gave contradicts it. A
 convention."""
@@ -122,6 +125,7 @@ def calibrate(
     scaled = model.jacobian(x) * information_weights(model, x)[:, None]
     covariance: Array = np.asarray(np.linalg.inv(scaled.T @ scaled), dtype=float)
     shares = capacities(model, x)
+    begun = {record.name: start_soc(model, x, i) for i, record in enumerate(model.records)}
     parameters = [intervals(model, end.x, covariance) for end in ends]
     return Calibration(
         cell=_with_provenance(found, cell, model, shares, conditions.dates),
@@ -137,6 +141,7 @@ def calibrate(
             *_contradicted_prior_sentences(model, x),
             *_own_parameter_sentences(model, x),
             *_ran_out_sentences(model, states),
+            *_moved_start_sentences(model, begun),
             *ends[0].heat_sentences,
             *ends_sentences(
                 [end.cost for end in ends], parameters, [end.from_file for end in ends].index(True)
@@ -146,6 +151,7 @@ def calibrate(
         model=model,
         x=x,
         covariance=covariance,
+        starts=begun,
         against_temperature=against_temperature(
             _start_file_at_size(cell, model.cell),
             model.records,
@@ -400,6 +406,20 @@ STATE_WORDS: dict[FitState, str] = {
     "simulated": "the file as simulated",
 }
 """State of the cell -> what notes call it."""
+
+
+def _moved_start_sentences(model: Model, begun: Mapping[str, float]) -> tuple[str, ...]:
+    """A sentence for each record whose given state of charge is another one in the windows of the written cell.
+
+    begun : `Calibration.starts`.
+    """
+    given = ((r.name, r.start.soc) for r in model.records if r.start.basis == "given")
+    return tuple(
+        f"{name} starts at a state of charge of {begun[name]:.4f} of the written cell, in which empty is the rest at "
+        f"its lower cut-off: by the start file it is the {soc:.4g} that was given."
+        for name, soc in given
+        if abs(begun[name] - soc) >= MOVED_SOC
+    )
 
 
 def _ran_out_sentences(model: Model, states: Mapping[FitState, tuple[Cell, Array]]) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -121,8 +121,10 @@ class Calibration:
 
     cell : calibrated.  declared : start.  parameters : name -> value with its interval.  undetermined : combinations
     that the data do not determine.  at_bounds : names of parameters that ended on a bound.  errors : of each record.
-    capacities : record -> its capacity over that of the cell.  size_assumed : a sentence where no record determined the
-    size of the cell, else ''.  x, covariance : working vector and its covariance, for the posterior.
+    capacities : record -> its capacity over that of the cell.  starts : record -> state of charge at its first row, in
+    the windows of `cell` as old as in that record; a simulation of the record starts there.
+    size_assumed : a sentence where no record determined the size of the cell, else ''.  x, covariance : working vector
+    and its covariance, for the posterior.
     against_temperature : a sentence for each record whose voltage contradicts the temperature that it was fitted at.
     """
 
@@ -140,6 +142,7 @@ class Calibration:
     x: Array
     covariance: Array
     against_temperature: tuple[str, ...] = ()
+    starts: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -49,13 +49,13 @@ def check_choice(name: str, value: object, choices: Any) -> None:
         raise InputError(f"{name} = {value!r} is not known; give {allowed}.")
 
 
-def check_soc(soc: Any, name: str = "soc0") -> None:
-    """Raises InputError for a state of charge that is not a share of the capacity.
+def checked_soc(soc: Any, name: str = "soc0") -> float | None:
+    """A state of charge as a float; None for None.  Raises InputError where it is no share of the capacity.
 
     name : of the argument, for the sentence.
     """
     if soc is None:
-        return
+        return None
     given = np.asarray(soc)
     number = given.ndim == 0 and given.dtype.kind in "iuf"
     if not (number and -FARTHEST_SOC <= given <= 1.0 + FARTHEST_SOC):  # this way round, NaN fails too
@@ -63,6 +63,7 @@ def check_soc(soc: Any, name: str = "soc0") -> None:
             f"{name} = {soc!r} is not a state of charge; give a share of the capacity between 0 (empty) and 1 (full), "
             "as one number, so 90 % is 0.9."
         )
+    return float(given)
 
 
 def check_temperature(temperature_degc: Any, name: str = "temperature_degc") -> None:

@@ -17,6 +17,8 @@ from aesi.physics.espm.plain import rate_factor, stack_of
 from aesi.physics.model import EspmModel
 
 LAYERS = {1: "negative electrode", 2: "positive electrode"}
+MOST_PERCENT = 1e4
+"""Per cent of the charge, from which on a message gives three digits."""
 SALT, NO_SOLUTION = 3, 4
 DRY_SHARE = 0.02
 """Share of the rest concentration at a collector below which the lack of salt is why no reaction can be found."""
@@ -72,6 +74,12 @@ def _salt_clause(model: EspmModel, kelvin: float, amperes: float, where: str) ->
     return f"{cause}. Check the unit of the current and the electrolyte's diffusivity"
 
 
+def _per_cent(share: float) -> str:
+    """A share as per cent to a tenth; in a few digits where it is far beyond what a cell holds."""
+    percent = 100.0 * share
+    return f"{percent:.1f}" if abs(percent) < MOST_PERCENT else f"{percent:.3g}"
+
+
 def _surface_clause(
     model: EspmModel, kelvin: float, amperes: float, rows: Array, at: int, what: int, where: str
 ) -> str:
@@ -84,7 +92,7 @@ def _surface_clause(
     soc = float(every[at])
     surface = (
         f"the surface of the {LAYERS[what]} left the stoichiometry range [0, 1] {where}, at a state of charge of "
-        f"{100 * soc:.1f} %"
+        f"{_per_cent(soc)} %"
     )
     if not 0.0 <= soc <= 1.0:
         # A simulation goes on past its fault, so that the charge of the whole record is known.
@@ -94,11 +102,11 @@ def _surface_clause(
             else ("brings more charge than the cell can hold", np.nanmax(every) - 1.0)
         )
         return (
-            f"{surface}: the record {asks}, by {100 * by:.1f} % of its capacity in all. Check soc0, the capacity and "
+            f"{surface}: the record {asks}, by {_per_cent(by)} % of its capacity in all. Check soc0, the capacity and "
             "the sign of the current"
         )
     cause = (
-        f"{surface}, while its particles hold {100 * float(row[4 + what]):.1f} % in the mean: solid diffusion cannot "
+        f"{surface}, while its particles hold {_per_cent(float(row[4 + what]))} % in the mean: solid diffusion cannot "
         f"follow {amperes:.3g} A"
     )
     slower = rate_factor(electrode.diffusivity_ea_j_mol, kelvin, cell.reference_temperature_k)

@@ -17,16 +17,18 @@ from __future__ import annotations
 import inspect
 import traceback
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any, Literal, TypeVar
 
 import numpy as np
 
+from aesi.constants import COLDEST_DEGC, WARMEST_DEGC, ZERO_CELSIUS_K
 from aesi.errors import AesiError, NoNumberError, OwnEffectError, ParameterError
 from aesi.numerics.typing import Array, IntArray
 from aesi.over_time import stamp
 from aesi.parameters import Parameter, checked
 from aesi.physics.model import EspmModel
+from aesi.records import Run
 
 Acted = TypeVar("Acted")
 Kind = Literal["physics", "parameter", "instrument"]
@@ -333,7 +335,8 @@ def as_cell_saw(record: Record, effects: Iterable[ActiveEffect]) -> Record:
 
 def check_states(effect: Effect, added: Contribution, trace: Trace) -> None:
     """Raises OwnEffectError where a user's own effect returns a state with a name that the run has already."""
-    clash = [name for name in added.series if name in trace.series]
+    taken = {*trace.series, *(one.name for one in fields(Run))}
+    clash = [name for name in added.series if name in taken]
     if clash and effect.file is not None:
         raise OwnEffectError(
             f"{effect.file}: on_voltage gives a state {clash[0]!r}, which the run has; name it otherwise."
@@ -369,9 +372,26 @@ def _check_acted(effect: Effect, function: Callable[..., Any], given: Any, acted
         rows = {"time_s": acted.time_s, "current_a": acted.current_a, "temperature_k": acted.temperature_k}
         rows["read_s"] = acted.read_s
         _check_rows(effect, place, {k: row for k, row in rows.items() if row is not None}, given.time_s)
+        _check_possible(effect, acted)
     elif isinstance(acted, Contribution):
         states = {f"state {name!r}": state for name, state in acted.series.items()}
         _check_rows(effect, place, {"": acted.voltage_v, **states}, given.time_s)
+
+
+def _check_possible(effect: Effect, acted: Record) -> None:
+    """Raises OwnEffectError for times of a record that do not rise, and for a temperature that no cell has."""
+    if np.any(np.diff(acted.time_s) <= 0.0):
+        raise OwnEffectError(f"{effect.file}: on_record gives times that do not rise from row to row.")
+    kelvin = acted.temperature_k
+    if kelvin is None:
+        return
+    low, high = COLDEST_DEGC + ZERO_CELSIUS_K, WARMEST_DEGC + ZERO_CELSIUS_K
+    absurd = (kelvin < low) | (kelvin > high)
+    if np.any(absurd):
+        raise OwnEffectError(
+            f"{effect.file}: on_record gives {kelvin[int(np.argmax(absurd))]:.5g} K, and a cell is at {low:g} to "
+            f"{high:g} K; temperature_k is in kelvin."
+        )
 
 
 def _article(name: str) -> str:

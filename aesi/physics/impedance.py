@@ -27,7 +27,7 @@ import numpy as np
 from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K, ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError, SimulationError
 from aesi.numerics.typing import Array, ComplexArray, Numbers
-from aesi.physics.arguments import check_cell, check_choice, check_soc, check_temperature, checked_effects
+from aesi.physics.arguments import check_cell, check_choice, check_temperature, checked_effects, checked_soc
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
 from aesi.physics.cell.relations import Relation
@@ -70,20 +70,20 @@ def impedance(
     InputError for a wrong type of cell, effect, state of charge or temperature; SimulationError for lithium plating.
     """
     check_cell(cell)
-    if soc is None:  # check_soc accepts None, for records whose voltage gives the state of charge
+    share = checked_soc(soc, "soc")
+    if share is None:
         raise InputError(
             "soc = None is no state of charge; give a share of the capacity, so that 90 % is 0.9."
         )
-    check_soc(soc, "soc")
     frequency = _checked_frequency(frequency_hz)
     active = checked_effects(effects)
     kelvin = _true_kelvin(active, _checked_kelvin(temperature_degc))
     check_choice("model", model, ModelName)
     changed = model_with(cell, active)
-    rest = _rest_stoichiometries(cell, changed, soc)
+    rest = _rest_stoichiometries(cell, changed, share)
     if not ((rest > 0.0) & (rest < 1.0)).all():
         raise DataError(
-            f"{cell.name} has no state of charge of {soc:g}: a stoichiometry leaves (0, 1) there."
+            f"{cell.name} has no state of charge of {share:g}: a stoichiometry leaves (0, 1) there."
         )
     if changed.negative.plating is not None:
         raise SimulationError("lithium plating has no linear answer at rest; leave the effect out.")

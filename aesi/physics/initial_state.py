@@ -28,7 +28,7 @@ import numpy as np
 
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError
-from aesi.physics.arguments import check_soc
+from aesi.physics.arguments import checked_soc
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Record, as_cell_saw, instruments_first
@@ -97,7 +97,7 @@ def initial_state(
     Raises DataError where the voltage belongs to no state of this cell, or where there is neither voltage nor `soc0`;
     InputError for a `soc0` that is no state of charge.
     """
-    check_soc(soc0)
+    soc0 = checked_soc(soc0)
     if not len(record):
         raise DataError(f"{record.name} has no row to start from.")
     active = instruments_first(effects)

@@ -18,10 +18,10 @@ from typing import Literal
 import numpy as np
 
 from aesi.constants import ZERO_CELSIUS_K
-from aesi.errors import DataError, InputError, SimulationError
+from aesi.errors import DataError, InputError, NoNumberError, SimulationError
 from aesi.numerics.typing import Array, Numbers
 from aesi.over_time import stamp
-from aesi.physics.arguments import check_cell, check_choice, check_soc, check_temperature, checked_effects
+from aesi.physics.arguments import check_cell, check_choice, check_temperature, checked_effects, checked_soc
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
 from aesi.physics.depletion import depletion_sentence
@@ -103,7 +103,7 @@ def simulate(
     check_choice("hold", hold, Hold)
     check_choice("on_depletion", on_depletion, OnDepletion)
     if on_depletion == "raise":  # a search may try states that no cell has
-        check_soc(soc0)
+        soc0 = checked_soc(soc0)
     time, current = _checked_record(time_s, current_a)
     active = instruments_first(checked_effects(effects))
     profile_arrays: dict[str, Array] | None = {} if profiles else None
@@ -145,8 +145,7 @@ def simulate(
                 for name, values in profile_arrays.items()
             }
     voltage = _as_read(changed, active, record.beside_voltage(backward), voltage, series, backward)
-    if fault_at >= 0:
-        _check_solved(time, voltage, written_at)
+    _check_finite(time, voltage, written_at)
     return Run(time, current, voltage, series, profile_arrays or {})
 
 
@@ -266,11 +265,16 @@ def _depleted(fault_at: int, n: int) -> Array:
     return (np.arange(n) >= fault_at).astype(float)
 
 
-def _check_solved(time: Array, voltage: Array, fault_at: int) -> None:
-    """Raises SimulationError where a clipped simulation has no solution at some row after the cell ran out."""
+def _check_finite(time: Array, voltage: Array, fault_at: int) -> None:
+    """Raises SimulationError where a clipped simulation has no solution at some row after the cell ran out, at row
+    `fault_at`, and NoNumberError where one that did not run out (-1) has none."""
     if np.isfinite(voltage).all():
         return
     lost = int(np.argmin(np.isfinite(voltage)))
+    if fault_at < 0:
+        raise NoNumberError(
+            f"the voltage is no number at {stamp(time[lost])} s: an effect gives, or makes of the cell, what is none."
+        )
     raise SimulationError(
         f"there is no solution at {stamp(time[lost])} s: the cell ran out at {stamp(time[fault_at])} s, and the "
         "current went on; end the record there, or check soc0, capacity and the sign of the current."
@@ -325,7 +329,7 @@ def _checked_record(time_s: object, current_a: object) -> tuple[Array, Array]:
     check_row(time, "time_s")
     check_row(current, "current_a")
     check_times(time, "time_s")
-    return np.ascontiguousarray(time), np.ascontiguousarray(current)
+    return np.array(time), np.array(current)  # a run keeps them, whatever becomes of what was given
 
 
 def _kelvin(temperature_degc: Numbers | None, time: Array) -> Array | None:

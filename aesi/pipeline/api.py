@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import date
 from itertools import islice
+from numbers import Real
 from os import PathLike
 from pathlib import Path
 
@@ -20,7 +21,7 @@ from aesi.data.spectra import read_spectra
 from aesi.errors import DataError, InputError
 from aesi.over_time import stamp
 from aesi.physics import ModelName
-from aesi.physics.arguments import check_choice, check_soc
+from aesi.physics.arguments import check_choice, checked_soc
 from aesi.physics.cell import Soh
 from aesi.pipeline.calibrate import (
     body_sentences,
@@ -89,7 +90,8 @@ def discover(
 
     Raises AesiError, one sentence, for data that cannot be read, cannot decide anything, or are not of this cell.
     """
-    _check_asked(soc0, holdout, max_effects, seed)
+    soc0 = checked_soc(soc0)
+    _check_asked(holdout, max_effects, seed)
     folder = None if out is None else _folder(out)
     given, parts = declared_model(cell).with_soh(soh), [_listed(part) for part in (data, tests, good)]
     asked = [one for part in parts for one in part]
@@ -106,8 +108,8 @@ def discover(
         max_effects,
         seed,
         files,
-        _names(only),
-        _names(without),
+        _names("only", only),
+        _names("without", without),
         model,
         good=known,
     )
@@ -155,11 +157,15 @@ def calibrate(
     taken, and a note says how far apart they are.
     Raises AesiError, one sentence, for arguments or data that cannot be used.
     """
-    check_soc(soc0)
+    soc0 = checked_soc(soc0)
     _check_by_name("temperatures_degc", temperatures_degc)
     _check_by_name("dates", dates)
     _check_priors(priors)
     _check_days(dates or {}, as_of)
+    _check_whole("starts", starts, 1)
+    _check_whole("seed", seed, 0)
+    if cut_offs_v is not None and not _is_row(cut_offs_v, 2):
+        raise InputError(f"cut_offs_v = {cut_offs_v!r}: give (lower, upper) V, as in (2.5, 4.2).")
     given = declared_model(cell)
     declared = start_cell(given.cell, cut_offs_v, body_mm, mass_g)
     measurements = _read_all(_listed(data), hold)
@@ -199,22 +205,39 @@ def _read_spectra(given: Spectra) -> tuple[Spectrum, ...]:
     return tuple(found)
 
 
-def _names(ids: str | Sequence[str]) -> tuple[str, ...]:
-    return (ids,) if isinstance(ids, str) else tuple(ids)
+def _names(what: str, ids: str | Sequence[str]) -> tuple[str, ...]:
+    """The ids.  Raises InputError where `ids`, the argument `what`, is neither a text nor a sequence of texts."""
+    given = (ids,) if isinstance(ids, str) else ids
+    if not isinstance(given, Sequence) or not all(isinstance(one, str) for one in given):
+        raise InputError(f"{what} = {ids!r}: give the id of an effect, or a list of ids.")
+    return tuple(given)
 
 
-def _check_asked(soc0: float | None, holdout: float | None, max_effects: int, seed: int) -> None:
+def _is_row(values: object, length: int) -> bool:
+    """Whether a value is a sequence of so many numbers."""
+    return (
+        isinstance(values, Sequence)
+        and len(values) == length
+        and all(isinstance(one, Real) for one in values)
+    )
+
+
+def _check_asked(holdout: object, max_effects: int, seed: int) -> None:
     """Raises InputError for a number that a search cannot use."""
-    check_soc(soc0)
-    if holdout is not None and not 0.0 <= holdout <= MOST_HOLDOUT:
+    if holdout is not None and not (isinstance(holdout, Real) and 0.0 <= float(holdout) <= MOST_HOLDOUT):
         raise InputError(
             f"holdout = {holdout!r} is not a share of the record, from 0 to {MOST_HOLDOUT:g}, to be kept back; 30 % "
             "is 0.3."
         )
-    for name, value, most in (("max_effects", max_effects, MOST_EFFECTS), ("seed", seed, np.inf)):
-        if not isinstance(value, int | np.integer) or not 0 <= value <= most:
-            upper = f" up to {most:g}" if np.isfinite(most) else ""
-            raise InputError(f"{name} = {value!r} is not a whole number from 0{upper}.")
+    _check_whole("max_effects", max_effects, 0, MOST_EFFECTS)
+    _check_whole("seed", seed, 0)
+
+
+def _check_whole(name: str, value: object, least: int, most: float = np.inf) -> None:
+    """Raises InputError where an argument is no whole number from `least` to `most`."""
+    if not isinstance(value, int | np.integer) or not least <= value <= most:
+        upper = f" up to {most:g}" if np.isfinite(most) else ""
+        raise InputError(f"{name} = {value!r} is not a whole number from {least}{upper}.")
 
 
 def _check_by_name(what: str, given: object) -> None:
@@ -229,8 +252,7 @@ def _check_priors(priors: object) -> None:
     if priors is not None and not isinstance(priors, Mapping):
         raise InputError(f"priors = {priors!r} names no parameter; give {form}.")
     for name, prior in (priors or {}).items():
-        pair = isinstance(prior, Sequence) and len(prior) == 2
-        if not pair or not all(isinstance(one, int | float | np.number) for one in prior):
+        if not _is_row(prior, 2):
             raise InputError(f"priors[{name!r}] = {prior!r} is no pair of numbers; give {form}.")
 
 

@@ -268,7 +268,7 @@ def calibration_content(
         "schema": SCHEMA,
         "cell": found.cell.name,
         "model": found.model.model_name,
-        "files": [_file_row(e, found.capacities[e.name]) for e in found.errors],
+        "files": [_file_row(e, found.capacities[e.name], found.starts[e.name]) for e in found.errors],
         "parameters": _parameter_rows(found, posterior),
         "capacity_ah": found.cell.capacity_ah,
         "declared_capacity_ah": found.declared.capacity_ah,
@@ -287,7 +287,7 @@ def calibration_content(
     }
 
 
-def _file_row(error: RecordError, capacity_share: float) -> dict[str, Any]:
+def _file_row(error: RecordError, capacity_share: float, soc0: float) -> dict[str, Any]:
     return {
         "name": error.name,
         "temperature_degc": error.temperature_degc,
@@ -295,6 +295,7 @@ def _file_row(error: RecordError, capacity_share: float) -> dict[str, Any]:
         "after_rmse_mv": MV_PER_V * error.after_v,
         "as_simulated_rmse_mv": MV_PER_V * error.simulated_v,
         "capacity_share": capacity_share,
+        "soc0": soc0,
     }
 
 

@@ -236,6 +236,11 @@ def test_a_file_that_cannot_be_used_is_told_when_it_is_read(tmp_path, was, now, 
             OwnEffectError,
             "a state 'soc', which the run has",
         ),
+        (
+            "Contribution(0 * trace.current_a, {'voltage_v': trace.current_a})",
+            OwnEffectError,
+            "a state 'voltage_v', which the run has",
+        ),
         ("Contribution(trace.current_a / 0.0)", NoNumberError, "on_voltage gives no number at 0 s"),
         ("Contribution(trace.current_a.astype(object))", OwnEffectError, "gives values of type object"),
     ],
@@ -249,6 +254,34 @@ def test_what_an_effect_of_ones_own_may_not_give_is_told_with_its_file(
     with pytest.raises(error, match=sentence) as caught:
         aesi.simulate(cell, TIME, current, SOC0, [load_effect(path).activate()])
     assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("place", "argument", "body", "error", "sentence"),
+    [
+        (
+            "on_record", "record", "replace(record, temperature_k=np.full(len(record.time_s), 25.0))",
+            OwnEffectError, "on_record gives 25 K, and a cell is at",
+        ),
+        (
+            "on_record", "record", "replace(record, time_s=record.time_s[::-1])",
+            OwnEffectError, "on_record gives times that do not rise",
+        ),
+        (
+            "on_model", "model", "model.with_cell(contact_resistance_ohm=np.nan)",
+            NoNumberError, "the voltage is no number at 0 s",
+        ),
+    ],
+)  # fmt: skip
+def test_what_an_effect_makes_of_a_record_or_a_cell_is_checked_as_what_a_user_gives(
+    tmp_path, cell, current, place, argument, body, error, sentence
+):
+    path = tmp_path / "mine.py"
+    acting = OWN[: OWN.index("def drop")] + "from dataclasses import replace\nimport numpy as np\n\n"
+    acting += f"def act({argument}, *, lead_ohm):\n    return {body}\n"
+    path.write_text(acting + OWN[OWN.index("\n\nEFFECT") :].replace("on_voltage=drop", f"{place}=act"))
+    with pytest.raises(error, match=sentence):
+        aesi.simulate(cell, TIME, current, SOC0, [load_effect(path).activate()])
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ import aesi
 from aesi.calibration import calibrate as fit_cell
 from aesi.data.read import examined
 from aesi.data.spectra import read_spectra
-from aesi.errors import CellError, DataError, InputError
+from aesi.errors import AesiError, CellError, DataError, InputError
 from aesi.physics.effects import CATALOGUE
 from aesi.pipeline import api
 from aesi.records import Spectrum
@@ -277,6 +277,10 @@ def test_columns_that_are_no_measurement_are_refused(columns, sentence):
     [
         ({"holdout": 30}, "holdout = 30 is not a share of the record, .* 30 % is 0.3"),
         ({"holdout": -0.1}, "holdout = -0.1 is not a share"),
+        ({"holdout": "half"}, "holdout = 'half' is not a share"),
+        ({"soh": "new"}, "a state of health of 'new'"),
+        ({"cell": None}, "a NoneType is no cell; give a BPX file"),
+        ({"only": 3}, "only = 3: give the id of an effect, or a list of ids"),
         ({"max_effects": -1}, "max_effects = -1 is not a whole number from 0 up to 10"),
         ({"max_effects": 1.5}, "max_effects = 1.5 is not a whole number"),
         ({"seed": "a"}, "seed = 'a' is not a whole number from 0"),
@@ -303,6 +307,56 @@ def test_a_discovery_says_what_cannot_be_meant_before_it_searches(cell, record, 
     with pytest.raises(InputError, match=sentence) as caught:
         aesi.discover(**({"cell": cell, "data": record} | changes))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"starts": 1.5}, "starts = 1.5 is not a whole number from 1"),
+        ({"seed": -1}, "seed = -1 is not a whole number from 0"),
+        ({"cut_offs_v": 4.2}, r"cut_offs_v = 4.2: give \(lower, upper\) V"),
+        ({"cut_offs_v": (1, 2, 3)}, r"cut_offs_v = \(1, 2, 3\): give"),
+        ({"body_mm": 5}, "a body of 5 mm: give diameter and height"),
+        ({"mass_g": "x"}, "a mass of 'x' g is no number"),
+    ],
+)
+def test_a_calibration_says_what_cannot_be_meant_before_it_fits(cell, record, changes, sentence):
+    with pytest.raises(InputError, match=sentence):
+        aesi.calibrate(cell, record, **changes)
+
+
+@pytest.mark.parametrize("source", [[], 3, None])
+def test_what_is_no_file_of_a_cell_is_told(source):
+    with pytest.raises(CellError, match="is no cell; give the path of a BPX file, or its content as a dict"):
+        aesi.Cell.from_bpx(source)
+
+
+def test_a_number_of_numpy_is_a_state_of_charge(cell, current):
+    one, other = (aesi.simulate(cell, TIME, current, soc0) for soc0 in (SOC0, np.array(SOC0)))
+    np.testing.assert_array_equal(one.voltage_v, other.voltage_v)
+    lost = [CATALOGUE["lithium_inventory_loss"].activate(loss=0.05)]
+    z = [aesi.impedance(cell, [1.0], soc, effects=lost)[0] for soc in (0.5, np.array(0.5))]
+    assert z[0] == z[1]
+
+
+def test_a_run_keeps_its_columns_when_the_arrays_that_were_given_change(cell):
+    time, held = np.arange(60.0), np.full(60, 1.0)
+    run = aesi.simulate(cell, time, held, SOC0)
+    held[:], time[:] = 5.0, 7.0
+    assert run.current_a[0] == 1.0
+    assert run.time_s[-1] == 59.0
+
+
+@pytest.mark.parametrize(("argument", "told"), [("error0_v", "is no voltage"), ("soc0_sd", "is no standard")])
+def test_a_text_in_place_of_a_number_is_told_by_a_prediction(cell, current, argument, told):
+    with pytest.raises(InputError, match=f"{argument} = 'x' {told}"):
+        aesi.HybridModel(cell).predict(TIME, current, SOC0, **{argument: "x"})
+
+
+def test_a_charge_of_no_cell_is_told_in_a_few_digits(cell):
+    with pytest.raises(AesiError) as caught:
+        aesi.simulate(cell, [0, 1, 2], [1e300] * 3, 0.6)
+    assert len(str(caught.value)) < 600
 
 
 def test_a_prediction_takes_one_temperature_for_all_rows(cell, current):

@@ -58,6 +58,10 @@ def _load(source: str | PathLike[str] | Mapping[str, Any]) -> tuple[dict[str, An
     """(content of a BPX file or mapping as it is, its name for messages)."""
     if isinstance(source, Mapping):
         return copy.deepcopy(dict(source)), "BPX data"
+    if not isinstance(source, str | PathLike):
+        raise CellError(
+            f"a {type(source).__name__} is no cell; give the path of a BPX file, or its content as a dict."
+        )
     path = Path(source)
     raw = _parsed(path, _text_of(path))
     if not isinstance(raw, dict):

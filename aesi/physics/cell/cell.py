@@ -8,8 +8,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import pi, prod
+from numbers import Real
 from os import PathLike
 from typing import Any, Self
+
+import numpy as np
 
 from aesi.constants import CM_PER_M, MILLI
 from aesi.errors import CellError
@@ -73,6 +76,9 @@ class Cell(CellParameters):
             cell = replace(cell, volume_m3=volume, surface_area_m2=surface)
         if mass_g is None:
             return cell
+        given: object = mass_g
+        if not isinstance(given, Real):
+            raise CellError(f"a mass of {mass_g!r} g is no number.")
         if cell.volume_m3 is None:
             raise CellError(
                 f"{self.name}: a mass of {mass_g:g} g makes no density without a volume; give the size of the body, "
@@ -94,7 +100,8 @@ class Cell(CellParameters):
 def _volume_and_surface(size_mm: Sequence[float]) -> tuple[float, float]:
     """(m3, m2) of a cylinder (diameter, height) or a box (three edges), mm.  Raises CellError for another body."""
     least, most = EDGE_MM
-    if len(size_mm) not in (2, 3) or not all(least <= edge <= most for edge in size_mm):
+    numbers = isinstance(size_mm, Sequence | np.ndarray) and all(isinstance(edge, Real) for edge in size_mm)
+    if not numbers or len(size_mm) not in (2, 3) or not all(least <= edge <= most for edge in size_mm):
         raise CellError(
             f"a body of {size_mm!r} mm: give diameter and height of a cylinder, or the three edges of a box, each from "
             f"{least:g} to {most:g} mm."

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from datetime import date, datetime
+from numbers import Real
 
 import numpy as np
 
@@ -58,9 +59,11 @@ def checked_soh(soh: Soh) -> Soh:
     """
     if isinstance(soh, date):
         return day_of(soh)
-    if not LEAST_SOH <= soh <= MOST_SOH:
+    given: object = soh
+    if not (isinstance(given, Real) and LEAST_SOH <= float(given) <= MOST_SOH):
+        told = f"{float(given):g}" if isinstance(given, Real) else repr(given)
         raise CellError(
-            f"a state of health of {soh:g}: it is the share of the cell file's capacity that the cell had, from "
+            f"a state of health of {told}: it is the share of the cell file's capacity that the cell had, from "
             f"{LEAST_SOH:g} to {MOST_SOH:g}; 97 % is 0.97."
         )
     return soh

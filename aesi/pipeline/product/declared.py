@@ -5,6 +5,7 @@ from __future__ import annotations
 from os import PathLike
 from pathlib import Path
 
+from aesi.errors import InputError
 from aesi.physics import Cell
 from aesi.physics.record_checks import check_measured
 from aesi.pipeline.product.hybrid import HybridModel
@@ -23,6 +24,12 @@ def declared_model(source: Declared) -> HybridModel:
         return source
     if isinstance(source, Cell):
         return _alone(source)
+    given: object = source
+    if not isinstance(given, str | PathLike):
+        raise InputError(
+            f"a {type(given).__name__} is no cell; give a BPX file, the folder of a saved model, a Cell or a "
+            "HybridModel."
+        )
     path = Path(source)
     return HybridModel.load(path) if path.is_dir() else _alone(Cell.from_bpx(path))
 

@@ -21,7 +21,7 @@ from aesi.errors import CellError, DataError, InputError, SimulationError
 from aesi.numerics.typing import Array, BoolArray, Numbers
 from aesi.numerics.visited import Visited
 from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
-from aesi.physics.arguments import check_cell, check_choice, check_soc, checked_effects
+from aesi.physics.arguments import check_cell, check_choice, checked_effects, checked_soc
 from aesi.physics.cell import Soh
 from aesi.physics.depletion import RUN_ON
 from aesi.physics.effects import active_effect, saved_effect
@@ -77,8 +77,9 @@ class HybridModel:
         step: object = self.dt_s  # a file may hold anything
         if not isinstance(step, Real) or not 0.0 < float(step) < np.inf:
             raise InputError(f"dt_s = {self.dt_s!r} has to be a positive number of seconds.")
+        object.__setattr__(self, "dt_s", float(step))
         check_choice("hold", self.hold, Hold)
-        check_soc(self.soc0)
+        object.__setattr__(self, "soc0", checked_soc(self.soc0))
         check_choice("model", self.model, ModelName)
 
     def __repr__(self) -> str:
@@ -147,9 +148,9 @@ class HybridModel:
         soc0_sd : standard deviation of a soc0 that is not read from the voltage; it widens the band of a free run.
         Raises InputError for a soc0_sd outside 0 to 1, and for an error0_v that is not finite; else as `predict`.
         """
-        if error0_v is not None and not np.isfinite(error0_v):
+        if error0_v is not None and not _is_finite(error0_v):
             raise InputError(f"error0_v = {error0_v!r} is no voltage; give volts, or leave it out.")
-        if not 0.0 <= soc0_sd <= 1.0:  # this way round, NaN fails too
+        if not (_is_finite(soc0_sd) and 0.0 <= soc0_sd <= 1.0):
             raise InputError(
                 f"soc0_sd = {soc0_sd!r} is no standard deviation of a state of charge; give 0 to 1."
             )
@@ -376,6 +377,11 @@ def _as_saved(file: Path) -> Iterator[None]:
         raise InputError(f"{file} lacks {error}; save the model again.") from None
     except (TypeError, ValueError, AttributeError, IndexError) as error:
         raise InputError(f"{file} is not as it was saved ({error}); save the model again.") from None
+
+
+def _is_finite(value: object) -> bool:
+    """Whether an argument is a finite number."""
+    return isinstance(value, Real) and bool(np.isfinite(float(value)))
 
 
 def _each_row(temperature_degc: Numbers | None, rows: tuple[int, ...]) -> Array | None:

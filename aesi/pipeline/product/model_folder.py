@@ -39,15 +39,17 @@ def write_model(
         raise InputError(
             f"{folder} cannot be a folder: a file of that name is there; name another."
         ) from None
+    arrays: dict[str, Array] = {}
+    texts = {name: _json_text(_without_arrays(content, name, arrays)) for name, content in parts.items()}
+    head_text = _json_text({"schema": SCHEMA, "parts": sorted(parts), **head})
     # The head goes first and comes last: without it nobody takes a folder for a model that is half another one's.
     (folder / HEAD).unlink(missing_ok=True)
-    arrays: dict[str, Array] = {}
-    for name, content in parts.items():
-        _write_json(part_file(folder, name), _without_arrays(content, name, arrays))
+    for name, text in texts.items():
+        write_whole(part_file(folder, name), text)
     for name, code in files.items():
         write_whole(folder / name, code)
     np.savez_compressed(folder / ARRAYS, allow_pickle=False, **arrays)
-    _write_json(folder / HEAD, {"schema": SCHEMA, "parts": sorted(parts), **head})
+    write_whole(folder / HEAD, head_text)
 
 
 def read_model(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -114,8 +116,8 @@ def _with_arrays(value: Any, arrays: Mapping[str, Array]) -> Any:
     return value
 
 
-def _write_json(path: Path, content: Any) -> None:
-    write_whole(path, json.dumps(content, indent=1, allow_nan=False))
+def _json_text(content: Any) -> str:
+    return json.dumps(content, indent=1, allow_nan=False)
 
 
 def _read_json(path: Path, hint: str = "save the model again.") -> Any:

@@ -153,8 +153,6 @@ def _course_end(state: ModelState, rate_c: float, degc: float | None) -> tuple[f
         run = state.problem.run(profile, soc0, state.effects(), "linear")
     except AesiError as error:
         return 0.0, f"{what} cannot be simulated: {error}"
-    if not np.isfinite(run.voltage_v).all():
-        return 0.0, f"{what} has no finite voltage"
     over = np.append(np.flatnonzero(_beyond_limit(cell, rate_c, run.voltage_v)), len(time) - 1)[0]
     empty = np.append(np.flatnonzero(run.series["depleted"] > 0), len(time))[0]
     if over <= empty:

@@ -12,7 +12,6 @@ import numpy as np
 from aesi.errors import AesiError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, BoolArray
-from aesi.over_time import stamp
 from aesi.physics.depletion import ran_out
 from aesi.records import Run
 from aesi.tracer.case.records import PreparedRecord
@@ -134,10 +133,7 @@ def _simulated(state: ModelState, record: PreparedRecord, index: int | None) -> 
     """A simulation over a record, or over its fit part alone where it fails beyond that."""
     n = len(record.data)
     try:
-        run = state.simulated(record, index, thin=False)
-        unknown = ~np.isfinite(run.voltage_v)
-        why = f"its voltage is no number at {stamp(float(run.time_s[np.argmax(unknown)]))} s."
-        return _padded(run, n, why if unknown.any() else "")
+        return _padded(state.simulated(record, index, thin=False), n, "")
     except AesiError as error:
         why = str(error)
     fitted = 0 if index is None else record.n_fit_whole

@@ -63,7 +63,7 @@ def test_a_workspace_without_locks_ended_every_run_with_a_bare_error(tmp_path, n
     with RunLock("one") as lock:
         assert not lock.held  # so that nobody closes a run that may be alive
         assert lock.acquire()
-    with _alone(local=True):
+    with _alone(tmp_path / "mlflow.db"):
         pass
     outcomes.close()
     said = capsys.readouterr().err.splitlines()

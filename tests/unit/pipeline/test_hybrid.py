@@ -216,6 +216,16 @@ def test_saved_physics_alone_has_its_intervals_one_step_ahead(model, record, dat
         physics.predict_record(apart, SOC0, one_step=True)
 
 
+def test_a_model_that_cannot_be_written_leaves_the_one_that_is_there(model, tmp_path):
+    folder = model.save(tmp_path / "model")
+    with pytest.raises(TypeError):
+        replace(model, finding=b"bytes").save(folder)
+    assert HybridModel.load(folder).soc0 == model.soc0
+    replace(model, soc0=np.float32(0.5), dt_s=np.int64(1)).save(folder)
+    loaded = HybridModel.load(folder)
+    assert (loaded.soc0, loaded.dt_s) == (0.5, 1.0)
+
+
 def linear_drive(model, dt_s, every_s=1.0, seconds=900.0):
     """Time, current and voltage of the model's own physics on a drive that runs straight between points `every_s`."""
     rng = np.random.default_rng(0)
