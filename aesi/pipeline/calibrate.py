@@ -264,6 +264,7 @@ def calibration_content(
     read : what a reader dropped, mapped or averaged in the files.
     """
     sampled_notes = () if posterior is None else (posterior.sentence,)
+    told = (note for note in (*read, *found.notes, *sampled_notes) if note != found.size_assumed)
     return {
         "schema": SCHEMA,
         "cell": found.cell.name,
@@ -282,7 +283,7 @@ def calibration_content(
         "impedance": [_spectrum_row(s) for s in spectra],
         "at_bounds": list(found.at_bounds),
         "warnings": list(found.warnings),
-        "notes": list(together((*read, *found.notes, *sampled_notes))),
+        "notes": list(together(told)),
         "seconds": round(found.seconds, 2),
     }
 

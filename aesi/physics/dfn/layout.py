@@ -65,9 +65,8 @@ class Electrodes(NamedTuple):
 
     before, after : see `collocation.GaussLayer`.  solid : (2, points, points) ohm m2.
     ocp, entropic, rate, film : (2, table).  alpha : (2,).  capacity, exchange : (places,) F/m2 and A/m2 of cell.
-    node_share : (places,) weights.  plating : rate in A/m2 of cell per mol/m3 of
-    salt, transfer coefficient, c0 in mol/m3.
-    plating_to_c : mol/m3 per C/m2.  energies : (8,) J/mol.  heat : (3,).  area : m2.  contact : ohm.
+    node_share : (places,) weights.  plating : rate in A/m2 of cell per mol/m3 of salt, transfer coefficient, c0 in
+    mol/m3.  plating_to_c : mol/m3 per C/m2.  energies : (8,) J/mol.  heat : (3,).  area : m2.  contact : ohm.
     transference : cation transference number.
     """
 

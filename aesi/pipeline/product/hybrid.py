@@ -259,7 +259,8 @@ class HybridModel:
 
     def _even(self, record: Measurement) -> Measurement:
         """The record resampled to the model's step; itself where it has that step, or the physics is alone."""
-        if not (self._looks_back or self.bands) or is_even(record.time_s, self.dt_s):
+        stepping = self._looks_back or self.bands is not None
+        if not stepping or is_even(record.time_s, self.dt_s):
             return record
         if len(record) > 1 and record.time_s[-1] - record.time_s[0] < self.dt_s:
             raise DataError(

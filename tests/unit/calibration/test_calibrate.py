@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from aesi.calibration import calibrate
-from aesi.calibration.fit import prepared_model
+from aesi.calibration.fit import _moved_start_sentences, prepared_model
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.model import ERROR_V, REPEATS
 from aesi.calibration.parameters import FitParameter, free_parameters
@@ -20,7 +20,9 @@ from aesi.calibration.records.conditions import Conditions, Prior
 from aesi.calibration.result import at_bounds, information_weights, intervals
 from aesi.calibration.start import full_discharge_numbers, scaled_to_discharge, size_assumed
 from aesi.errors import DataError, InputError
+from aesi.numerics.metrics import rms
 from aesi.physics import simulate
+from aesi.pipeline.calibrate import calibration_content
 from aesi.records import Measurement
 
 
@@ -113,7 +115,26 @@ def test_the_size_of_a_cell_is_said_to_be_the_files_where_no_record_is_a_full_di
     whole = Measurement([0.0, 1800.0, 3600.0], [5.0, 5.0, 5.0], [4.15, 3.6, 2.6], name="whole")
     assert "size of the cell is taken from the start file, 5.15 Ah" in found.size_assumed
     assert found.size_assumed in found.notes
+    assert found.size_assumed not in calibration_content(found)["notes"]  # the report has it first
     assert size_assumed(found.declared, [*records, whole]) == ""
+
+
+def test_a_simulation_of_a_record_starts_where_the_calibration_says(found, records):
+    data = records[0]
+    run = simulate(found.cell, data.time_s, data.current_a, found.starts["at_25"], (), 25.0, "linear")
+    assert rms(run.voltage_v - data.voltage_v) == pytest.approx(found.errors[0].simulated_v, rel=1e-6)
+
+
+def test_a_given_start_that_is_another_state_of_charge_in_the_written_cell_is_told():
+    given, read = (SimpleNamespace(basis=basis, soc=0.85) for basis in ("given", "rest"))
+    records = [
+        SimpleNamespace(name=name, start=start) for name, start in (("a", given), ("b", given), ("c", read))
+    ]
+    told = _moved_start_sentences(SimpleNamespace(records=records), {"a": 0.8572, "b": 0.8503, "c": 0.8572})
+    assert told == (
+        "a starts at a state of charge of 0.8572 of the written cell, in which empty is the rest at its lower cut-off: "
+        "by the start file it is the 0.85 that was given.",
+    )
 
 
 def test_the_mean_temperatures_of_one_record_were_said_to_span_nothing(start, records):
