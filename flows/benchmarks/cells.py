@@ -14,15 +14,16 @@ from typing import Any
 from aesi.bench.hybrid.splits import judged
 from aesi.bench.physics import cells as physics
 from aesi.bench.physics.cells_table import archive_table, table
+from aesi.data.catalogue import HG2, NMC, PANASONIC
 from aesi.errors import AesiError
 from aesi.pipeline.experiment.config import read_experiment
 from flows.benchmarks.page import write_between
 from flows.benchmarks.splits import BLOCK_S, QUICK, QUICK_INTERVALS, search_and_fit
 
 EXPERIMENTS = {
-    physics.NCR: "panasonic_ncr18650pf.yaml",
-    physics.HG2: "lg_18650hg2.yaml",
-    physics.NMC: "measured_nmc_drive.yaml",
+    PANASONIC: "panasonic_ncr18650pf.yaml",
+    HG2: "lg_18650hg2.yaml",
+    NMC: "measured_nmc_drive.yaml",
 }
 """Data set -> experiment file of its cell. An experiment that trains on repeats of a record is trained on all of it
 here."""

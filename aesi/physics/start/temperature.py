@@ -73,7 +73,8 @@ class OtherTemperature:
         elif self.constant:
             wrong = (
                 "it is the same in all rows: stated or of a chamber, and not the cell's, of a dead sensor, or in "
-                "another unit (--column temperature_degc=DEGC states another, --column temperature_degc= leaves it out)"
+                "another unit (--unit temperature_degc=degF; --column temperature_degc=DEGC states another, --column "
+                "temperature_degc= leaves it out)"
             )
         else:
             wrong = (

@@ -83,8 +83,9 @@ def test_what_a_run_needs_and_is_away_was_told_after_half_a_minute_of_work(
 def test_data_too_few_for_the_library_leave_no_folder_nor_a_word_of_a_run(tracked, capsys):
     from flows.jobs.start import start
 
-    for name, end_v in (("bad", 3.88), ("good", 3.87)):
-        (tracked / f"{name}.csv").write_text(f"time_s,current_a,voltage_v\n0,1,3.9\n1,1,3.89\n2,1,{end_v}\n")
+    for name, rows, slope in (("bad", 3, 1e-3), ("good", 120, 2e-4)):
+        lines = "".join(f"{k},1,{3.9 - slope * k:.4f}\n" for k in range(rows))
+        (tracked / f"{name}.csv").write_text(f"time_s,current_a,voltage_v\n{lines}")
     path = tracked / "refused.yaml"
     path.write_text(EXPERIMENT.replace("CELL", str(CELL)))
     with pytest.raises(InputError, match="needs more than the 2 training"):

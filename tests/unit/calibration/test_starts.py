@@ -45,5 +45,5 @@ def test_a_number_of_starts_below_one_is_refused(start, records, starts):
     import aesi
     from aesi.errors import InputError
 
-    with pytest.raises(InputError, match="give the number of fits, at least 1"):
+    with pytest.raises(InputError, match=f"starts = {starts} is not a whole number from 1"):
         aesi.calibrate(start, records[0], starts=starts)
