@@ -1,8 +1,10 @@
 """Blocks of neighbouring rows: the moving-block bootstrap over several records, and pieces that are left out in turn.
 
-Rows are numbered consecutively over all records; a block never extends over the end of its record. The number of
-blocks is the number of rows over the block length, rounded up, and the last block is cut so that a resample
-has as many rows as the data.
+Rows are numbered consecutively over all records. A block lies within one record, and is the whole of a record that is
+shorter. First the record is drawn, in proportion to the number of blocks that its rows make, then the start of the
+block among all that it may have: a row occurs as often in the mean whatever the length of its record. (With starts
+drawn over all records alike, a record as short as a block has one start among thousands, and no resample holds it.) The
+last block is cut, so that a resample has as many rows as the data.
 
 Kunsch, Annals of Statistics 17 (1989) 1217, doi:10.1214/aos/1176347265.
 """
@@ -32,9 +34,11 @@ def block_means(values: Array, starts: IntArray) -> Array:
     return np.asarray((np.add.reduceat(values, starts, axis=0).T / rows).T)
 
 
-def block_starts(spans: Sequence[Span], length: int) -> IntArray:
-    """All rows at which a block of `length` rows can start in its record (the record's first row if it is shorter)."""
-    return np.concatenate([np.arange(a, max(a, b - length) + 1) for a, b in spans])
+def record_shares(rows: IntArray, length: int) -> Array:
+    """(records,) probability that a block of the bootstrap lies in each record: in proportion to the number of blocks
+    that its rows make.  rows : (records,) of each.  length : rows of a block."""
+    blocks = rows / np.minimum(rows, length)
+    return np.asarray(blocks / blocks.sum())
 
 
 def moving_block_weights(
@@ -45,19 +49,19 @@ def moving_block_weights(
     spans : consecutive records covering rows 0 to n.
     """
     n = spans[-1][1]
-    ends = np.concatenate([np.full(b - a, b) for a, b in spans])
-    starts = block_starts(spans, length)
+    first, rows = (np.array(column) for column in zip(*((a, b - a) for a, b in spans), strict=True))
+    block = np.minimum(rows, length)
+    shares, most = record_shares(rows, length), -(-n // int(block.min()))
     weights = np.empty((resamples, n), dtype=np.uint16)
     for row in weights:
-        change = np.zeros(n + 1, dtype=np.int16)
-        drawn = 0
-        while drawn < n:
-            start = int(starts[rng.integers(len(starts))])
-            stop = min(start + length, int(ends[start]), start + n - drawn)
-            change[start] += 1
-            change[stop] -= 1
-            drawn += stop - start
-        row[:] = np.cumsum(change[:-1], dtype=np.int16)
+        record = rng.choice(len(spans), most, p=shares)
+        starts = first[record] + rng.integers(rows[record] - block[record] + 1)
+        drawn = np.cumsum(block[record])
+        used = int(np.searchsorted(drawn, n)) + 1
+        stops = starts[:used] + block[record[:used]]
+        stops[-1] -= drawn[used - 1] - n
+        ends = (np.bincount(edges, minlength=n + 1) for edges in (starts[:used], stops))
+        row[:] = np.cumsum(np.subtract(*ends))[:-1]
     return weights
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from aesi.numerics.blocks import record_shares
 from aesi.pipeline.report import style
 from aesi.pipeline.report.views import BootstrapView, Row
 
@@ -166,20 +167,21 @@ def bootstrap_figure(bootstrap: BootstrapView) -> Figure:
 
 
 def expected_unique_fraction(lengths: Sequence[int], block: int) -> float:
-    """Expected share of distinct samples in one resample of records of these lengths: as many blocks as have the
-    samples of all, starts uniform on 0 ... n - B of each record, or its first sample where none fits.
+    """Expected share of distinct samples in one resample of records of these lengths (`moving_block_weights`), in as
+    many blocks as have the samples of all.
 
     A sample near an edge lies in fewer blocks, so the mean runs over all samples.
     """
-    starts = np.array([max(1, n - block + 1) for n in lengths])
-    blocks = np.ceil(sum(lengths) * starts.sum() / (starts @ np.minimum(lengths, block)))
+    rows = np.array(lengths)
+    shares, starts = record_shares(rows, block), np.maximum(rows - block + 1, 1)
+    blocks = np.ceil(np.round(rows.sum() / (shares @ np.minimum(rows, block)), 9))  # of whole blocks no more
     holding = np.concatenate(
         [
-            np.minimum(np.minimum(np.arange(1, n + 1), np.arange(n, 0, -1)), min(block, here))
-            for n, here in zip(lengths, starts, strict=True)
+            share / here * np.minimum(np.minimum(np.arange(1, n + 1), np.arange(n, 0, -1)), min(block, here))
+            for n, here, share in zip(lengths, starts, shares, strict=True)
         ]
     )
-    return float(np.mean(1 - (1 - holding / starts.sum()) ** blocks))
+    return float(np.mean(1 - (1 - holding) ** blocks))
 
 
 def _bars(rows: Sequence[Row], values: Sequence[float], title: str, caption: str, axis: str) -> Figure:
