@@ -126,12 +126,13 @@ def autoregressive_ahead(by_inputs: Array, memory: float, measured: Array, steps
     return np.asarray(by_inputs + memory ** (samples - start) * residual[start])
 
 
-def held_at_divergence(scaled: Array, start: float) -> tuple[Array, int]:
-    """(series with the last value within LIMIT held from the first value beyond it on, index of that one or -1).
+def held_at_divergence(scaled: Array, by_inputs: Array, start: float) -> tuple[Array, int]:
+    """(a free run without feedback, its last value held from where the prediction by the inputs is beyond LIMIT, index
+    of that sample or -1).
 
-    start : the value before the series.
+    scaled : the run.  by_inputs : as for `autoregressive_run`.  start : the value before the run.
     """
-    beyond = np.flatnonzero(~(np.abs(scaled) <= LIMIT))
+    beyond = np.flatnonzero(~(np.abs(by_inputs) <= LIMIT))
     if not len(beyond):
         return scaled, -1
     first = int(beyond[0])

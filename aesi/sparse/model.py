@@ -10,8 +10,9 @@ which is stable, as memory < 1. (At the start of a record g(U[0]) replaces g(U[-
 was not measured. A model with terms in the error then begins with zero error.)
 
 The model works in scaled variables (scaling.py). Inputs outside the trained range are held at its edge and flagged in
-`FreeRun.outside`; a prediction ten times beyond the trained range of the error is a divergence. `reach` gives, for
-bands, how far the prediction would move if the terms continued beyond the edge with their slope there.
+`FreeRun.outside`; a prediction ten times beyond the trained range of the error is a divergence. (A measured first error
+may lie there in a model without terms in the error, since it is not fed back and decays.) `reach` gives, for bands, how
+far the prediction would move if the terms continued beyond the edge with their slope there.
 """
 
 from __future__ import annotations
@@ -212,8 +213,9 @@ class SparseModel:
                 drive[:, :-1], self._error_functions, scaled0, self._clip, free_run.LIMIT
             )
         else:
+            by_inputs = drive[0, :-1]
             scaled, diverged = free_run.held_at_divergence(
-                free_run.autoregressive_run(drive[0, :-1], self.memory, scaled0), scaled0
+                free_run.autoregressive_run(by_inputs, self.memory, scaled0), by_inputs, scaled0
             )
         return np.append(start, self.scaling.error_to_volts(scaled)), diverged
 

@@ -152,7 +152,9 @@ def test_the_bootstrap_of_single_samples_is_the_classic_one():
     assert ensemble.expected_unique_fraction([10_000], 1) == pytest.approx(1 - np.exp(-1), abs=1e-4)
 
 
-@pytest.mark.parametrize(("lengths", "block"), [((300,) * 6, 60), ((300, 50, 900), 60), ((3600, 1200, 700), 500)])
+@pytest.mark.parametrize(
+    ("lengths", "block"), [((300,) * 6, 60), ((300, 50, 900), 60), ((3600, 1200, 700), 500)]
+)
 def test_the_bootstrap_of_several_records_was_expected_to_be_that_of_one(lengths, block):
     from aesi.numerics.blocks import coverage, moving_block_weights
     from aesi.sparse.search.rows import spans_of

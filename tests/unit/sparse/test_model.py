@@ -72,6 +72,18 @@ def test_a_divergence_at_the_first_step_holds_the_error_that_the_run_began_with(
     np.testing.assert_allclose(run.error_v, 0.7)
 
 
+@pytest.mark.parametrize("first", [15.0, -300.0])
+def test_a_first_error_far_beyond_the_trained_range_dies_away(first):
+    model, series = linear(0.0, 0.1, 0.9), record([first] + [0.0] * 200, [0.5] * 201)
+    run = model.free_run(series)
+    assert run.diverged_at is None
+    np.testing.assert_allclose(
+        run.error_v[:3], [first, 0.05 + 0.9 * (first - 0.05), 0.05 + 0.81 * (first - 0.05)]
+    )
+    assert run.error_v[-1] == pytest.approx(0.05, abs=1e-6)
+    np.testing.assert_allclose(run.error_v, model.k_step(series, 200), atol=1e-9)
+
+
 def test_clipping_bounds_an_unstable_map():
     run = linear(1.5, 0.0).free_run(record([0.9] + [0] * 50, [0.0] * 51))
     assert run.diverged_at is None
