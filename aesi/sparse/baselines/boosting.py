@@ -101,14 +101,14 @@ def _judged_models(problem: Problem, leaves: int, seed: int, judge: Judge) -> It
     left_out = [_left_out_predictions(problem, fold, leaves, seed) for fold in range(len(problem.folds))]
     for place, trees in enumerate(TREES):
         predictions = np.concatenate([by_trees[place] for by_trees in left_out])
-        runs, memory = runs_without_feedback(problem, np.column_stack([predictions] * 2))
+        runs = runs_without_feedback(problem, predictions[:, None])
         regressor = _regressor(leaves, trees, seed)
         model = BoostedErrorModel(
             regressor.fit(problem.inputs, problem.target, problem.row_weights),
             problem.scaling,
             problem.library.variables[1:],
             problem.dt_s,
-            memory,
+            runs.memories[0],
             Fade(runs.amplitudes[0], problem.region) if problem.options.fade else None,
         )
         (valid,) = judged_on_validation(problem, runs, (model,))

@@ -84,8 +84,9 @@ def evaluate_single(
     if not coefficients.any():
         return Failed("no term is left")
     fits = np.stack([fit(factor[:, columns]) for factor in problem.fold_factors])
-    runs, memory = fold_runs(problem, active, fits, fits)
-    model = faded(sparse_model(problem, active, coefficients, memory, name), problem, runs.amplitudes[0])
+    runs = fold_runs(problem, active, fits, fits, [coefficients] * 2)
+    fitted = sparse_model(problem, active, coefficients, runs.memories[0], name)
+    model = faded(fitted, problem, runs.amplitudes[0])
     folds, (valid,) = runs.judge(problem, Fit.FOLD), judged_on_validation(problem, runs, (model,))
     if not np.isfinite(folds.loss + valid.loss):
         return Failed("the model diverges in free run")

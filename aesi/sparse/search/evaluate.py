@@ -138,11 +138,12 @@ def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = 
         return combined
     ensemble, loss_oob = combined
     fold_fits, refits = _fold_fits(problem, columns, ensemble.stability != 0, solver)
-    runs, memory = fold_runs(problem, active, fold_fits, refits)
+    both = ensemble.bagging, ensemble.stability
+    runs = fold_runs(problem, active, fold_fits, refits, both)
     bagging, stability = (
         faded(sparse_model(problem, active, coefficients, memory, name, ensemble), problem, amplitude)
-        for name, coefficients, amplitude in zip(
-            ENSEMBLES, (ensemble.bagging, ensemble.stability), runs.amplitudes, strict=True
+        for name, coefficients, memory, amplitude in zip(
+            ENSEMBLES, both, runs.memories, runs.amplitudes, strict=True
         )
     )
     judged = judged_on_validation(problem, runs, (bagging, stability))

@@ -79,15 +79,17 @@ class FoldRuns:
 
     from_unmeasured : free run without a measured error at its start; equal to `free_run` for models with feedback.
     Corrections fade in all of them by nearness and amplitude, not by leverage (fade.py).
-    amplitudes : (2,) a of (2) there.  sums : (2, n_folds, 3) for each fit and fold the scaled sums of e**2, e p and
-    p**2, with p the prediction `from_unmeasured` before the amplitude.
+    amplitudes : (2,) a of (2) there.  memories : (2,) memory of the residual, 0 for models with feedback.
+    sums : (2, n_folds, 3) for each fit and fold the scaled sums of e**2, e p and p**2, with p the prediction
+    `from_unmeasured` before the amplitude.
     """
 
     one_step: Array
     free_run: Array
     from_unmeasured: Array
     sums: Array
-    amplitudes: tuple[float, float] = (1.0, 1.0)
+    amplitudes: tuple[float, ...] = (1.0, 1.0)
+    memories: tuple[float, ...] = (0.0, 0.0)
 
     def judge(self, problem: Problem, column: Fit) -> Judged:
         """The scores of one of the fits over all pieces."""
@@ -107,29 +109,66 @@ class FoldRuns:
         )
 
 
-def fold_runs(problem: Problem, active: IntArray, fits: Array, refits: Array) -> tuple[FoldRuns, float]:
-    """(runs over each piece by models fitted to the others, memory of the residual for models without feedback)."""
+def fold_runs(
+    problem: Problem, active: IntArray, fits: Array, refits: Array, models: Sequence[Array]
+) -> FoldRuns:
+    """The runs over each piece by models fitted to the others.
+
+    fits, refits : (n_folds, m) coefficients of the active terms by each `Fit`.  models : coefficients (m,) of the two
+    models that these represent. They decide whether a fit feeds back: a genome may admit terms in the error of which
+    thresholding leaves none.
+    """
+    feedbacks = problem.library.feedbacks[active]
+    plain = [column for column in Fit if not feedbacks[models[column] != 0].any()]
     drives = [
         drive_of(problem, active, np.stack([fit, refit]), slice(a, b))
         for (a, b), fit, refit in zip(problem.folds, fits, refits, strict=True)
     ]
-    if not any(functions.any() for _, functions in drives):
-        return runs_without_feedback(problem, np.vstack([drive[0] for drive, _ in drives]))
+    if not plain:
+        return _runs_with_feedback(problem, drives)
+    without = runs_without_feedback(problem, np.vstack([drive[0][:, plain] for drive, _ in drives]))
+    return (
+        without
+        if len(plain) == len(Fit)
+        else _joined(_runs_with_feedback(problem, drives), without, plain[0])
+    )
+
+
+def _runs_with_feedback(problem: Problem, drives: Sequence[tuple[Array, IntArray]]) -> FoldRuns:
+    """`fold_runs` of models with feedback.  drives : of each piece, from `drive_of`."""
     parts = []
     for (a, b), (drive, functions) in zip(problem.folds, drives, strict=True):
         rows = slice(a, b)
         one_step = one_step_predictions(problem, drive, functions, rows)
         restart = np.zeros(b - a, dtype=bool)
         restart[0] = True
-        free_runs = free_predictions(problem, drive, functions, rows, restart, np.zeros(2))
-        parts.append((one_step, free_runs))
-    all_free_runs = np.vstack([free_runs for _, free_runs in parts])
-    sums = _fold_sums(problem, all_free_runs)
-    return FoldRuns(np.vstack([one_step for one_step, _ in parts]), all_free_runs, all_free_runs, sums), 0.0
+        parts.append((one_step, free_predictions(problem, drive, functions, rows, restart, np.zeros(2))))
+    one_step, free_runs = (np.vstack(part) for part in zip(*parts, strict=True))
+    return FoldRuns(one_step, free_runs, free_runs, _fold_sums(problem, free_runs))
+
+
+def _joined(feeding: FoldRuns, plain: FoldRuns, place: Fit) -> FoldRuns:
+    """The runs of one fit with feedback and of one without, which has the column `place`.  plain : its one column."""
+
+    def columns(name: str) -> Array:
+        out = np.array(getattr(feeding, name))
+        out[:, place] = getattr(plain, name)[:, 0]
+        return out
+
+    amplitudes, memories, sums = [1.0, 1.0], [0.0, 0.0], np.array(feeding.sums)
+    amplitudes[place], memories[place], sums[place] = plain.amplitudes[0], plain.memories[0], plain.sums[0]
+    return FoldRuns(
+        columns("one_step"),
+        columns("free_run"),
+        columns("from_unmeasured"),
+        sums,
+        tuple(amplitudes),
+        tuple(memories),
+    )
 
 
 def _fold_sums(problem: Problem, predictions: Array) -> Array:
-    """`FoldRuns.sums` of scaled predictions (n, 2)."""
+    """`FoldRuns.sums` of scaled predictions (n, columns)."""
     error = problem.unseen_target[:, None]
     with np.errstate(invalid="ignore", over="ignore"):
         products = np.stack(
@@ -138,10 +177,10 @@ def _fold_sums(problem: Problem, predictions: Array) -> Array:
         return np.stack([products[a:b].sum(axis=0) for a, b in problem.folds], axis=1)
 
 
-def runs_without_feedback(problem: Problem, predictions: Array) -> tuple[FoldRuns, float]:
-    """`fold_runs` of models without feedback.
+def runs_without_feedback(problem: Problem, predictions: Array) -> FoldRuns:
+    """`fold_runs` of models without feedback, which have the memory of the first.
 
-    predictions : (n, 2) scaled predictions by the inputs alone, of rows that the models have not seen."""
+    predictions : (n, columns) scaled predictions by the inputs alone, of rows that the models have not seen."""
     amplitudes = [1.0] * predictions.shape[1]
     if problem.options.fade:
         predictions = problem.nearness[:, None] * predictions
@@ -152,13 +191,14 @@ def runs_without_feedback(problem: Problem, predictions: Array) -> tuple[FoldRun
             for column in predictions.T
         ]
         predictions = predictions * amplitudes
-    memory = memory_of(problem, [predictions[a:b, Fit.FOLD] for a, b in problem.folds])
+    memory = memory_of(problem, [predictions[a:b, 0] for a, b in problem.folds])
     one_step, free_runs = np.empty_like(predictions), np.empty_like(predictions)
     for a, b in problem.folds:
         for j, column in enumerate(predictions[a:b].T):
             one_step[a:b, j] = free_run.autoregressive_ahead(column, memory, problem.unseen_error[a:b], 1)
             free_runs[a:b, j] = free_run.autoregressive_run(column, memory, problem.unseen_error[a])
-    return FoldRuns(one_step, free_runs, predictions, sums, (amplitudes[0], amplitudes[1])), memory
+    memories = (memory,) * len(amplitudes)
+    return FoldRuns(one_step, free_runs, predictions, sums, tuple(amplitudes), memories)
 
 
 def memory_of(problem: Problem, predictions: Sequence[Array]) -> float:

@@ -65,11 +65,44 @@ def test_free_runs_of_the_search_equal_those_of_the_model(feedback_problem):
     table = candidate.bagging.coefficient_table()
     coefficients = np.array([table.get(name, 0.0) for name in names])
     fits = np.tile(coefficients, (len(problem.folds), 1))
-    runs, _ = fold_runs(problem, active, fits, fits)
+    runs = fold_runs(problem, active, fits, fits, [coefficients] * 2)
     first = problem.split.train[0].take(slice(0, problem.folds[0][1] + 1))
     model = replace(candidate.bagging, memory=0.0)
     expected = problem.scaling.error_to_scaled(model.free_run(first).error_v[1:])
     np.testing.assert_allclose(runs.free_run[: len(expected), Fit.FOLD], expected, atol=1e-10)
+
+
+def test_a_candidate_is_judged_as_the_model_that_is_left_after_thresholding(split):
+    options = Options(p_c=1, d=1, mixed=False, special=False, resamples=20, block=60, fade=True)
+    problem = Problem.build(split, options)
+    fed, plain = (
+        evaluate(problem, whole(problem, 1.0, 0.1, p_c=1, d=1, feedback=gene)) for gene in (True, False)
+    )
+    assert not fed.bagging.has_feedback
+    assert fed.bagging.terms == plain.bagging.terms
+    assert fed.bagging.fade.amplitude == pytest.approx(plain.bagging.fade.amplitude)
+    assert fed.bagging.memory == pytest.approx(plain.bagging.memory)
+    assert fed.valid_losses == pytest.approx(plain.valid_losses)
+
+
+def test_one_ensemble_may_feed_back_and_the_other_not(feedback_problem):
+    problem, genome = feedback_problem, whole(feedback_problem, 1e-3, 5e-3)
+    active = np.flatnonzero(genome.active(problem.library))
+    candidate = evaluate(problem, genome)
+    table = candidate.bagging.coefficient_table()
+    feeding = np.array([table.get(problem.library.names[j], 0.0) for j in active])
+    plain = np.where(problem.library.feedbacks[active] == 0, feeding, 0.0)
+    fits = [np.tile(one, (len(problem.folds), 1)) for one in (feeding, plain)]
+    both = fold_runs(problem, active, *fits, [feeding, plain])
+    alone = [
+        fold_runs(problem, active, one, one, [model] * 2)
+        for one, model in zip(fits, (feeding, plain), strict=True)
+    ]
+    for name in ("one_step", "free_run", "from_unmeasured"):
+        for place, runs in enumerate(alone):
+            np.testing.assert_allclose(getattr(both, name)[:, place], getattr(runs, name)[:, place])
+    assert both.memories == (0.0, alone[1].memories[1])
+    assert both.memories[1] > 0.0
 
 
 def test_a_candidate_that_fits_noise_was_admitted_by_its_correlation_on_rows_that_it_had_seen():
