@@ -9,12 +9,13 @@ Samples whose residual is missing (NaN) are left out of every score.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from aesi.conformal.intervals import Intervals
-from aesi.numerics.typing import Array, IntArray
+from aesi.numerics.typing import Array, BoolArray, IntArray
 
 CURRENT_BINS = 8
 """Bins over the range of the current. Conventions of the tables, as are the width of a bin in state of charge, the rows
@@ -69,7 +70,7 @@ def scores_of(
         mean_width_v=float(np.mean(intervals.width_v[seen])) if seen.any() else np.nan,
         interval_score_v=interval_score(intervals.lower_v, intervals.upper_v, residuals, alpha),
         worst_bin_coverage=worst,
-        low_minutes=low_minute_share(covered, dt_s) if dt_s is not None else np.nan,
+        low_minutes=low_minute_share([covered], dt_s) if dt_s is not None else np.nan,
     )
 
 
@@ -122,22 +123,26 @@ def _joined(counts: IntArray, min_samples: int) -> IntArray:
     return np.minimum(group, current - 1) if held and current else group
 
 
-def low_minute_share(covered: Array, dt_s: float) -> float:
-    """Share of the sliding minute-long windows with under 70 % coverage; NaN for less than a minute.
+def low_minute_share(records: Sequence[Array], dt_s: float) -> float:
+    """Share of the sliding minute-long windows of all records with under 70 % coverage; NaN if all are shorter than a
+    minute. No window spans two records.
 
-    covered : (n,) 1, 0, or NaN where missing; a window counts where half of it is seen.
+    records : (n_i,) each, 1, 0, or NaN where missing, every dt_s; a window counts where half of it is seen.
     """
     length = max(1, round(MINUTE_S / dt_s))
-    if len(covered) < length:
-        return np.nan
+    low = [_low_windows(covered, length) for covered in records if len(covered) >= length]
+    windows = np.concatenate([np.empty(0, dtype=bool), *low])
+    return float(np.mean(windows)) if len(windows) else np.nan
+
+
+def _low_windows(covered: Array, length: int) -> BoolArray:
+    """(windows,) whether the coverage is low in each window of `length` samples of which half is seen."""
     seen = np.isfinite(covered)
     hits = _sliding_sum(np.where(seen, covered, 0.0), length)
     counts = _sliding_sum(seen.astype(float), length)
     use = counts >= length / 2
-    if not use.any():
-        return np.nan
     # The sums of ones are exact, the product with 0.7 is not: the slack is for that.
-    return float(np.mean(hits[use] < LOW_MINUTE_COVERAGE * counts[use] - 1e-9))
+    return np.asarray(hits[use] < LOW_MINUTE_COVERAGE * counts[use] - 1e-9)
 
 
 def _sliding_sum(values: Array, length: int) -> Array:

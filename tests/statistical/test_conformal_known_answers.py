@@ -101,4 +101,4 @@ def test_no_minute_under_seventy_per_cent_on_a_changing_variance() -> None:
     covered = (
         METHODS["spci_boosted"].fit([past.residuals]).intervals(future.residuals).covers(future.residuals)
     )
-    assert low_minute_share(covered.astype(float), 0.1) < 0.01
+    assert low_minute_share([covered.astype(float)], 0.1) < 0.01

@@ -54,19 +54,21 @@ class GenomeSpace:
         A search that begins with them never ends below them. Begun at random alone, searches of 100 to 200 candidates
         on a measured cell now and then stayed with a dozen terms and half of the reduction.
         """
-        extents = {(min(1, self.p_c[1]), min(2, self.d[1])), (self.p_c[1], self.d[1])}
+        low = int(np.clip(1, *self.p_c)), int(np.clip(2, *self.d))
+        extents = sorted({low, (self.p_c[1], self.d[1])})
+        ridges = dict.fromkeys(float(np.clip(lambda1, *self.lambda1)) for lambda1 in (1.0, 100.0))
         return tuple(
             Genome.of(
                 np.ones(self.size, dtype=bool),
-                float(np.clip(lambda1, *self.lambda1)),
+                ridge,
                 self.lambda2[0],
                 float(np.mean(self.tau)),
                 p_c,
                 d,
                 feedback,
             )
-            for lambda1 in (1.0, 100.0)
-            for p_c, d in sorted(extents)
+            for ridge in ridges
+            for p_c, d in extents
             for feedback in ((False, True) if self.feedback else (False,))
         )
 

@@ -68,11 +68,21 @@ def test_low_minutes_are_the_windows_that_cover_too_little() -> None:
     # 19 or more of the misses: starts 19 - 60 + 60 = 19 to 119 - 18 = 101, 83 of the 121 windows.
     covered = np.ones(180)
     covered[60:120] = 0.0
-    assert low_minute_share(covered, 1.0) == pytest.approx(83 / 121)
-    assert low_minute_share(np.ones(180), 1.0) == 0.0
-    assert np.isnan(low_minute_share(np.ones(59), 1.0))
+    assert low_minute_share([covered], 1.0) == pytest.approx(83 / 121)
+    assert low_minute_share([np.ones(180)], 1.0) == 0.0
+    assert np.isnan(low_minute_share([np.ones(59)], 1.0))
+
+
+def test_no_minute_spans_two_records() -> None:
+    # Each record misses its first and last 15 seconds: no window of a record, and every one over the border, is low.
+    covered = np.ones(180)
+    covered[:15] = covered[-15:] = 0.0
+    assert low_minute_share([covered], 1.0) == 0.0
+    assert low_minute_share([covered, covered], 1.0) == 0.0
+    assert low_minute_share([np.append(covered, covered)], 1.0) > 0.0
+    assert low_minute_share([covered, np.zeros(59)], 1.0) == 0.0
 
 
 def test_exactly_seventy_per_cent_is_not_low() -> None:
     covered = np.array(([1.0] * 7 + [0.0] * 3) * 6)
-    assert low_minute_share(covered, 1.0) == 0.0
+    assert low_minute_share([covered], 1.0) == 0.0

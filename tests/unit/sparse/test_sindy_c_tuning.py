@@ -59,3 +59,11 @@ def test_a_candidate_below_the_correlations_ranks_below_all_that_keep_to_them(pr
     )
     assert best.fitness == 2.0
     assert isinstance(best.genome, Genome)
+
+
+def test_plain_starts_are_different_genomes_within_the_ranges():
+    space = GenomeSpace(50, lambda1=(1e-13, 0.1), p_c=(3, 5), d=(3, 5))
+    starts = space.plain_starts()
+    assert {(one.p_c, one.d) for one in starts} == {(3, 3), (5, 5)}
+    assert {one.lambda1 for one in starts} == {0.1}
+    assert len(set(starts)) == len(starts) == 4

@@ -15,7 +15,7 @@ import numpy as np
 
 from aesi.conformal import FreeRunBands, Intervals
 from aesi.conformal.horizon_band import HorizonBand
-from aesi.conformal.scores import scores_of
+from aesi.conformal.scores import low_minute_share, scores_of
 from aesi.constants import MV_PER_V
 from aesi.numerics.metrics import rms, rmse
 from aesi.numerics.typing import Array
@@ -292,10 +292,10 @@ def _interval_figures(
     alpha: float,
 ) -> dict[str, float]:
     """Scores of intervals over all test records together: coverages in per cent, widths and scores in V; NaN for fewer
-    rows than `LEAST_ROWS`. A bin of current and state of charge can have samples of several records."""
-    left_v = _joined(residuals)
-    if np.count_nonzero(np.isfinite(left_v)) < LEAST_ROWS:
-        left_v = np.full(len(left_v), np.nan)
+    rows than `LEAST_ROWS`. A bin of current and state of charge can have samples of several records, a minute cannot.
+    """
+    if np.count_nonzero(np.isfinite(_joined(residuals))) < LEAST_ROWS:
+        residuals = [np.full(len(left_v), np.nan) for left_v in residuals]
     known = [each for each in intervals if each is not None]
     together = Intervals(
         lower_v=_joined(each.lower_v for each in known),
@@ -304,20 +304,30 @@ def _interval_figures(
     )
     scores = scores_of(
         together,
-        left_v,
+        _joined(residuals),
         alpha,
         current_a=_joined(r.current_a for r in test),
         soc=_joined(r.soc for r in test),
-        dt_s=test[0].dt_s,
     )
+    covered = [_covered_on_grid(*of_record) for of_record in zip(test, intervals, residuals, strict=True)]
     return {
         "nominal_pct": 100.0 * (1.0 - alpha),
         "coverage_pct": 100.0 * scores.coverage,
         "average_width_v": scores.mean_width_v,
         "winkler_v": scores.interval_score_v,
         "worst_bin_coverage_pct": 100.0 * scores.worst_bin_coverage,
-        "low_minutes_pct": 100.0 * scores.low_minutes,
+        "low_minutes_pct": 100.0 * low_minute_share(covered, test[0].dt_s),
     }
+
+
+def _covered_on_grid(record: ErrorSeries | RowsAhead, intervals: Intervals | None, left_v: Array) -> Array:
+    """(steps,) 1 where an interval holds the error left_v (n,) V, 0 where not, at each step of the even grid; NaN for a
+    step without a scored row."""
+    at = record.stamps if isinstance(record, RowsAhead) else np.arange(len(left_v))
+    out = np.full(int(at.max(initial=-1)) + 1, np.nan)
+    if intervals is not None:
+        out[at] = np.where(np.isfinite(left_v), intervals.covers(left_v), np.nan)
+    return out
 
 
 def _prediction(record: _Judged) -> ModelVoltage:
