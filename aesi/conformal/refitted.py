@@ -140,5 +140,6 @@ class _Forest:
 
     def quantiles(self, rows: Array) -> tuple[Array, Array]:
         """(n,) V, (n,) V."""
-        both = np.asarray(self.forest.predict(rows, quantiles=self.levels))  # type: ignore[attr-defined]
+        # Meinshausen's weights: every tree counts alike, not every sample of a leaf.
+        both = np.asarray(self.forest.predict(rows, quantiles=self.levels, weighted_leaves=True))  # type: ignore[attr-defined]
         return both[:, 0], both[:, 1]
