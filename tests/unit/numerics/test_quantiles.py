@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from aesi.errors import FitError
 from aesi.numerics.quantile_regression import fit_quantiles
@@ -32,6 +33,25 @@ def test_quantiles_follow_a_scale_that_is_linear(rng: np.random.Generator) -> No
     slope = fit_quantiles(x, size * rng.standard_normal(40_000), np.array([0.05, 0.95]))
     # True coefficients 0 and -+1.645; the standard error of the slope is near 0.025.
     np.testing.assert_allclose(slope, [[0, 0], [-1.645, 1.645]], atol=0.1)
+
+
+@pytest.mark.parametrize("slope", [0.0, 5.0])
+def test_a_steep_line_does_not_widen_the_smoothing(slope: float) -> None:
+    # The share of the population below the fitted quantile; the mean of twenty draws has a standard error of 0.2 %.
+    shares = []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        x = np.column_stack([np.ones(500), rng.standard_normal(500)])
+        fitted = fit_quantiles(x, slope * x[:, 1] + rng.standard_normal(500), np.array([0.05]))[:, 0]
+        shares.append(norm.cdf(x @ fitted - slope * x[:, 1]).mean())
+    assert np.mean(shares) == pytest.approx(0.05, abs=0.007)
+
+
+def test_every_quantile_of_rows_on_a_line_is_the_line() -> None:
+    x = np.column_stack([np.ones(50), np.arange(50.0)])
+    np.testing.assert_allclose(
+        fit_quantiles(x, 1e-3 * x[:, 1], np.array([0.05, 0.9])), [[0, 0], [1e-3, 1e-3]], atol=1e-9
+    )
 
 
 def test_units_do_not_matter(rng: np.random.Generator) -> None:
