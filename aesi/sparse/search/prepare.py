@@ -20,8 +20,8 @@ def prepared_series(
     """(training records, validation records, a sentence for each input that was left out).
 
     inputs : names; None takes those of the records. The inputs of a given `library` take precedence.
-    Raises DataError without a training record, where the training error or all inputs are constant, where the
-    validation error is zero, and for a record that is too short, sampled otherwise, or not finite.
+    Raises DataError without a training record, where the training error, all inputs or an input of a given library are
+    constant, where the validation error is zero, and for a record that is too short, sampled otherwise, or not finite.
     """
     if not split.train:
         raise DataError("there are no training records.")
@@ -36,6 +36,8 @@ def prepared_series(
         raise DataError("the voltage error is constant over the training records: there is nothing to learn.")
     if library is None:
         names, notes = _useful_inputs(train)
+    else:
+        _check_varying(train)
     valid = [with_inputs(record, names) for record in split.valid]
     for record in valid:
         _check_record(record, train[0].dt_s)
@@ -64,17 +66,30 @@ def _check_record(record: ErrorSeries, dt_s: float) -> None:
             )
 
 
+def _is_constant(column: Array) -> bool:
+    return bool(np.ptp(column) <= 1e-12 * np.abs(column).max())
+
+
+def _check_varying(train: Sequence[ErrorSeries]) -> None:
+    """Raises DataError for an input that is constant over the training records."""
+    for name, column in zip(train[0].input_names, np.vstack([one.inputs for one in train]).T, strict=True):
+        if _is_constant(column):
+            raise DataError(
+                f"{name} is constant over the training records and has no range to be scaled by; build the library "
+                "without it."
+            )
+
+
 def _useful_inputs(train: Sequence[ErrorSeries]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """(names of inputs that vary and do not repeat an earlier one up to scaling, notes on the others)."""
     columns = np.vstack([record.inputs for record in train])
     kept: dict[str, Array] = {}
     notes = []
     for name, column in zip(train[0].input_names, columns.T, strict=True):
-        spread = np.ptp(column)
-        if spread <= 1e-12 * np.abs(column).max():
+        if _is_constant(column):
             notes.append(f"{name} is constant over the training records; its terms were left out.")
             continue
-        unit = (column - column.min()) / spread
+        unit = (column - column.min()) / np.ptp(column)
         twin = next((other for other, known in kept.items() if _repeats(unit, known)), None)
         if twin is not None:
             notes.append(f"{name} repeats {twin} up to scale; its terms were left out.")

@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
-from aesi.errors import DataError
+from aesi.errors import DataError, InputError
 from aesi.numerics.blocks import CountArray, Span, moving_block_weights, pieces, starts_mask
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.records import HeldOutDrive, Split
@@ -50,6 +50,8 @@ class Options:
     fade : whether a correction without such terms is shrunk towards the physics (fade.py).
     balance : give every record the same weight in fits and losses, whatever its length and its error (very small errors
     excepted). Otherwise a record near the end of discharge, where the error is largest, dominates the model.
+    seed : of the resamples.
+    Raises InputError for a value that none of these can have.
     """
 
     inputs: tuple[str, ...] | None = None
@@ -70,6 +72,19 @@ class Options:
     feedback: bool = True
     fade: bool = False
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("resamples", "block", "horizon", "fold", "cuts"):
+            given = getattr(self, name)
+            if given is not None and not given >= 1:
+                raise InputError(f"{name} = {given}: give a whole number, at least 1.")
+        if not 0.0 < self.best <= 1.0:
+            raise InputError(f"best = {self.best}: give the share of resamples, above 0 and at most 1.")
+        for name, value, choices in (("regime", self.regime, Regime), ("outside", self.outside, Outside)):
+            if value not in get_args(choices):
+                raise InputError(f"{name} = {value!r}: choose from {', '.join(get_args(choices))}.")
+        if self.inputs is not None and len(set(self.inputs)) < len(self.inputs):
+            raise InputError(f"inputs = {', '.join(self.inputs)}: give each name once.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +209,10 @@ class Problem(TrainingRows, Factors):
 
 
 def _checked_pieces(cut: tuple[Span, ...], fold: int | None) -> tuple[Span, ...]:
-    """What is left out in turn.  Raises DataError for pieces so long, or a record so short, that there is but one."""
+    """What is left out in turn.  Raises DataError for pieces so long, or a record so short, that there is but one, and
+    for more pieces than rows."""
+    if any(stop <= start for start, stop in cut):
+        raise DataError("a training record has fewer rows than the parts that it is cut into; lower cuts.")
     if len(cut) < 2 and fold is None:
         rows = sum(stop - start for start, stop in cut)
         raise DataError(

@@ -1,10 +1,11 @@
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from sparse_records import make_record
 
-from aesi.errors import DataError
+from aesi.errors import DataError, InputError
 from aesi.numerics.metrics import mser
 from aesi.records import Failed, Split
 from aesi.sparse import Candidate, FitnessWeights, Genome, Options, Problem, evaluate, fitness
@@ -376,3 +377,31 @@ def test_a_record_too_short_to_be_cut_was_told_to_lower_a_fold_that_nobody_gave(
         DataError, match=r"\d+ rows of one training record are too few .* give a longer record"
     ):
         Problem.build(alone, Options(p_c=1, d=1, special=False, mixed=False, resamples=5, feedback=False))
+
+
+@pytest.mark.parametrize(
+    ("asked", "sentence"),
+    [
+        ({"resamples": 0}, "resamples = 0: give a whole number, at least 1"),
+        ({"block": 0}, "block = 0: give a whole number"),
+        ({"best": 0.0}, "best = 0.0: give the share of resamples"),
+        ({"regime": "both"}, "regime = 'both': choose from free_run, one_step"),
+        ({"outside": "wrap"}, "outside = 'wrap': choose from"),
+        ({"inputs": ("I", "I")}, "inputs = I, I: give each name once"),
+    ],
+)
+def test_options_that_no_search_can_have_are_refused(asked, sentence):
+    with pytest.raises(InputError, match=re.escape(sentence)):
+        Options(**asked)
+
+
+def test_an_input_of_a_given_library_that_does_not_vary_is_named():
+    flat = with_column(lambda record: np.full(len(record), 0.5))
+    library = Library.build(flat.train[0].input_names, p_c=1, d=1)
+    with pytest.raises(DataError, match="soc is constant over the training records and has no range"):
+        Problem.build(flat, SMALL, library)
+
+
+def test_more_parts_than_rows_are_refused(split):
+    with pytest.raises(DataError, match="fewer rows than the parts"):
+        Problem.build(split, Options(p_c=1, d=1, mixed=False, cuts=2000))
