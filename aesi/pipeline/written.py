@@ -27,6 +27,8 @@ FINDING, ARCHIVE = "discovery.json", "hypotheses.jsonl"
 """Files of a discovery: the finding, and the fits that an interrupted search goes on from."""
 ROW, CALIBRATED = "row.json", "calibrated.bpx.json"
 """Further files for a cell of a batch: its row of the summary, and the cell of a check-up."""
+EARLIER = "earlier"
+"""Folder, in that of a cell of a batch that failed, of what an earlier run found there."""
 SUMMARY_TABLE, SUMMARY_PAGE = "summary.csv", "index.html"
 """Files of a batch."""
 BATCH_SUMMARIES = (SUMMARY_TABLE, SUMMARY, SUMMARY_PAGE)

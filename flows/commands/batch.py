@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 from aesi.errors import InputError
-from aesi.pipeline.written import SUMMARY_TABLE, batch_files
+from aesi.pipeline.written import batch_files
 from flows.commands import options, outputs, record_options
 
 
@@ -79,7 +79,7 @@ def batch(
     jobs = read_plan(source, cell, health)
     read = [file for job in jobs for file in job.files]
     outputs.check_folder(out, [source, *read], batch_files(out, [job.name for job in jobs]))
-    rows = run(
+    run(
         source,
         out,
         cell,
@@ -89,5 +89,3 @@ def batch(
         address,
         health,
     )
-    if all(row["status"] == "failed" for row in rows):
-        raise InputError(f"no cell of {source} could be used; {out / SUMMARY_TABLE} says why.")

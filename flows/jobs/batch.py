@@ -10,6 +10,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from aesi.errors import InputError
+from aesi.numerics.files.source_digest import source_digest
 from aesi.pipeline.batch.job import Settings, lost_job, of_other_code, run_job
 from aesi.pipeline.batch.plan import Job, read_plan, without_records
 from aesi.pipeline.batch.summary import write_summary
@@ -43,8 +45,8 @@ def batch(
     """Run the jobs of a folder or table; the rows of the summary, which is written anew after each.
 
     soh : state of health of every cell that the plan gives none.
-    Raises InputError for a plan that cannot be read, and where another process writes to `out` now; a job that fails is
-    a row with its reason.
+    Raises InputError for a plan that cannot be read, where another process writes to `out` now, and where all jobs
+    fail; a job that fails is a row with its reason.
     """
     environment.prepare_process()
     console = Console()
@@ -56,7 +58,12 @@ def batch(
     _say_plan(console, jobs, source, out, workers)
     rows: dict[str, dict[str, Any]] = {}
     kept = f"What is done is kept in {out}; the same command goes on from there."
-    with alone_in(out), kept_on_interrupt(kept), _tracked(jobs, settings, source, console) as tracker:
+    asked = {
+        "source": source.name,
+        "cell": "" if cell is None else cell.name,
+        "soh": soh,
+    } | settings.parameters
+    with alone_in(out), kept_on_interrupt(kept), _tracked(jobs, settings, asked, console) as tracker:
         for row in _rows(jobs, out, settings, workers, runner, address):
             rows[row["name"]] = row
             told = row["finding"] if row["status"] == "done" else f"failed: {row['reason']}"
@@ -65,8 +72,10 @@ def batch(
             page = write_summary(out, _ordered(jobs, rows), title)
             _track(tracker, row)
         _track_summary(tracker, rows, out)
-    failed = sum(row["status"] == "failed" for row in rows.values())
-    console.say(f"Finished in {duration(time.monotonic() - started)}; {failed} failed. Summary: {page}")
+        failed = sum(row["status"] == "failed" for row in rows.values())
+        console.say(f"Finished in {duration(time.monotonic() - started)}; {failed} failed. Summary: {page}")
+        if failed == len(rows):
+            raise InputError(f"no cell of {source} could be used; {out / SUMMARY_TABLE} says why.")
     return _ordered(jobs, rows)
 
 
@@ -86,17 +95,21 @@ def _say_plan(console: Console, jobs: Sequence[Job], source: Path, out: Path, wo
 
 @contextmanager
 def _tracked(
-    jobs: Sequence[Job], settings: Settings, source: Path, console: Console
+    jobs: Sequence[Job], settings: Settings, asked: dict[str, Any], console: Console
 ) -> Iterator[Tracker | None]:
-    """A run of the batch; None where the store is away."""
+    """A run of the batch; None where the store is away.  asked : source and options, by name."""
+    from flows.tracking.experiment_log import CODE
+    from flows.tracking.provenance import versions
     from flows.tracking.tracker import Subject
 
-    key = sha256("".join(job.name for job in jobs).encode()).hexdigest()[:16]
+    of_jobs = {job.name: job.unusable or job.key(settings.key) for job in jobs}
+    key = sha256(repr(sorted(of_jobs.items())).encode()).hexdigest()[:16]
     quiet = TrackingConfig(system_metrics=False, log_model=False)
     subject = Subject("batch", settings.seed, key, "batch", quiet)
-    with tracked_job(subject, source.name, console) as tracker:
+    with tracked_job(subject, asked["source"], console) as tracker:
         if tracker is not None:
-            tracker.parameters({"source": source.name, "cells": len(jobs), "holdout": settings.holdout})
+            content = {"plan_digest": key, "cells": len(jobs), "versions": versions()}
+            tracker.parameters(asked | content, {CODE: source_digest()})
         yield tracker
 
 
@@ -130,5 +143,5 @@ def _rows(
     """Rows as they are done."""
     if runner == "dask":
         run = partial(run_job, out=out.resolve(), settings=settings)
-        return on_dask(run, jobs, workers, address, lost_job)
+        return on_dask(run, [job.resolved() for job in jobs], workers, address, lost_job)
     return in_processes(partial(run_job, out=out, settings=settings), jobs, workers, lost_job)

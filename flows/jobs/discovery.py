@@ -5,15 +5,19 @@ cell and data -> hypotheses -> verdict -> discovery.json, report, model
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aesi.constants import MV_PER_V
+from aesi.numerics.files.source_digest import source_digest
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.sections import TrackingConfig
+from aesi.pipeline.product.contents import contents
 from aesi.pipeline.written import ARCHIVE, FINDING, REPORT
 from flows.base import environment
 from flows.base.console import Console, duration
@@ -154,12 +158,40 @@ class HypothesisTracker:
 
 
 def _subject(case: Case, under: TrackedUnder) -> Subject:
-    from aesi.records import digest
     from flows.tracking.tracker import Subject
 
-    fitted = (*case.measurements, *case.good)
-    key = digest(*(m.time_s for m in fitted), *(m.voltage_v for m in fitted))
+    key = sha256(repr(_asked(case)).encode()).hexdigest()[:16]
     return Subject(under.name, case.seed, key, "discovery", under.tracking)
+
+
+def _asked(case: Case) -> dict[str, Any]:
+    """What was asked, by name: cell, records and options."""
+    given = case.declared()
+    cell = json.dumps(given.cell.to_bpx(), sort_keys=True) + repr(given.effects)
+    asked = {
+        "cell": given.cell.name,
+        "cell_digest": sha256(cell.encode()).hexdigest()[:16],
+        "data": ", ".join(m.name for m in case.measurements),
+        "data_digest": ", ".join(m.digest for m in case.measurements),
+        "test": ", ".join(m.name for m in case.tests),
+        "test_digest": ", ".join(m.digest for m in case.tests),
+        "good": ", ".join(m.name for m in case.good),
+        "good_digest": ", ".join(m.digest for m in case.good),
+        "hold": ", ".join(dict.fromkeys(m.hold_taken for m in case.records)),
+        "model_asked": case.model or "",
+        "effect_files": ", ".join(file.name for file in case.effect_files),
+        "effect_files_digest": "".join(sha256(held).hexdigest()[:16] for held in contents(case.effect_files)),
+        "only": ", ".join(case.only),
+        "without": ", ".join(case.without),
+    }
+    options = {
+        "soc0": case.soc0,
+        "soh": case.soh,
+        "holdout": case.kept_back,
+        "max_effects": case.max_effects,
+        "seed": case.seed,
+    }
+    return {name: value for name, value in asked.items() if value} | options
 
 
 def _run_id(tracker: Tracker | None) -> str:
@@ -170,25 +202,12 @@ def _track_case(tracker: Tracker | None, case: Case) -> None:
     """What was asked, from the start on: a search that fails or is stopped can be told from others too."""
     if tracker is None:
         return
+    from flows.tracking.experiment_log import CODE
+    from flows.tracking.provenance import versions
     from flows.tracking.view import DISCOVERY_COLUMNS, HOW_TO_READ_DISCOVERIES, experiment_tags
 
     tracker.about(experiment_tags(HOW_TO_READ_DISCOVERIES, DISCOVERY_COLUMNS))
-    tracker.parameters(
-        {
-            "cell": case.declared().cell.name,
-            "data": ", ".join(m.name for m in case.measurements),
-            "data_digest": ", ".join(m.digest for m in case.measurements),
-            "test": ", ".join(m.name for m in case.tests),
-            **({"good": ", ".join(m.name for m in case.good)} if case.good else {}),
-            **({"only": ", ".join(case.only)} if case.only else {}),
-            **({"without": ", ".join(case.without)} if case.without else {}),
-            "soc0": case.soc0,
-            "soh": case.soh,
-            "holdout": case.kept_back,
-            "max_effects": case.max_effects,
-            "seed": case.seed,
-        }
-    )
+    tracker.parameters(_asked(case) | {"versions": versions()}, {CODE: source_digest()})
 
 
 def _track_result(tracker: Tracker | None, found: Discovery, content: dict[str, Any], out: Path) -> None:

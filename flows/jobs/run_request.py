@@ -45,7 +45,8 @@ class RunRequest:
 
     @property
     def resuming(self) -> str:
-        """The command line that goes on with what this one began."""
+        """The command line that goes on with what this one began. It has no `--no-cache`, since it goes on from the
+        cache."""
         words = ["aesi", "run", self.path]
         words += [word for text in self.overrides for word in ("--set", text)]
         words += ["--runner", self.runner] if self.runner else []

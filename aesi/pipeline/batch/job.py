@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ from aesi.pipeline.calibrate import Request, calibrate_files
 from aesi.pipeline.discovery.cases import case_of_files
 from aesi.pipeline.discovery.discover import run_case, write_discovery
 from aesi.pipeline.report.words.discoveries import short_finding
-from aesi.pipeline.written import CALIBRATED, FINDING, REPORT, ROW
+from aesi.pipeline.written import CALIBRATED, EARLIER, FINDING, MODEL, REPORT, ROW, calibration_files
 
 
 @dataclass(frozen=True)
@@ -36,15 +37,23 @@ class Settings:
         """The settings and the program that does the jobs, as text: rows of two versions are not mixed."""
         return f"{self!r}|{source_digest()}"
 
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The settings by name; of those on reading files the ones that were given."""
+        shared: dict[str, Any] = {"holdout": self.holdout, "max_effects": self.max_effects, "seed": self.seed}
+        reading = {} if self.reading is None else vars(self.reading)
+        return shared | {name: value for name, value in reading.items() if value not in (None, {})}
+
 
 def run_job(job: Job, out: Path, settings: Settings) -> dict[str, Any]:
     """Run one job below `out/<name>`, or take what it gave before from there; a row of the summary.
 
-    A job that cannot be done is a row with its reason, so that one bad file does not stop a hundred cells.
+    A job that cannot be done is a row with its reason, so that one bad file does not stop a hundred cells. What an
+    earlier run left in its folder is moved into `earlier`, where nobody takes it for a result of these files.
     """
-    if job.unusable:
-        return _job_columns(job, "failed") | {"reason": job.unusable}
     folder = out / job.name
+    if job.unusable:
+        return _failed(job, folder, job.unusable)
     try:
         key = job.key(settings.key)
         finished = _finished_row(folder, key)
@@ -56,12 +65,29 @@ def run_job(job: Job, out: Path, settings: Settings) -> dict[str, Any]:
             folder / ROW, json.dumps({"key": key, "code": source_digest(), "row": row}, indent=1) + "\n"
         )
     except AesiError as error:
-        return _job_columns(job, "failed") | {"reason": str(error)}
+        return _failed(job, folder, str(error))
     except OSError as error:
-        return _job_columns(job, "failed") | {
-            "reason": f"{error.filename or 'a file'}: {error.strerror or error}"
-        }
+        return _failed(job, folder, f"{error.filename or 'a file'}: {error.strerror or error}")
     return row
+
+
+def _failed(job: Job, folder: Path, reason: str) -> dict[str, Any]:
+    """The row of a job that cannot be done, after what lies in its folder from an earlier run was moved."""
+    results = (ROW, FINDING, REPORT, MODEL, *(file.name for file in calibration_files(folder / CALIBRATED)))
+    there = [name for name in results if (folder / name).exists()]
+    if there:
+        kept = folder / EARLIER
+        try:
+            shutil.rmtree(kept, ignore_errors=True)
+            kept.mkdir()
+            for name in there:
+                (folder / name).rename(kept / name)
+        except OSError as error:
+            place = f"{error.filename or folder}: {error.strerror or error}"
+            reason = f"{reason} What an earlier run found is still in {folder} ({place})."
+        else:
+            reason = f"{reason} What an earlier run found was moved to {kept}."
+    return _job_columns(job, "failed") | {"reason": reason}
 
 
 def lost_job(job: Job) -> dict[str, Any]:

@@ -54,6 +54,11 @@ class Job:
         """The files that the job reads: the cell's (a saved model is a folder) and the records."""
         return self.cell, *self.data, *self.tests
 
+    def resolved(self) -> Job:
+        """The job with absolute paths, for a worker that was started in another folder."""
+        data, tests = (tuple(path.resolve() for path in files) for files in (self.data, self.tests))
+        return replace(self, cell=self.cell.resolve(), data=data, tests=tests)
+
     def key(self, settings: str) -> str:
         """Hash that identifies the job: content and purpose of its files, and its settings."""
         sha = hashlib.sha256(f"{settings}|{self.soc0}|{self.soh}|{bool(self.specimen)}".encode())
@@ -91,11 +96,15 @@ def read_plan(source: Path, cell: Path | None = None, soh: Soh | None = None) ->
 def _check_names(source: Path, names: list[str]) -> None:
     """Raises InputError for a name that is there twice, for one that is no name of a folder, and for that of a file of
     the batch, in capitals too: some file systems do not tell them apart."""
+    first: dict[str, str] = {}
     for name in names:
-        if names.count(name) > 1:
+        if name.lower() in first:
+            other = first[name.lower()]
+            also = "" if other == name else f" and {other!r}, which differ in capitals alone"
             raise InputError(
-                f"{source}: two rows are named {name!r}; names tell the folders of results apart."
+                f"{source}: two rows are named {name!r}{also}; names tell the folders of results apart."
             )
+        first[name.lower()] = name
         if Path(name).name != name or name.startswith("."):
             raise InputError(
                 f"{source}: {name!r} names a folder of results; give a name without slashes that starts with no dot."
@@ -193,6 +202,9 @@ def _jobs(table: Path, stream: TextIO, cell: Path | None) -> Iterator[Job]:
             f"{table} is separated by {OTHER_SIGNS[other]}; separate its cells by commas (several files of one cell "
             "are separated by ;)."
         )
+    twice = next((name for name in header if header.count(name) > 1), None)
+    if twice is not None:
+        raise InputError(f"{table} has {header.count(twice)} columns named {twice!r}; leave one.")
     unknown = [name for name in header if name not in COLUMNS]
     if unknown or not {"name", "data"} <= set(header):
         raise InputError(

@@ -126,6 +126,7 @@ class Case:
         untold = (m for m in self.records if m.temperature_degc is None)
         without = "the saved model's learnt correction is left out: what is sought is what its physics lacks."
         left = () if given.correction is None else (without,)
+        temperatures = [temperature_sentence(given.cell, m, given.effects) for m in untold]
         return (
             *given.cell.unread,
             *soh_day_sentences(declared_model(self.cell).cell, self.soh),
@@ -133,7 +134,7 @@ class Case:
                 given.cell, (m.temperature_degc for m in self.records), given.effects
             ),
             *left,
-            *(temperature_sentence(given.cell, m, given.effects) for m in untold),
+            *(map(with_keys, temperatures) if self.of_experiment else temperatures),
         )
 
     @property

@@ -301,7 +301,7 @@ def _on_grid(
         notes += [
             held,
             *sampled,
-            temperature_sentence(cell, measurement, given.effects),
+            with_keys(temperature_sentence(cell, measurement, given.effects)),
             *map(with_keys, contradiction_sentences(given, measurement, start.soc, data.hold)),
             *map(with_keys, even.notes),
         ]

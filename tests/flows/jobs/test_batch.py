@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from aesi.calibration.health import HEALTH_WORDS
-from aesi.errors import AesiError
+from aesi.errors import AesiError, InputError
 from aesi.numerics.files.source_digest import source_digest
 from aesi.pipeline.batch.job import Settings
 from aesi.pipeline.batch.plan import read_plan
@@ -117,3 +117,40 @@ def test_a_batch_for_a_scheduler_that_is_away_left_a_failed_run(workspace, monke
     assert capsys.readouterr().err == ""
     assert not (workspace / "out").exists()
     assert not (workspace / "mlflow.db").exists()
+
+
+def test_a_batch_tracks_what_was_asked(tracked):
+    from aesi.data.reading import Reading
+    from flows.jobs.batch import batch
+    from flows.tracking.store import Store
+
+    plan, out = tracked / "plan.csv", tracked / "out"
+    plan.write_text("name,data\na,a.csv\n")
+    settings = Settings(0.3, 1, 3, Reading(units={"current_a": "mA"}))
+    for content in ("a", "b"):
+        (tracked / "a.csv").write_text(content)
+        with pytest.raises(InputError, match=r"no cell of .*plan.csv could be used; .*summary.csv says why"):
+            batch(plan, out, CELL, settings, workers=1, soh=0.98)
+    store = Store()
+    runs = [run for run in store.runs(store.find_experiment("batch"), "") if run.info.run_name == "plan.csv"]
+    asked = {
+        "cell": CELL.name,
+        "soh": "0.98",
+        "max_effects": "1",
+        "seed": "3",
+        "units": '{"current_a": "mA"}',
+    }
+    for run in runs:
+        assert {name: run.data.params.get(name) for name in asked} == asked
+    assert len({run.data.params["plan_digest"] for run in runs}) == 2
+    assert {run.info.status for run in runs} == {"FAILED"}
+
+
+def test_workers_elsewhere_find_the_files_of_a_relative_plan(tracked, monkeypatch):
+    monkeypatch.chdir(tracked)
+    for name in ("a.csv", "plan.csv"):
+        Path(name).write_text("name,data\na,a.csv\n")
+    (job,) = read_plan(Path("plan.csv"), CELL)
+    assert job.data == (Path("a.csv"),)
+    assert job.resolved().data == (tracked.resolve() / "a.csv",)
+    assert job.resolved().key("") == job.key("")

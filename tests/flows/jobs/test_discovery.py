@@ -68,6 +68,29 @@ def test_everything_is_written_and_tracked(tracked, case):
     assert {"drive", "series_resistance", "voltage_sensor_offset"} <= names
 
 
+def test_searches_of_other_cells_records_or_options_are_told_apart_by_what_is_tracked(case, tmp_path):
+    from dataclasses import replace
+
+    from flows.jobs.discovery import _asked
+
+    content = json.loads(CELL.read_text())
+    content["Parameterisation"]["Negative electrode"]["Diffusivity [m2.s-1]"] = 1e-14
+    (tmp_path / "other.json").write_text(json.dumps(content))
+    data = case.measurements[0]
+    others = {
+        "cell_digest": replace(case, cell=tmp_path / "other.json"),
+        "hold": replace(case, measurements=(replace(data, hold="backward"),)),
+        "data_digest": replace(case, measurements=(replace(data, current_a=1.01 * data.current_a),)),
+        "test_digest": replace(case, tests=(data,)),
+        "model_asked": replace(case, model="espm"),
+        "soc0": replace(case, soc0=0.91),
+    }
+    asked = _asked(case)
+    for name, other in others.items():
+        assert _asked(other).get(name) != asked.get(name), name
+    assert asked == _asked(replace(case))
+
+
 def test_a_search_that_was_killed_is_told_from_others_and_closed_by_the_next(tracked, case, monkeypatch):
     from flows.jobs import discovery
     from flows.jobs.start import discover

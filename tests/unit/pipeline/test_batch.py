@@ -98,6 +98,8 @@ def test_a_state_of_health_is_a_cell_s_own_or_that_of_all(tmp_path):
         ("name,data,mass\na,s.csv,3\n", "columns name and data"),
         ("name,data\na,nowhere.csv\n", "line 2: there is no file"),
         ("name,data\na,s.csv\na,s.csv\n", "named 'a'"),
+        ("name,data\na,s.csv\nA,s.csv\n", "named 'A' and 'a', which differ in capitals alone"),
+        ("name,name,data\na,b,s.csv\n", "has 2 columns named 'name'; leave one"),
         ("name,data,at\na,s.csv,old\n", "is no number"),
         ("name,data,soc0\na,s.csv,90\n", "line 2: soc0 = 90: a state of charge is a share"),
         ("name,data,soh\na,s.csv,new\n", "line 2: soh: a state of health of 'new': give the share"),
@@ -174,6 +176,20 @@ def left(folder, content):
     (folder / "row.json").write_text(json.dumps(content))
 
 
+def test_what_an_earlier_run_found_is_no_result_of_a_job_that_fails(tmp_path):
+    out = tmp_path / "out"
+    for name in ("row.json", "discovery.json", "report.html", "model/model.json", "hypotheses.jsonl"):
+        touched(out / "c" / name)
+    row = run_job(Job("c", CELL, (touched(tmp_path / "data.csv"),)), out, Settings())
+    assert row["status"] == "failed"
+    assert row["reason"].endswith(f" What an earlier run found was moved to {out / 'c' / 'earlier'}.")
+    assert sorted(path.name for path in (out / "c").iterdir()) == ["earlier", "hypotheses.jsonl"]
+    assert (out / "c" / "earlier" / "model" / "model.json").read_text() == "x"
+    again = run_job(Job("c", CELL, (tmp_path / "data.csv",)), out, Settings())
+    assert "earlier" not in again["reason"]
+    assert (out / "c" / "earlier" / "discovery.json").exists()
+
+
 def test_what_is_done_is_taken_again_until_a_file_or_a_setting_changes(tmp_path):
     data = touched(tmp_path / "a.csv")
     job, settings = Job("a", CELL, (data,)), Settings()
@@ -200,6 +216,7 @@ def test_a_row_of_another_version_or_without_its_finding_was_taken_as_done(tmp_p
         later.setattr("aesi.pipeline.batch.job.source_digest", lambda: "another")
         assert of_other_code([job], out) == ["a"]
         assert run_job(job, out, settings)["status"] == "failed"
+    left(out / "a", {"key": job.key(settings.key), "code": source_digest(), "row": kept})
     (out / "a" / "report.html").unlink()
     assert run_job(job, out, settings)["status"] == "failed"
 
