@@ -106,7 +106,10 @@ def shrunken_slope(sums: Array, drives: IntArray) -> float:
     slope = _slope(total[None, :])[0]
     if n_drives == 1:
         return float(np.clip(slope, 0.0, 1.0))
-    slopes = _slope(total - by_drive)
+    others = total - by_drive
+    if not others.any(axis=1).all():
+        return 0.0  # without one drive nothing is left that has a slope, so that s_b is not determined
+    slopes = _slope(others)
     scatter = float(np.sqrt((n_drives - 1) / n_drives * np.sum((slopes - slopes.mean()) ** 2)))
     return float(np.clip(slope - stdtrit(n_drives - 1, ndtr(SE)) * scatter, 0.0, 1.0))
 
