@@ -48,12 +48,12 @@ class Leverage:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values and an array."""
-        return {"root": self.root, "typical": self.upper_quartile}
+        return {"root": self.root, "upper_quartile": self.upper_quartile}
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Self:
         """Inverse of `to_dict`; the array may come back as lists."""
-        return cls(np.asarray(data["root"], dtype=float), float(data["typical"]))
+        return cls(np.asarray(data["root"], dtype=float), float(data["upper_quartile"]))
 
 
 def _standard_error(root: Array, theta: Array) -> Array:

@@ -32,7 +32,7 @@ from aesi.sparse.terms.inputs import model_variables
 from aesi.sparse.terms.library import Library, Term, evaluate_terms
 from aesi.sparse.terms.scaling import Scaling
 
-SCHEMA = "aesi.sparse_model/6"
+SCHEMA = "aesi.sparse_model/7"
 
 
 @dataclass(frozen=True, eq=False)
