@@ -30,7 +30,7 @@ import numpy as np
 from aesi.numerics.quantile_regression import fit_quantiles
 from aesi.numerics.typing import Array, SavedState
 
-RELATIVE_FLOOR = 0.1
+SHARE_OF_ERROR = 0.1
 """Least s, as a share of the mean |error|. With a tenth or three times of it the score changes by 0.1 mV at most."""
 MOST_ROWS = 6000
 """Most rows in the regression, evenly spread: neighbouring errors of a free run have nearly the same information."""
@@ -49,7 +49,7 @@ class LocalScale:
         of sizes above s."""
         step = -(-len(sizes) // MOST_ROWS)
         weights = _nonnegative_quantile(covariates[::step], sizes[::step], 1 - alpha)
-        return cls(weights, max(RELATIVE_FLOOR * float(np.mean(sizes)), float(np.finfo(float).tiny)))
+        return cls(weights, max(SHARE_OF_ERROR * float(np.mean(sizes)), float(np.finfo(float).tiny)))
 
     def __call__(self, covariates: Array) -> Array:
         """(n,) V, > 0: s at each row.  covariates : (n, p)."""
