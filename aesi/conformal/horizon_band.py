@@ -134,7 +134,7 @@ def calibrated_band(
     """
     if not [len(e) for e in errors] == [len(c) for c in columns] == [len(i) for i in inside]:
         raise InputError(
-            f"errors at {horizon:g} s and covariates differ in length; give one row a sample of each."
+            f"errors {_ahead(horizon)} and covariates differ in length; give one row a sample of each."
         )
     names: Sequence[str | int] = records or range(len(errors))
     pieces = _pieces(errors, columns, inside, names)
@@ -165,13 +165,17 @@ class TooFewPieces(FitError):
     """Records are too few or too short for the band of a horizon (horizon_s), which says nothing of the others."""
 
     def __init__(self, pieces: int, horizon_s: float) -> None:
-        ahead = "over a whole drive" if horizon_s == WHOLE_DRIVE else f"{horizon_s:g} s ahead"
         advice = "longer records" if horizon_s == WHOLE_DRIVE else "longer records, or a shorter horizon"
         super().__init__(
-            f"{pieces} pieces of {MIN_ROWS} or more predictions {ahead} cannot calibrate a band: at least {MIN_PIECES} "
-            f"are needed; give {advice}."
+            f"{pieces} pieces of {MIN_ROWS} or more predictions {_ahead(horizon_s)} cannot calibrate a band: at "
+            f"least {MIN_PIECES} are needed; give {advice}."
         )
         self.horizon_s = horizon_s
+
+
+def _ahead(horizon_s: float) -> str:
+    """How a sentence calls a horizon."""
+    return "over a whole drive" if horizon_s == WHOLE_DRIVE else f"{horizon_s:g} s ahead"
 
 
 def _check_pieces(pieces: Sequence[_Piece], horizon: float) -> None:
@@ -179,7 +183,9 @@ def _check_pieces(pieces: Sequence[_Piece], horizon: float) -> None:
     if len(pieces) < MIN_PIECES:
         raise TooFewPieces(len(pieces), horizon)
     if not any(piece.sizes.any() for piece in pieces):
-        raise FitError(f"the errors at {horizon:g} s are zero; calibrate on predictions of measured voltage.")
+        raise FitError(
+            f"the errors {_ahead(horizon)} are zero; calibrate on predictions of measured voltage."
+        )
 
 
 def _apart_from(piece: _Piece, pieces: Sequence[_Piece], horizon: float) -> list[_Piece]:
@@ -188,7 +194,7 @@ def _apart_from(piece: _Piece, pieces: Sequence[_Piece], horizon: float) -> list
     if not others:
         raise FitError(
             f"no piece is left that shares no row with one of {piece.record}, so that nothing can scale its errors "
-            f"at {horizon:g} s; give errors of another record, or of other rows."
+            f"{_ahead(horizon)}; give errors of another record, or of other rows."
         )
     return others
 

@@ -8,17 +8,19 @@ from aesi.errors import FitError
 from aesi.numerics.typing import Array
 
 
-def conformal_quantile(scores: Array, alpha: float) -> float:
-    """The ceil((n + 1)(1 - alpha))-th smallest score: one more exchangeable score is below with >= 1 - alpha.
+def conformal_quantile(scores: Array, alpha: float, tails: int = 1) -> float:
+    """The ceil((n + 1)(1 - a))-th smallest score, a = alpha / tails: one more exchangeable score is below with
+    >= 1 - a.
 
-    scores : (n,), finite.  Raises FitError where n is too small for that rank to exist (n < 1/alpha - 1).
+    scores : (n,), finite.  tails : number of equal parts of the miss rate alpha, of which this tail has one.
+    Raises FitError where n is too small for that rank to exist (n < 1/a - 1).
     Vovk, Gammerman & Shafer, Algorithmic Learning in a Random World (2005), ch. 2.
     """
-    n = scores.size
-    rank = int(np.ceil((n + 1) * (1 - alpha) - 1e-9))  # round-off must not ask for one rank too many
+    n, own = scores.size, alpha / tails
+    rank = int(np.ceil((n + 1) * (1 - own) - 1e-9))  # round-off must not ask for one rank too many
     if rank > n:
         raise FitError(
-            f"{n} scores cannot support a miss rate of {alpha:g}: at least {int(np.ceil(1 / alpha)) - 1} "
+            f"{n} scores cannot support a miss rate of {alpha:g}: at least {int(np.ceil(1 / own)) - 1} "
             "are needed; give more calibration data or a larger alpha."
         )
     return float(np.partition(scores, rank - 1)[rank - 1])
