@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aesi.conformal import WHOLE_DRIVE, FreeRunBands
+from aesi.conformal import WHOLE_DRIVE, FreeRunBands, Intervals
 from aesi.errors import FitError, InputError
 from aesi.numerics.visited import Visited
 from aesi.records import ErrorSeries, FreeRun
@@ -248,9 +248,12 @@ def test_too_few_pieces_are_refused() -> None:
         FreeRunBands.fit({1.0: [np.ones(70)]}, DT, [np.zeros(70)])
 
 
-def test_errors_that_are_all_zero_are_refused() -> None:
-    with pytest.raises(FitError, match="are zero"):
-        FreeRunBands.fit({1.0: [np.zeros(3000)]}, DT, [np.zeros(3000)])
+@pytest.mark.parametrize(
+    ("horizon_s", "words"), [(1.0, "errors 1 s ahead"), (WHOLE_DRIVE, "errors over a whole drive")]
+)
+def test_errors_that_are_all_zero_are_refused(horizon_s, words) -> None:
+    with pytest.raises(FitError, match=f"the {words} are zero"):
+        FreeRunBands.fit({horizon_s: [np.zeros(3000)]}, DT, [np.zeros(3000)])
 
 
 def test_constant_errors_get_a_band_of_their_size() -> None:
@@ -286,7 +289,7 @@ def test_pieces_of_the_same_rows_alone_ended_in_an_empty_array() -> None:
 def test_the_band_of_errors_that_are_mostly_zero_was_no_number() -> None:
     error = np.where(np.arange(3000) % 20 == 0, 1e-3, 0.0)
     bands = FreeRunBands.fit({1.0: [error]}, DT)
-    np.testing.assert_array_equal(bands.at(1.0, np.zeros(2))[1], 0.0)
+    np.testing.assert_array_equal(Intervals(*bands.at(1.0, np.zeros(2)), np.ones(2, dtype=bool)).width_v, 0.0)
     np.testing.assert_allclose(bands.at(1.0, np.zeros(2), open_v=1e-3)[1], 1.645e-3, rtol=1e-3)
 
 
