@@ -136,7 +136,7 @@ def calibrated_band(
         raise InputError(
             f"errors {_ahead(horizon)} and covariates differ in length; give one row a sample of each."
         )
-    names: Sequence[str | int] = records or range(len(errors))
+    names: Sequence[str | int] = range(len(errors)) if records is None else records
     pieces = _pieces(errors, columns, inside, names)
     extrapolated = len(pieces) < MIN_PIECES
     if extrapolated:

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from numbers import Real
+
 import numpy as np
 
-from aesi.errors import FitError
+from aesi.errors import FitError, InputError
 from aesi.numerics.typing import Array
+
+
+def check_miss_rate(alpha: object) -> None:
+    """Raises InputError for an alpha that is no share of misses, in (0, 1)."""
+    if not (isinstance(alpha, Real) and 0 < float(alpha) < 1):
+        raise InputError(f"alpha = {alpha} is not a share of misses; give a value between 0 and 1.")
 
 
 def conformal_quantile(scores: Array, alpha: float, tails: int = 1) -> float:

@@ -211,6 +211,11 @@ def test_too_few_residuals_are_refused(name: str) -> None:
         METHODS[name].fit([], window=WINDOW)
 
 
+def test_half_of_the_miss_rate_that_was_given_was_told() -> None:
+    with pytest.raises(FitError, match=r"cannot support a miss rate of 0\.0001: at least 19999 are needed"):
+        METHODS["split"].fit([series(1000, 9)], alpha=1e-4)
+
+
 @pytest.mark.parametrize("name", sorted(METHODS))
 def test_an_impossible_level_is_refused(name: str) -> None:
     with pytest.raises(InputError, match="share of misses"):

@@ -15,7 +15,7 @@ from aesi.conformal.online.calibrated import Calibrated
 from aesi.conformal.online.records import checked_currents, checked_records
 from aesi.conformal.online.scale import Scale
 from aesi.errors import FitError, InputError
-from aesi.numerics.quantiles import conformal_quantile
+from aesi.numerics.quantiles import check_miss_rate, conformal_quantile
 from aesi.numerics.typing import Array
 
 SHARE_OF_MARGINAL = 1e-3
@@ -84,8 +84,7 @@ class Method(ABC):
 
 def check_settings(alpha: float, window: int) -> None:
     """Raises InputError for an alpha outside (0, 1), and for a window that is no whole number or too short."""
-    if not 0 < alpha < 1:
-        raise InputError(f"alpha = {alpha:g} is not a share of misses; give a value between 0 and 1.")
+    check_miss_rate(alpha)
     if not isinstance(window, int | np.integer):
         raise InputError(f"window = {window!r} is not a number of samples; give a whole one.")
     if window < MIN_WINDOW:

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from numbers import Real
 from pathlib import Path
 from typing import Any, Self
 
@@ -34,7 +33,7 @@ from aesi.pipeline.product.prediction import Prediction
 from aesi.pipeline.product.trained import outside_trained, trained_on
 from aesi.pipeline.written import EFFECTS, HEAD
 from aesi.records import ErrorSeries, FreeRun, Hold, Measurement
-from aesi.records.checked import numbers, row_words
+from aesi.records.checked import checked_dt, is_finite_number, numbers, row_words
 from aesi.records.steps import after_gap, next_stamp
 from aesi.sparse import SparseModel
 from aesi.sparse.yardsticks import Bare
@@ -74,10 +73,7 @@ class HybridModel:
         """Raises InputError for a wrong cell, effects, step, hold, state of charge or model."""
         check_cell(self.cell)
         object.__setattr__(self, "effects", checked_effects(self.effects))
-        step: object = self.dt_s  # a file may hold anything
-        if not isinstance(step, Real) or not 0.0 < float(step) < np.inf:
-            raise InputError(f"dt_s = {self.dt_s!r} has to be a positive number of seconds.")
-        object.__setattr__(self, "dt_s", float(step))
+        object.__setattr__(self, "dt_s", checked_dt(self.dt_s))
         check_choice("hold", self.hold, Hold)
         object.__setattr__(self, "soc0", checked_soc(self.soc0))
         check_choice("model", self.model, ModelName)
@@ -148,9 +144,9 @@ class HybridModel:
         soc0_sd : standard deviation of a soc0 that is not read from the voltage; it widens the band of a free run.
         Raises InputError for a soc0_sd outside 0 to 1, and for an error0_v that is not finite; else as `predict`.
         """
-        if error0_v is not None and not _is_finite(error0_v):
+        if error0_v is not None and not is_finite_number(error0_v):
             raise InputError(f"error0_v = {error0_v!r} is no voltage; give volts, or leave it out.")
-        if not (_is_finite(soc0_sd) and 0.0 <= soc0_sd <= 1.0):
+        if not (is_finite_number(soc0_sd) and 0.0 <= soc0_sd <= 1.0):
             raise InputError(
                 f"soc0_sd = {soc0_sd!r} is no standard deviation of a state of charge; give 0 to 1."
             )
@@ -378,11 +374,6 @@ def _as_saved(file: Path) -> Iterator[None]:
         raise InputError(f"{file} lacks {error}; save the model again.") from None
     except (TypeError, ValueError, AttributeError, IndexError) as error:
         raise InputError(f"{file} is not as it was saved ({error}); save the model again.") from None
-
-
-def _is_finite(value: object) -> bool:
-    """Whether an argument is a finite number."""
-    return isinstance(value, Real) and bool(np.isfinite(float(value)))
 
 
 def _each_row(temperature_degc: Numbers | None, rows: tuple[int, ...]) -> Array | None:

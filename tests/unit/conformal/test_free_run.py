@@ -281,6 +281,40 @@ def test_an_excess_or_a_name_too_few_was_no_sentence(given, sentence) -> None:
         FreeRunBands.fit({1.0: [np.ones(40)] * 3}, DT, **given)
 
 
+@pytest.mark.parametrize("alpha", [0.0, 1.0, -0.1, 1.5, math.nan, "a tenth"])
+def test_bands_of_an_impossible_level_were_calibrated(alpha) -> None:
+    with pytest.raises(InputError, match=f"alpha = {alpha} is not a share of misses"):
+        FreeRunBands.fit({1.0: [np.ones(40)] * 3}, DT, alpha=alpha)
+
+
+@pytest.mark.parametrize("horizon_s", [0.0, -1.0, math.nan])
+def test_a_horizon_that_lies_nowhere_ahead_was_calibrated_or_ended_in_an_index(horizon_s) -> None:
+    words = f"a horizon of {horizon_s} s is no time ahead; give a positive number of seconds"
+    with pytest.raises(InputError, match=words):
+        FreeRunBands.fit({horizon_s: [np.ones(40)] * 3}, DT)
+    with pytest.raises(InputError, match=words):
+        fitted().at(horizon_s, np.zeros(2))
+
+
+@pytest.mark.parametrize("dt_s", [0.0, -1.0, math.nan, math.inf])
+def test_a_step_of_no_length_was_counted_by(dt_s) -> None:
+    with pytest.raises(InputError, match=f"dt_s = {dt_s} has to be a positive number of seconds"):
+        FreeRunBands.fit({1.0: [np.ones(40)] * 3}, dt_s)
+    with pytest.raises(InputError, match=f"dt_s = {dt_s} has to be a positive number of seconds"):
+        fitted().along(dt_s, np.zeros(2))
+
+
+def test_rows_of_one_array_were_no_list_of_arrays() -> None:
+    errors = 1e-3 * np.random.default_rng(5).standard_normal((4, 600))
+    spread = np.abs(errors)
+    inside, names = np.ones((4, 600), dtype=bool), np.array(["a", "b", "c", "d"])
+    listed = FreeRunBands.fit(
+        {1.0: list(errors)}, DT, list(spread), inside=list(inside), excess=list(spread), records=list(names)
+    )
+    whole = FreeRunBands.fit({1.0: errors}, DT, spread, inside=inside, excess=spread, records=names)
+    np.testing.assert_array_equal(whole.at(1.0, spread[0])[1], listed.at(1.0, spread[0])[1])
+
+
 def test_pieces_of_the_same_rows_alone_ended_in_an_empty_array() -> None:
     with pytest.raises(FitError, match="no piece is left that shares no row with one of a"):
         FreeRunBands.fit({1.0: [np.ones(40)] * 3}, DT, records=["a"] * 3)
