@@ -83,7 +83,7 @@ def checked_dt(dt_s: object) -> float:
 
 def is_finite_number(value: object) -> TypeGuard[float]:
     """Whether a single argument is a number, and finite; a truth value is none."""
-    return isinstance(value, Real) and type(value) is not bool and bool(np.isfinite(float(value)))
+    return not isinstance(value, bool) and isinstance(value, Real) and bool(np.isfinite(float(value)))
 
 
 def row_words(row: int) -> str:
