@@ -53,6 +53,7 @@ from aesi.conformal.intervals import Intervals
 from aesi.conformal.local_scale import covariates
 from aesi.conformal.parameter_spread import spread, thermal_spread
 from aesi.errors import InputError
+from aesi.numerics.files.restored import reading_back, saved_array
 from aesi.numerics.quantiles import check_miss_rate
 from aesi.numerics.typing import Array, BoolArray, SavedState
 from aesi.numerics.visited import Visited
@@ -220,19 +221,26 @@ class FreeRunBands:
 
     @classmethod
     def from_dict(cls, state: SavedState) -> FreeRunBands:
-        """Inverse of `to_dict`; arrays may come back as lists. Raises InputError for another schema."""
-        if state.get("schema") != SCHEMA:
-            raise InputError(
-                f"bands have schema {state.get('schema')!r}, this version reads {SCHEMA!r}; run the experiment again."
+        """Inverse of `to_dict`; arrays may come back as lists. Raises InputError for anything else."""
+        with reading_back("bands of a free run"):
+            if state.get("schema") != SCHEMA:
+                raise InputError(
+                    f"bands have schema {state.get('schema')!r}, this version reads {SCHEMA!r}; run the experiment "
+                    "again."
+                )
+            alpha, seen, root, energies = (state[key] for key in ("alpha", "seen", "root", "energies_j_mol"))
+            check_miss_rate(alpha)
+            bands = tuple(HorizonBand.from_state(item, float(alpha)) for item in state["horizons"])
+            horizons_s = [band.horizon_s for band in bands]
+            if not bands or horizons_s != sorted(set(horizons_s)):
+                raise ValueError(f"its horizons are {horizons_s} s, and not one or more that increase")
+            return cls(
+                float(alpha),
+                bands,
+                None if seen is None else Visited.from_state(seen),
+                None if root is None else saved_array(root, "root", (len(root), len(root))),
+                None if energies is None else saved_array(energies, "energies_j_mol", (None,), 0.0),
             )
-        alpha = float(state["alpha"])
-        seen = None if state["seen"] is None else Visited.from_state(state["seen"])
-        root, energies = (
-            None if state[key] is None else np.asarray(state[key], dtype=float)
-            for key in ("root", "energies_j_mol")
-        )
-        horizons = tuple(HorizonBand.from_state(item, alpha) for item in state["horizons"])
-        return cls(alpha, horizons, seen, root, energies)
 
     def _bounds(
         self,

@@ -12,6 +12,7 @@ from scipy.special import ndtri, stdtrit
 
 from aesi.conformal.local_scale import LocalScale
 from aesi.errors import FitError, InputError
+from aesi.numerics.files.restored import LEAST_POSITIVE, saved_array, saved_number
 from aesi.numerics.typing import Array, BoolArray, IntArray, SavedState
 
 WHOLE_DRIVE = math.inf
@@ -85,15 +86,18 @@ class HorizonBand:
 
     @classmethod
     def from_state(cls, state: SavedState, alpha: float) -> Self:
-        """Inverse of `to_state`."""
+        """Inverse of `to_state`.  Raises ValueError for anything else."""
+        horizon_s, scales = state["horizon_s"], tuple(map(LocalScale.from_state, state["scales"]))
+        if len(scales) < MIN_PIECES:
+            raise ValueError(f"a band has {len(scales)} scales, and at least {MIN_PIECES} pieces make one")
         return cls(
-            WHOLE_DRIVE if state["horizon_s"] is None else float(state["horizon_s"]),
+            WHOLE_DRIVE if horizon_s is None else saved_number(horizon_s, "horizon_s", LEAST_POSITIVE),
             alpha,
-            tuple(LocalScale.from_state(scale) for scale in state["scales"]),
-            np.asarray(state["scores"], dtype=float),
-            np.asarray(state["counts"], dtype=float),
-            float(state["widening"]),
-            tuple(float(share) for share in state["by_piece"]),
+            scales,
+            saved_array(state["scores"], "scores", (len(scales), N_LEVELS), 0.0),
+            saved_array(state["counts"], "counts", (len(scales),), 1.0),
+            saved_number(state["widening"], "widening", LEAST_POSITIVE),
+            tuple(saved_array(state["by_piece"], "by_piece", (len(scales),), 0.0, 1.0).tolist()),
             bool(state["extrapolated"]),
         )
 

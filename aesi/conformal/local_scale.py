@@ -27,6 +27,7 @@ from typing import Self
 
 import numpy as np
 
+from aesi.numerics.files.restored import LEAST_POSITIVE, saved_array, saved_number
 from aesi.numerics.quantile_regression import fit_quantiles
 from aesi.numerics.typing import Array, SavedState
 
@@ -61,8 +62,9 @@ class LocalScale:
 
     @classmethod
     def from_state(cls, state: SavedState) -> Self:
-        """Inverse of `to_state`."""
-        return cls(np.asarray(state["weights"], dtype=float), float(state["floor"]))
+        """Inverse of `to_state`.  Raises ValueError for anything else."""
+        floor = saved_number(state["floor"], "floor", LEAST_POSITIVE)
+        return cls(saved_array(state["weights"], "weights", (3,), 0.0), floor)
 
 
 def covariates(spread_v: Array, excess: Array | None = None) -> Array:

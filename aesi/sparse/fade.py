@@ -34,6 +34,7 @@ import numpy as np
 from scipy.special import ndtr, stdtrit
 
 from aesi.numerics.blocks import Span
+from aesi.numerics.files.restored import saved_number
 from aesi.numerics.typing import Array, IntArray
 from aesi.sparse.trained_region import TrainedRegion
 
@@ -73,9 +74,10 @@ class Fade:
         return {"amplitude": self.amplitude, "region": self.region.to_dict()}
 
     @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> Self:
-        """Inverse of `to_dict`."""
-        return cls(float(data["amplitude"]), TrainedRegion.from_dict(data["region"]))
+    def from_dict(cls, data: dict[str, Any], n_inputs: int) -> Self:
+        """Inverse of `to_dict`, for so many inputs.  Raises ValueError for anything else."""
+        amplitude = saved_number(data["amplitude"], "amplitude", 0.0, 1.0)
+        return cls(amplitude, TrainedRegion.from_dict(data["region"], n_inputs))
 
 
 def amplitude(

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from aesi.conformal import COMPARED, METHODS, Calibrated, calibrated_from_dict
+from aesi.conformal.online.calibrated import SCHEMA
 from aesi.errors import FitError, InputError
 
 WINDOW = 50
@@ -131,6 +132,21 @@ def test_survives_a_file_without_pickle(calibrated: Calibrated) -> None:
     record = series(400, 6)
     np.testing.assert_array_equal(restored.intervals(record).lower_v, calibrated.intervals(record).lower_v)
     np.testing.assert_array_equal(restored.intervals(record).upper_v, calibrated.intervals(record).upper_v)
+
+
+@pytest.mark.parametrize("content", [{"schema": SCHEMA}, [], None])
+def test_intervals_of_a_schema_alone_ended_in_a_key(content) -> None:
+    with pytest.raises(
+        InputError, match=r"the saved intervals cannot be read back: .*; save the model again"
+    ):
+        calibrated_from_dict(content)
+
+
+def test_intervals_of_a_state_that_lacks_any_key_are_refused(calibrated: Calibrated) -> None:
+    state = calibrated.to_dict()
+    for key in state:
+        with pytest.raises(InputError, match="schema" if key == "schema" else f"it lacks '{key}'"):
+            calibrated_from_dict({name: value for name, value in state.items() if name != key})
 
 
 def _pull_arrays(value, path, arrays):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from aesi.conformal import WHOLE_DRIVE, FreeRunBands, Intervals
+from aesi.conformal.free_run import SCHEMA
 from aesi.errors import FitError, InputError
 from aesi.numerics.visited import Visited
 from aesi.records import ErrorSeries, FreeRun
@@ -95,6 +96,20 @@ def test_bands_read_back_from_json_have_the_same_edges() -> None:
 def test_bands_of_an_earlier_schema_are_refused() -> None:
     with pytest.raises(InputError, match=r"free_run_bands/2.*free_run_bands/8.*run the experiment again"):
         FreeRunBands.from_dict(fitted().to_dict() | {"schema": "aesi.free_run_bands/2"})
+
+
+@pytest.mark.parametrize("content", [{"schema": SCHEMA}, [], None, {"schema": SCHEMA, "alpha": "x"}])
+def test_bands_of_a_schema_alone_ended_in_a_key(content) -> None:
+    with pytest.raises(
+        InputError, match=r"the saved bands of a free run cannot be read back: .*; save the model"
+    ):
+        FreeRunBands.from_dict(content)
+
+
+def test_bands_whose_horizons_fall_were_interpolated_between() -> None:
+    state = fitted().to_dict()
+    with pytest.raises(InputError, match=r"horizons are \[inf, 10\.0\] s, and not one or more that increase"):
+        FreeRunBands.from_dict(state | {"horizons": state["horizons"][::-1]})
 
 
 def test_a_record_outside_the_trained_range_is_flagged() -> None:
