@@ -154,6 +154,11 @@ class HybridModel:
         """
         if error0_v is not None and not is_finite_number(error0_v):
             raise InputError(f"error0_v = {error0_v!r} is no voltage; give volts, or leave it out.")
+        if error0_v is not None and not one_step and self.correction is None:
+            raise InputError(
+                f"error0_v = {error0_v:g} V is where a correction starts, and this model has none: physics alone has "
+                "no error to start from; leave it out."
+            )
         if not (is_finite_number(soc0_sd) and 0.0 <= soc0_sd <= 1.0):
             raise InputError(
                 f"soc0_sd = {soc0_sd!r} is no standard deviation of a state of charge; give 0 to 1."

@@ -632,6 +632,18 @@ def test_a_cell_whose_name_begins_as_a_reference_to_an_array_could_not_be_loaded
     np.testing.assert_allclose(told.upper_v, was.upper_v, atol=1e-12)
 
 
+def test_an_error_to_start_from_moved_nothing_of_physics_alone_but_its_band(model, data):
+    physics = replace(model, correction=None)
+    with pytest.raises(
+        InputError, match=r"error0_v = 0\.05 V is where a correction starts, and this model has none"
+    ):
+        physics.predict(data.time_s, data.current_a, SOC0, error0_v=0.05)
+    one_step = data.time_s, data.current_a, SOC0, data.voltage_v
+    physics.predict(*one_step, error0_v=0.05)  # ignored there, as documented
+    with pytest.raises(InputError, match="error0_v = True is no voltage"):
+        model.predict(data.time_s, data.current_a, SOC0, error0_v=True)
+
+
 def test_a_record_of_other_sampling_is_loaded_at_the_experiments_step(record):
     config = experiment(record)
     coarse = config.model_copy(update={"data": config.data.model_copy(update={"dt_s": 2.0})})
