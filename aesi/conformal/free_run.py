@@ -43,6 +43,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Real
 
 import numpy as np
 from scipy.special import ndtri
@@ -52,9 +53,12 @@ from aesi.conformal.intervals import Intervals
 from aesi.conformal.local_scale import covariates
 from aesi.conformal.parameter_spread import spread, thermal_spread
 from aesi.errors import InputError
+from aesi.numerics.files.restored import reading_back, saved_array
+from aesi.numerics.quantiles import check_miss_rate
 from aesi.numerics.typing import Array, BoolArray, SavedState
 from aesi.numerics.visited import Visited
 from aesi.records import ErrorSeries, FreeRun
+from aesi.records.checked import checked_dt
 
 SCHEMA = "aesi.free_run_bands/8"
 
@@ -96,7 +100,7 @@ class FreeRunBands:
 
         errors_by_horizon : horizon in s (WHOLE_DRIVE: from the start of the record) -> one (n_i,) array per continuous
         record, V, measured minus predicted at each sample from a measurement `horizon` earlier; NaN where there is no
-        such prediction.  dt_s : sampling interval, s.  alpha : miss rate, 0 to 1.
+        such prediction.  dt_s : sampling interval, s.  alpha : miss rate, in (0, 1).
         spread_v : one (n_i,) array per record, V, spread of the physics of a fit without that record.
         inside : one (n_i,) array per record, True inside the trained range of the model that predicted; None for
         everywhere.
@@ -106,20 +110,25 @@ class FreeRunBands:
         records : name of the record of each array, where several arrays are of one record (with the same row numbers):
         no piece is scored by a scale that was fitted to its own rows. None where each array is a record of its own.
 
-        Raises InputError for arrays that do not match; FitError for too few pieces, for a piece that shares rows with
-        all others, and for errors that are all zero.
+        Raises InputError for an inadmissible alpha, horizon or step, and for arrays that do not match; FitError for too
+        few pieces, for a piece that shares rows with all others, and for errors that are all zero.
         """
+        check_miss_rate(alpha)
+        dt_s = checked_dt(dt_s)
         if not errors_by_horizon:
             raise InputError("no horizon to calibrate; give errors for at least one.")
+        for horizon_s in errors_by_horizon:
+            _check_horizon(horizon_s)
         lengths = [len(each) for each in next(iter(errors_by_horizon.values()))]
         _check_lengths(lengths, spread_v=spread_v, inside=inside, excess=excess)
         if records is not None and len(records) != len(lengths):
             raise InputError(
                 f"{len(records)} names of records for the errors of {len(lengths)}; give one a record."
             )
-        spreads = spread_v or [np.zeros(n) for n in lengths]
-        columns = [covariates(p, x) for p, x in zip(spreads, excess or [None] * len(spreads), strict=True)]
-        usable = inside or [np.ones(n, dtype=bool) for n in lengths]
+        spreads = [np.zeros(n) for n in lengths] if spread_v is None else spread_v
+        excesses = [None] * len(lengths) if excess is None else excess
+        columns = [covariates(p, x) for p, x in zip(spreads, excesses, strict=True)]
+        usable = [np.ones(n, dtype=bool) for n in lengths] if inside is None else inside
         bands = [
             calibrated_band(
                 horizon, errors_by_horizon[horizon], columns, usable, alpha, dt_s, stretches, records
@@ -142,7 +151,9 @@ class FreeRunBands:
         spread_v : (n,) V, from `spread`.  reach_v : (n,) V, added to the half-width: change of the prediction if the
         model were extrapolated beyond its trained range.  open_v : (n,) V, standard deviation of errors that the pieces
         do not contain, such as `thermal`.
+        Raises InputError for a horizon that is not positive.
         """
+        _check_horizon(horizon_s)
         elapsed = np.full(len(spread_v), horizon_s)
         return self._bounds(elapsed, spread_v, excess, reach_v, open_v)
 
@@ -158,8 +169,9 @@ class FreeRunBands:
 
         Times below the shortest horizon have its band; times from ten times the longest finite horizon on have that of
         the whole drive.  spread_v, reach_v, open_v : as for `at`.
+        Raises InputError for a step that is not positive.
         """
-        elapsed = dt_s * np.arange(len(spread_v), dtype=np.float64)
+        elapsed = checked_dt(dt_s) * np.arange(len(spread_v), dtype=np.float64)
         return self._bounds(elapsed, spread_v, excess, reach_v, open_v)
 
     def spread(self, series: ErrorSeries) -> Array:
@@ -209,19 +221,26 @@ class FreeRunBands:
 
     @classmethod
     def from_dict(cls, state: SavedState) -> FreeRunBands:
-        """Inverse of `to_dict`; arrays may come back as lists. Raises InputError for another schema."""
-        if state.get("schema") != SCHEMA:
-            raise InputError(
-                f"bands have schema {state.get('schema')!r}, this version reads {SCHEMA!r}; run the experiment again."
+        """Inverse of `to_dict`; arrays may come back as lists. Raises InputError for anything else."""
+        with reading_back("bands of a free run"):
+            if state.get("schema") != SCHEMA:
+                raise InputError(
+                    f"bands have schema {state.get('schema')!r}, this version reads {SCHEMA!r}; run the experiment "
+                    "again."
+                )
+            alpha, seen, root, energies = (state[key] for key in ("alpha", "seen", "root", "energies_j_mol"))
+            check_miss_rate(alpha)
+            bands = tuple(HorizonBand.from_state(item, float(alpha)) for item in state["horizons"])
+            horizons_s = [band.horizon_s for band in bands]
+            if not bands or horizons_s != sorted(set(horizons_s)):
+                raise ValueError(f"its horizons are {horizons_s} s, and not one or more that increase")
+            return cls(
+                float(alpha),
+                bands,
+                None if seen is None else Visited.from_state(seen),
+                None if root is None else saved_array(root, "root", (len(root), len(root))),
+                None if energies is None else saved_array(energies, "energies_j_mol", (None,), 0.0),
             )
-        alpha = float(state["alpha"])
-        seen = None if state["seen"] is None else Visited.from_state(state["seen"])
-        root, energies = (
-            None if state[key] is None else np.asarray(state[key], dtype=float)
-            for key in ("root", "energies_j_mol")
-        )
-        horizons = tuple(HorizonBand.from_state(item, alpha) for item in state["horizons"])
-        return cls(alpha, horizons, seen, root, energies)
 
     def _bounds(
         self,
@@ -243,6 +262,14 @@ class FreeRunBands:
             + reach_v
         )
         return -half_width, half_width
+
+
+def _check_horizon(horizon_s: object) -> None:
+    """Raises InputError for what is no time ahead, s; WHOLE_DRIVE is one."""
+    if not (isinstance(horizon_s, Real) and float(horizon_s) > 0.0):
+        raise InputError(
+            f"a horizon of {horizon_s} s is no time ahead; give a positive number of seconds, or WHOLE_DRIVE."
+        )
 
 
 def _check_lengths(lengths: Sequence[int], **arguments: Sequence[Array | BoolArray | None] | None) -> None:

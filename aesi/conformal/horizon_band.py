@@ -12,6 +12,7 @@ from scipy.special import ndtri, stdtrit
 
 from aesi.conformal.local_scale import LocalScale
 from aesi.errors import FitError, InputError
+from aesi.numerics.files.restored import LEAST_POSITIVE, saved_array, saved_number
 from aesi.numerics.typing import Array, BoolArray, IntArray, SavedState
 
 WHOLE_DRIVE = math.inf
@@ -85,15 +86,18 @@ class HorizonBand:
 
     @classmethod
     def from_state(cls, state: SavedState, alpha: float) -> Self:
-        """Inverse of `to_state`."""
+        """Inverse of `to_state`.  Raises ValueError for anything else."""
+        horizon_s, scales = state["horizon_s"], tuple(map(LocalScale.from_state, state["scales"]))
+        if len(scales) < MIN_PIECES:
+            raise ValueError(f"a band has {len(scales)} scales, and at least {MIN_PIECES} pieces make one")
         return cls(
-            WHOLE_DRIVE if state["horizon_s"] is None else float(state["horizon_s"]),
+            WHOLE_DRIVE if horizon_s is None else saved_number(horizon_s, "horizon_s", LEAST_POSITIVE),
             alpha,
-            tuple(LocalScale.from_state(scale) for scale in state["scales"]),
-            np.asarray(state["scores"], dtype=float),
-            np.asarray(state["counts"], dtype=float),
-            float(state["widening"]),
-            tuple(float(share) for share in state["by_piece"]),
+            scales,
+            saved_array(state["scores"], "scores", (len(scales), N_LEVELS), 0.0),
+            saved_array(state["counts"], "counts", (len(scales),), 1.0),
+            saved_number(state["widening"], "widening", LEAST_POSITIVE),
+            tuple(saved_array(state["by_piece"], "by_piece", (len(scales),), 0.0, 1.0).tolist()),
             bool(state["extrapolated"]),
         )
 
@@ -134,9 +138,9 @@ def calibrated_band(
     """
     if not [len(e) for e in errors] == [len(c) for c in columns] == [len(i) for i in inside]:
         raise InputError(
-            f"errors at {horizon:g} s and covariates differ in length; give one row a sample of each."
+            f"errors {_ahead(horizon)} and covariates differ in length; give one row a sample of each."
         )
-    names: Sequence[str | int] = records or range(len(errors))
+    names: Sequence[str | int] = range(len(errors)) if records is None else records
     pieces = _pieces(errors, columns, inside, names)
     extrapolated = len(pieces) < MIN_PIECES
     if extrapolated:
@@ -165,13 +169,17 @@ class TooFewPieces(FitError):
     """Records are too few or too short for the band of a horizon (horizon_s), which says nothing of the others."""
 
     def __init__(self, pieces: int, horizon_s: float) -> None:
-        ahead = "over a whole drive" if horizon_s == WHOLE_DRIVE else f"{horizon_s:g} s ahead"
         advice = "longer records" if horizon_s == WHOLE_DRIVE else "longer records, or a shorter horizon"
         super().__init__(
-            f"{pieces} pieces of {MIN_ROWS} or more predictions {ahead} cannot calibrate a band: at least {MIN_PIECES} "
-            f"are needed; give {advice}."
+            f"{pieces} pieces of {MIN_ROWS} or more predictions {_ahead(horizon_s)} cannot calibrate a band: at "
+            f"least {MIN_PIECES} are needed; give {advice}."
         )
         self.horizon_s = horizon_s
+
+
+def _ahead(horizon_s: float) -> str:
+    """How a sentence calls a horizon."""
+    return "over a whole drive" if horizon_s == WHOLE_DRIVE else f"{horizon_s:g} s ahead"
 
 
 def _check_pieces(pieces: Sequence[_Piece], horizon: float) -> None:
@@ -179,7 +187,9 @@ def _check_pieces(pieces: Sequence[_Piece], horizon: float) -> None:
     if len(pieces) < MIN_PIECES:
         raise TooFewPieces(len(pieces), horizon)
     if not any(piece.sizes.any() for piece in pieces):
-        raise FitError(f"the errors at {horizon:g} s are zero; calibrate on predictions of measured voltage.")
+        raise FitError(
+            f"the errors {_ahead(horizon)} are zero; calibrate on predictions of measured voltage."
+        )
 
 
 def _apart_from(piece: _Piece, pieces: Sequence[_Piece], horizon: float) -> list[_Piece]:
@@ -188,7 +198,7 @@ def _apart_from(piece: _Piece, pieces: Sequence[_Piece], horizon: float) -> list
     if not others:
         raise FitError(
             f"no piece is left that shares no row with one of {piece.record}, so that nothing can scale its errors "
-            f"at {horizon:g} s; give errors of another record, or of other rows."
+            f"{_ahead(horizon)}; give errors of another record, or of other rows."
         )
     return others
 

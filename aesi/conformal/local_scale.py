@@ -27,10 +27,11 @@ from typing import Self
 
 import numpy as np
 
+from aesi.numerics.files.restored import LEAST_POSITIVE, saved_array, saved_number
 from aesi.numerics.quantile_regression import fit_quantiles
 from aesi.numerics.typing import Array, SavedState
 
-RELATIVE_FLOOR = 0.1
+SHARE_OF_ERROR = 0.1
 """Least s, as a share of the mean |error|. With a tenth or three times of it the score changes by 0.1 mV at most."""
 MOST_ROWS = 6000
 """Most rows in the regression, evenly spread: neighbouring errors of a free run have nearly the same information."""
@@ -49,7 +50,7 @@ class LocalScale:
         of sizes above s."""
         step = -(-len(sizes) // MOST_ROWS)
         weights = _nonnegative_quantile(covariates[::step], sizes[::step], 1 - alpha)
-        return cls(weights, max(RELATIVE_FLOOR * float(np.mean(sizes)), float(np.finfo(float).tiny)))
+        return cls(weights, max(SHARE_OF_ERROR * float(np.mean(sizes)), float(np.finfo(float).tiny)))
 
     def __call__(self, covariates: Array) -> Array:
         """(n,) V, > 0: s at each row.  covariates : (n, p)."""
@@ -61,8 +62,9 @@ class LocalScale:
 
     @classmethod
     def from_state(cls, state: SavedState) -> Self:
-        """Inverse of `to_state`."""
-        return cls(np.asarray(state["weights"], dtype=float), float(state["floor"]))
+        """Inverse of `to_state`.  Raises ValueError for anything else."""
+        floor = saved_number(state["floor"], "floor", LEAST_POSITIVE)
+        return cls(saved_array(state["weights"], "weights", (3,), 0.0), floor)
 
 
 def covariates(spread_v: Array, excess: Array | None = None) -> Array:

@@ -8,6 +8,7 @@ from typing import Self
 import numpy as np
 
 from aesi.constants import GAS_CONSTANT_J_MOL_K, ZERO_CELSIUS_K
+from aesi.numerics.files.restored import saved_array
 from aesi.numerics.typing import Array, BoolArray, SavedState
 
 RESOLUTION = 0.005
@@ -93,8 +94,13 @@ class Visited:
 
     @classmethod
     def from_state(cls, state: SavedState) -> Self:
-        """Inverse of `to_state`; other keys of the state are ignored."""
-        span = state["temperature_degc"]
-        return cls(
-            np.array(state["charge"], dtype=float), None if span is None else (float(span[0]), float(span[1]))
-        )
+        """Inverse of `to_state`; other keys of the state are ignored.  Raises ValueError for anything else."""
+        charge, span = saved_array(state["charge"], "charge", (None,)), state["temperature_degc"]
+        if (np.diff(charge) <= 0.0).any():
+            raise ValueError("charge does not increase")
+        if span is None:
+            return cls(charge)
+        coldest, warmest = saved_array(span, "temperature_degc", (2,)).tolist()
+        if coldest > warmest:
+            raise ValueError(f"temperature_degc falls from {coldest:g} to {warmest:g}")
+        return cls(charge, (coldest, warmest))

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from numbers import Real
+from typing import TypeGuard
+
 import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
-from aesi.errors import DataError
+from aesi.errors import DataError, InputError
 from aesi.numerics.typing import Array
 from aesi.over_time import stamp
 
@@ -69,6 +72,18 @@ def check_times(time_s: Array, name: str) -> None:
             f"{name} has a step of {steps[row - 1]:.4g} s before {row_words(row)}, longer than a year "
             f"({LONGEST_STEP_S:.4g} s); time has to be in seconds."
         )
+
+
+def checked_dt(dt_s: object) -> float:
+    """A time step, s.  Raises InputError for what is no positive number."""
+    if not (is_finite_number(dt_s) and dt_s > 0.0):
+        raise InputError(f"dt_s = {dt_s!r} has to be a positive number of seconds.")
+    return float(dt_s)
+
+
+def is_finite_number(value: object) -> TypeGuard[float]:
+    """Whether a single argument is a number, and finite; a truth value is none."""
+    return not isinstance(value, bool) and isinstance(value, Real) and bool(np.isfinite(float(value)))
 
 
 def row_words(row: int) -> str:

@@ -34,6 +34,7 @@ import numpy as np
 from scipy.special import ndtr, stdtrit
 
 from aesi.numerics.blocks import Span
+from aesi.numerics.files.restored import saved_number
 from aesi.numerics.typing import Array, IntArray
 from aesi.sparse.trained_region import TrainedRegion
 
@@ -73,9 +74,10 @@ class Fade:
         return {"amplitude": self.amplitude, "region": self.region.to_dict()}
 
     @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> Self:
-        """Inverse of `to_dict`."""
-        return cls(float(data["amplitude"]), TrainedRegion.from_dict(data["region"]))
+    def from_dict(cls, data: dict[str, Any], n_inputs: int) -> Self:
+        """Inverse of `to_dict`, for so many inputs.  Raises ValueError for anything else."""
+        amplitude = saved_number(data["amplitude"], "amplitude", 0.0, 1.0)
+        return cls(amplitude, TrainedRegion.from_dict(data["region"], n_inputs))
 
 
 def amplitude(
@@ -106,7 +108,10 @@ def shrunken_slope(sums: Array, drives: IntArray) -> float:
     slope = _slope(total[None, :])[0]
     if n_drives == 1:
         return float(np.clip(slope, 0.0, 1.0))
-    slopes = _slope(total - by_drive)
+    others = total - by_drive
+    if not others.any(axis=1).all():
+        return 0.0  # without one drive nothing is left that has a slope, so that s_b is not determined
+    slopes = _slope(others)
     scatter = float(np.sqrt((n_drives - 1) / n_drives * np.sum((slopes - slopes.mean()) ** 2)))
     return float(np.clip(slope - stdtrit(n_drives - 1, ndtr(SE)) * scatter, 0.0, 1.0))
 

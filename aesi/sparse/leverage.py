@@ -17,6 +17,7 @@ from typing import Any, Self
 import numpy as np
 from scipy.linalg import solve_triangular
 
+from aesi.numerics.files.restored import LEAST_POSITIVE, saved_array, saved_number
 from aesi.numerics.typing import Array
 from aesi.sparse.stridge import triangle
 
@@ -48,12 +49,14 @@ class Leverage:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values and an array."""
-        return {"root": self.root, "typical": self.upper_quartile}
+        return {"root": self.root, "upper_quartile": self.upper_quartile}
 
     @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> Self:
-        """Inverse of `to_dict`; the array may come back as lists."""
-        return cls(np.asarray(data["root"], dtype=float), float(data["typical"]))
+    def from_dict(cls, data: dict[str, Any], n_terms: int) -> Self:
+        """Inverse of `to_dict`, for so many terms; the array may come back as lists.  Raises ValueError for anything
+        else."""
+        upper_quartile = saved_number(data["upper_quartile"], "upper_quartile", LEAST_POSITIVE)
+        return cls(saved_array(data["root"], "root", (n_terms, n_terms)), upper_quartile)
 
 
 def _standard_error(root: Array, theta: Array) -> Array:

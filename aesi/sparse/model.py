@@ -24,16 +24,18 @@ from typing import Any
 import numpy as np
 
 from aesi.errors import DataError
+from aesi.numerics.files.restored import reading_back, saved_array, saved_number
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.records import ErrorSeries, FreeRun
+from aesi.records.checked import checked_dt
 from aesi.sparse import free_run
 from aesi.sparse.fade import Fade
 from aesi.sparse.leverage import Leverage
 from aesi.sparse.terms.inputs import model_variables
-from aesi.sparse.terms.library import Library, Term, evaluate_terms
+from aesi.sparse.terms.library import Library, evaluate_terms
 from aesi.sparse.terms.scaling import Scaling
 
-SCHEMA = "aesi.sparse_model/6"
+SCHEMA = "aesi.sparse_model/7"
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,27 +167,30 @@ class SparseModel:
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> SparseModel:
         """Inverse of `to_dict`. Raises DataError for anything else."""
-        if data.get("schema") != SCHEMA:
-            raise DataError(
-                f"not a sparse model of this version: schema is {data.get('schema')!r}, expected {SCHEMA!r}; "
-                "run the experiment again."
+        with reading_back("sparse model", DataError):
+            if data.get("schema") != SCHEMA:
+                raise DataError(
+                    f"not a sparse model of this version: schema is {data.get('schema')!r}, expected {SCHEMA!r}; "
+                    "run the experiment again."
+                )
+            library = Library.of_saved(data["variables"], data["terms"])
+            m, n = len(library), len(library.variables)
+            leverage, fade = data["leverage"], data["fade"]
+            optional = {
+                key: None if data[key] is None else saved_array(data[key], key, (m,))
+                for key in ("inclusion", "low", "high")
+            }
+            return cls(
+                str(data["name"]),
+                library,
+                saved_array(data["coefficients"], "coefficients", (m,)),
+                Scaling.from_dict(data["scaling"], n),
+                checked_dt(data["dt_s"]),
+                saved_number(data["memory"], "memory", 0.0, 1.0),
+                **optional,
+                leverage=None if leverage is None else Leverage.from_dict(leverage, m),
+                fade=None if fade is None else Fade.from_dict(fade, n - 1),
             )
-        terms = tuple(Term(tuple((int(v), int(f)) for v, f in factors)) for factors in data["terms"])
-        optional = {
-            key: None if data[key] is None else np.array(data[key], dtype=float)
-            for key in ("inclusion", "low", "high")
-        }
-        return cls(
-            data["name"],
-            Library(tuple(data["variables"]), terms),
-            np.array(data["coefficients"], dtype=float),
-            Scaling.from_dict(data["scaling"]),
-            float(data["dt_s"]),
-            float(data["memory"]),
-            **optional,
-            leverage=Leverage.from_dict(data["leverage"]) if data["leverage"] else None,
-            fade=Fade.from_dict(data["fade"]) if data["fade"] else None,
-        )
 
     @property
     def _clip(self) -> bool:

@@ -31,7 +31,10 @@ def svd_scores(features: Array) -> Array:
 
 
 def svd_ranking(model: SparseModel, records: Sequence[ErrorSeries]) -> list[tuple[str, float]]:
-    """Terms of a model with their scores along the records, the most important first; without the constant."""
+    """Terms of a model with their scores along the records, the most important first; without the constant.
+
+    Rows in which a term has no value are left out: of terms in the error those whose error was not measured (NaN).
+    """
     variables = np.vstack(
         [np.column_stack([r.error_v, with_inputs(r, model.input_names).inputs]) for r in records]
     )
@@ -41,6 +44,7 @@ def svd_ranking(model: SparseModel, records: Sequence[ErrorSeries]) -> list[tupl
     kept = [j for j, term in enumerate(model.library.terms) if term.factors]
     if not kept:
         return []
-    scores = svd_scores(np.asfortranarray(features[kept].T))
+    along = features[kept]
+    scores = svd_scores(np.asfortranarray(along[:, np.isfinite(along).all(axis=0)].T))
     order = np.argsort(-scores, kind="stable")
     return [(model.terms[kept[j]], float(scores[j])) for j in order]

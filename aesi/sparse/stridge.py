@@ -17,7 +17,8 @@ import numpy as np
 from scipy.linalg import lapack
 
 from aesi.errors import DataError, ParameterError
-from aesi.numerics.typing import Array, IntArray
+from aesi.numerics.typing import Array, IntArray, Numbers
+from aesi.records.checked import numbers, row_words
 
 COLLINEAR = 1e-12
 """Share of a term's size that the terms before it have to leave of it; with less it is their sum, and what is left is
@@ -28,34 +29,34 @@ search, 1e-13, leaves 1e-9 of a term along 100,000 rows, so that none in a searc
 @dataclass(frozen=True)
 class STRidge:
     """The solver.  lambda1 : ridge weight, >= 0.  lambda2 : smallest coefficient kept, >= 0, in scaled units.
-    max_iter : most solves, >= 1."""
+    max_iter : most solves, >= 1.  Raises ParameterError for others, and for a weight without end."""
 
     lambda1: float
     lambda2: float
     max_iter: int = 20
 
     def __post_init__(self) -> None:
-        if not (self.lambda1 >= 0 and self.lambda2 >= 0 and self.max_iter >= 1):
+        if not (0 <= self.lambda1 < np.inf and 0 <= self.lambda2 < np.inf and self.max_iter >= 1):
             raise ParameterError(
-                f"lambda1 = {self.lambda1:g} and lambda2 = {self.lambda2:g} must not be negative, and "
-                f"max_iter = {self.max_iter} must be at least 1."
+                f"lambda1 = {self.lambda1:g} and lambda2 = {self.lambda2:g} must not be negative and must be finite, "
+                f"and max_iter = {self.max_iter} must be at least 1."
             )
 
-    def fit(self, theta: Array, y: Array, weights: Array | None = None) -> Array:
+    def fit(self, theta: Numbers, y: Numbers, weights: Numbers | None = None) -> Array:
         """Coefficients (m,) of the weighted problem; theta (n, m), y (n,), weights (n,) >= 0.
 
-        Raises DataError for other shapes, and for a value that is not finite.
+        Raises DataError for other shapes, for a value that is not finite or no real number, and for a negative weight.
         """
-        theta, y = np.asarray(theta, dtype=float), np.asarray(y, dtype=float)
-        if theta.ndim != 2 or y.shape != theta.shape[:1] or not len(y):
+        theta, y = numbers(theta, "theta"), numbers(y, "y")
+        if theta.ndim != 2 or y.shape != theta.shape[:1] or not theta.size:
             raise DataError(
-                f"theta and y have shapes {theta.shape} and {y.shape}; give (n, m) and (n,), n at least 1."
+                f"theta and y have shapes {theta.shape} and {y.shape}; give (n, m) and (n,), n at least 1 and m too."
             )
         if not (np.isfinite(theta).all() and np.isfinite(y).all()):
             raise DataError("theta or y holds a value that is not finite; drop such rows first.")
         augmented = np.column_stack([theta, y])
         if weights is not None:
-            augmented *= np.sqrt(weights)[:, None]
+            augmented *= np.sqrt(_checked_weights(weights, len(y)))[:, None]
         return self.fit_factor(triangle(augmented))
 
     def fit_factor(self, factor: Array) -> Array:
@@ -83,6 +84,20 @@ class STRidge:
         if len(factor) == m + 1 and not np.tril(factor, -1).any():
             return _merge_triangles(factor, ridge)
         return triangle(np.vstack([factor, ridge]))
+
+
+def _checked_weights(weights: Numbers, n: int) -> Array:
+    """(n,) of the rows.  Raises DataError for another shape, and for a weight that is negative or not finite."""
+    given = numbers(weights, "weights")
+    if given.shape != (n,):
+        raise DataError(
+            f"weights have the shape {given.shape}, and theta has {n} rows; give one weight a row."
+        )
+    wrong = ~((given >= 0) & (given < np.inf))  # this way round, NaN is wrong too
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise DataError(f"weights is {given[row]:g} in {row_words(row)}; give finite weights from 0 on.")
+    return given
 
 
 def triangle(matrix: Array) -> Array:

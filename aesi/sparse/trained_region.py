@@ -17,6 +17,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from aesi.numerics.files.restored import saved_array
 from aesi.numerics.typing import Array
 from aesi.numerics.visited import Visited
 
@@ -54,7 +55,7 @@ class TrainedRegion:
         return {"low": self.low.tolist(), "high": self.high.tolist(), **self.visited.to_state()}
 
     @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> Self:
-        """Inverse of `to_dict`."""
-        low, high = (np.array(data[key], dtype=float) for key in ("low", "high"))
+    def from_dict(cls, data: dict[str, Any], n_inputs: int) -> Self:
+        """Inverse of `to_dict`, for so many inputs.  Raises ValueError for anything else."""
+        low, high = (saved_array(data[key], key, (n_inputs,)) for key in ("low", "high"))
         return cls(low, high, Visited.from_state(data))

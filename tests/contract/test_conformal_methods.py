@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from aesi.conformal import COMPARED, METHODS, Calibrated, calibrated_from_dict
+from aesi.conformal.online.calibrated import SCHEMA
 from aesi.errors import FitError, InputError
 
 WINDOW = 50
@@ -133,6 +134,21 @@ def test_survives_a_file_without_pickle(calibrated: Calibrated) -> None:
     np.testing.assert_array_equal(restored.intervals(record).upper_v, calibrated.intervals(record).upper_v)
 
 
+@pytest.mark.parametrize("content", [{"schema": SCHEMA}, [], None])
+def test_intervals_of_a_schema_alone_ended_in_a_key(content) -> None:
+    with pytest.raises(
+        InputError, match=r"the saved intervals cannot be read back: .*; save the model again"
+    ):
+        calibrated_from_dict(content)
+
+
+def test_intervals_of_a_state_that_lacks_any_key_are_refused(calibrated: Calibrated) -> None:
+    state = calibrated.to_dict()
+    for key in state:
+        with pytest.raises(InputError, match="schema" if key == "schema" else f"it lacks '{key}'"):
+            calibrated_from_dict({name: value for name, value in state.items() if name != key})
+
+
 def _pull_arrays(value, path, arrays):
     if isinstance(value, dict):
         return {k: _pull_arrays(v, f"{path}/{k}", arrays) for k, v in value.items()}
@@ -209,6 +225,11 @@ def test_too_few_residuals_are_refused(name: str) -> None:
         METHODS[name].fit([series(12, 9)], window=WINDOW)
     with pytest.raises(FitError, match="need"):
         METHODS[name].fit([], window=WINDOW)
+
+
+def test_half_of_the_miss_rate_that_was_given_was_told() -> None:
+    with pytest.raises(FitError, match=r"cannot support a miss rate of 0\.0001: at least 19999 are needed"):
+        METHODS["split"].fit([series(1000, 9)], alpha=1e-4)
 
 
 @pytest.mark.parametrize("name", sorted(METHODS))

@@ -30,7 +30,7 @@ from aesi.conformal.scores import interval_score, worst_bin_coverage
 from aesi.constants import MV_PER_V
 from aesi.numerics.typing import Array
 from aesi.physics import Cell
-from aesi.pipeline.experiment.intervals.bands import WHOLE, OutOfSampleErrors, Unseen
+from aesi.pipeline.experiment.intervals.bands import ALL_BUT_FIRST, OutOfSampleErrors, Unseen
 from aesi.records import Failed, Split
 from aesi.records.horizons import HORIZONS_S
 from aesi.sparse import Genome, Options, Problem, evaluate
@@ -156,12 +156,12 @@ def _errors(split: Split, cuts: int) -> _Errors | None:
     if isinstance(chosen, Failed):
         return None
     model = with_leverage(chosen.bagging, problem, chosen.genome.lambda1)
-    pairs: list[Unseen] = [(model, record, WHOLE) for record in problem.split.valid]
+    pairs: list[Unseen] = [(model, record, ALL_BUT_FIRST) for record in problem.split.valid]
     pairs += fold_models(problem, chosen)
     stretches = len(pairs)
     if cuts > 1:
         pairs += fold_models(problem, chosen, cut=problem.spans)
-    tested: list[Unseen] = [(model, record, WHOLE) for record in problem.split.test]
+    tested: list[Unseen] = [(model, record, ALL_BUT_FIRST) for record in problem.split.test]
     train = problem.split.train
     return _Errors(
         OutOfSampleErrors.of(pairs, train, HORIZONS_S),

@@ -56,4 +56,5 @@ class Band(ABC):
     @classmethod
     @abstractmethod
     def from_state(cls, state: SavedState, kinds: Kinds) -> Self:
-        """Inverse of `to_state`; `kinds` holds the regressors that a band may rest on."""
+        """Inverse of `to_state`; `kinds` holds the regressors that a band may rest on.  Raises ValueError, or KeyError,
+        for anything else."""

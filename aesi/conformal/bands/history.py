@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, Self
+from typing import Literal, Self, get_args
 
 import numpy as np
 
 from aesi.numerics.drive import drive_features, drive_row
+from aesi.numerics.files.restored import saved_count
 from aesi.numerics.typing import Array, BoolArray, SavedState
 from aesi.numerics.windows import N_LAGS, history_features, history_row, n_features, raw_lags, spans
 
@@ -65,5 +66,8 @@ class History:
 
     @classmethod
     def from_state(cls, state: SavedState) -> Self:
-        """Inverse of `to_state`."""
-        return cls(int(state["window"]), state["view"], bool(state["with_current"]))
+        """Inverse of `to_state`.  Raises ValueError for anything else."""
+        view = state["view"]
+        if view not in get_args(View):
+            raise ValueError(f"view = {view!r} is not known")
+        return cls(saved_count(state["window"], "window"), view, bool(state["with_current"]))

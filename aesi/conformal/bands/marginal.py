@@ -11,6 +11,7 @@ from aesi.conformal.bands.band import Band, RawBand
 from aesi.conformal.bands.narrowest import narrowest
 from aesi.conformal.regressors.model import Kinds
 from aesi.numerics.compiled import kept_njit
+from aesi.numerics.files.restored import saved_array, saved_count, saved_number
 from aesi.numerics.typing import Array, BoolArray, SavedState
 
 ROUND_OFF = 1e-9
@@ -37,7 +38,10 @@ class FixedBand(Band):
 
     @classmethod
     def from_state(cls, state: SavedState, kinds: Kinds) -> Self:
-        return cls(float(state["low"]), float(state["high"]))
+        low, high = (saved_number(state[key], key) for key in ("low", "high"))
+        if low > high:
+            raise ValueError(f"low = {low:g} V lies above high = {high:g} V")
+        return cls(low, high)
 
 
 @kept_njit()
@@ -101,4 +105,5 @@ class RollingBand(Band):
 
     @classmethod
     def from_state(cls, state: SavedState, kinds: Kinds) -> Self:
-        return cls(int(state["window"]), int(state["needed"]), np.asarray(state["levels"], dtype=float))
+        window, needed = (saved_count(state[key], key) for key in ("window", "needed"))
+        return cls(window, needed, saved_array(state["levels"], "levels", (None,), 0.0, 1.0))

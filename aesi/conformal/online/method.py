@@ -15,10 +15,10 @@ from aesi.conformal.online.calibrated import Calibrated
 from aesi.conformal.online.records import checked_currents, checked_records
 from aesi.conformal.online.scale import Scale
 from aesi.errors import FitError, InputError
-from aesi.numerics.quantiles import conformal_quantile
+from aesi.numerics.quantiles import check_miss_rate, conformal_quantile
 from aesi.numerics.typing import Array
 
-RELATIVE_FLOOR = 1e-3
+SHARE_OF_MARGINAL = 1e-3
 """Least width of an interval, as a share of the marginal one: at rest the residual is constant within the sensor's
 resolution, and a fitted width would shrink to zero."""
 MIN_WINDOW = 10
@@ -84,8 +84,7 @@ class Method(ABC):
 
 def check_settings(alpha: float, window: int) -> None:
     """Raises InputError for an alpha outside (0, 1), and for a window that is no whole number or too short."""
-    if not 0 < alpha < 1:
-        raise InputError(f"alpha = {alpha:g} is not a share of misses; give a value between 0 and 1.")
+    check_miss_rate(alpha)
     if not isinstance(window, int | np.integer):
         raise InputError(f"window = {window!r} is not a number of samples; give a whole one.")
     if window < MIN_WINDOW:
@@ -104,7 +103,7 @@ def marginal_interval(records: Sequence[Array], alpha: float) -> tuple[float, fl
             f"all {pooled.size} residuals equal {pooled[0]:g} V, which says nothing about the spread. "
             "Calibrate on residuals of measured voltage that the model was not fitted to."
         )
-    return -conformal_quantile(-pooled, alpha / 2), conformal_quantile(pooled, alpha / 2)
+    return -conformal_quantile(-pooled, alpha, tails=2), conformal_quantile(pooled, alpha, tails=2)
 
 
 def width_floor(records: Sequence[Array], marginal_v: tuple[float, float]) -> float:
@@ -113,7 +112,7 @@ def width_floor(records: Sequence[Array], marginal_v: tuple[float, float]) -> fl
     steps = np.abs(np.concatenate([np.diff(r) for r in records]))
     steps = steps[np.isfinite(steps) & (steps > 0)]
     resolution = float(np.quantile(steps, 0.01)) if steps.size else 0.0
-    return max(RELATIVE_FLOOR * (marginal_v[1] - marginal_v[0]), resolution)
+    return max(SHARE_OF_MARGINAL * (marginal_v[1] - marginal_v[0]), resolution)
 
 
 def _widened(width_v: float, interval_v: tuple[float, float]) -> tuple[float, float]:

@@ -7,6 +7,7 @@ from typing import Self
 
 import numpy as np
 
+from aesi.numerics.files.restored import saved_array
 from aesi.numerics.quantiles import conformal_quantile
 from aesi.numerics.typing import Array, IntArray, SavedState
 
@@ -65,8 +66,11 @@ class Scale:
 
     @classmethod
     def from_state(cls, state: SavedState) -> Self:
-        """Inverse of `to_state`."""
-        return cls(np.asarray(state["edges_a"], dtype=float), np.asarray(state["log_ratio"], dtype=float))
+        """Inverse of `to_state`.  Raises ValueError for anything else."""
+        edges = saved_array(state["edges_a"], "edges_a", (None,))
+        if (np.diff(edges) <= 0.0).any():
+            raise ValueError("edges_a does not increase")
+        return cls(edges, saved_array(state["log_ratio"], "log_ratio", (len(edges) + 1,), -np.inf))
 
 
 def _log_factor(scores: Array, alpha: float) -> float:

@@ -8,6 +8,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from aesi.conformal.regressors.model import FitTask, Kinds, QuantileModel
+from aesi.numerics.files.restored import saved_array
 from aesi.numerics.trees.boosting import BoostedTrees, Growth, bin_edges, binned, fit_boosted
 from aesi.numerics.typing import Array, SavedState
 
@@ -44,8 +45,13 @@ class BoostedQuantiles(QuantileModel):
 
     @classmethod
     def from_state(cls, state: SavedState, kinds: Kinds) -> Self:
-        base, threshold, leaf = (np.asarray(state[k], dtype=float) for k in ("base", "threshold", "leaf"))
-        feature = np.asarray(state["feature"], dtype=np.int64)
+        base, threshold = (
+            saved_array(state["base"], "base", (None,)),
+            np.asarray(state["threshold"], dtype=float),
+        )
+        levels, rounds, nodes = threshold.shape
+        leaf = saved_array(state["leaf"], "leaf", (levels, rounds, nodes + 1))
+        feature = saved_array(state["feature"], "feature", (len(base), rounds, nodes), 0.0).astype(np.int64)
         return cls(
             tuple(BoostedTrees(float(base[j]), feature[j], threshold[j], leaf[j]) for j in range(len(base)))
         )

@@ -15,6 +15,7 @@ import numpy as np
 
 from aesi.conformal.regressors.model import FitTask, Kinds, QuantileModel
 from aesi.numerics.compiled import kept_njit
+from aesi.numerics.files.restored import saved_array
 from aesi.numerics.quantile_regression import fit_quantiles
 from aesi.numerics.typing import Array, SavedState
 
@@ -56,7 +57,8 @@ class LinearQuantiles(QuantileModel):
 
     @classmethod
     def from_state(cls, state: SavedState, kinds: Kinds) -> Self:
-        return cls(np.asarray(state["intercept"], dtype=float), np.asarray(state["slope"], dtype=float))
+        intercept = saved_array(state["intercept"], "intercept", (None,))
+        return cls(intercept, saved_array(state["slope"], "slope", (None, len(intercept))))
 
 
 def local_scale(task: FitTask) -> Array:

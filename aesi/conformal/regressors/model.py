@@ -52,7 +52,8 @@ class QuantileModel(ABC):
     @classmethod
     @abstractmethod
     def from_state(cls, state: SavedState, kinds: Kinds) -> Self:
-        """Inverse of `to_state`; `kinds` has the regressors that may be part of this one."""
+        """Inverse of `to_state`; `kinds` has the regressors that may be part of this one.  Raises ValueError, or
+        KeyError, for anything else."""
 
 
 RegressorFit = Callable[[FitTask], QuantileModel]

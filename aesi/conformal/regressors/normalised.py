@@ -16,6 +16,7 @@ import numpy as np
 
 from aesi.conformal.regressors.linear import LinearQuantiles
 from aesi.conformal.regressors.model import FitTask, Kinds, QuantileModel, RegressorFit
+from aesi.numerics.files.restored import LEAST_POSITIVE, saved_count, saved_number
 from aesi.numerics.typing import Array, SavedState
 
 
@@ -58,8 +59,8 @@ class NormalisedQuantiles(QuantileModel):
         return cls(
             LinearQuantiles.from_state(state["line"], kinds),
             kinds[state["inner_kind"]].from_state(state["inner"], kinds),
-            int(state["n_history"]),
-            float(state["floor_v"]),
+            saved_count(state["n_history"], "n_history"),
+            saved_number(state["floor_v"], "floor_v", LEAST_POSITIVE),
         )
 
 

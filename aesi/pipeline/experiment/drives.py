@@ -70,7 +70,7 @@ def _repeat(series: ErrorSeries, period_s: float, number: int) -> ErrorSeries:
     return series.take(slice(int(low), int(high)), f"repeat {number}")
 
 
-WHOLE = 0.99
+WHOLE_REPEAT_SHARE = 0.99
 """Least share of a period that a whole repeat contains. The last rows of a record may be missing. A convention."""
 
 
@@ -86,7 +86,7 @@ def cut_short(time_s: Array, repeats: RepeatsConfig) -> list[str]:
     return [
         f"repeat {number} has {seconds:.0f} s of the {repeats.period_s:g} s of a period: the record ends in it."
         for number, seconds in lasts.items()
-        if seconds < WHOLE * repeats.period_s
+        if seconds < WHOLE_REPEAT_SHARE * repeats.period_s
     ]
 
 

@@ -70,7 +70,10 @@ PRIORS = (
     *(FileParameter(owner, "loss", 0.0003) for owner in BALANCE),
     *_waves(),
 )
-FILMS = tuple(FileParameter(FILM, side, STEP, True, FILM_ENERGY_SD) for side in ("negative", "positive"))
+FILM_UNIT = 0.05
+"""What counts as a deviation of the logarithm of a film. A unit and no prior, since no fit moves films: the voltage
+that an energy is worth is a slope in these units times ENERGIES_J_MOL, which is divided by it."""
+FILMS = tuple(FileParameter(FILM, side, FILM_UNIT, True, FILM_ENERGY_SD) for side in ("negative", "positive"))
 """Films of the electrodes. No fit moves them, since at one temperature they are like contacts; with temperature they
 change as rates do."""
 ENERGIES_J_MOL = np.array([prior.energy_j_mol / prior.prior_sd for prior in (*PRIORS, *FILMS)])

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from numbers import Real
 from pathlib import Path
 from typing import Any, Self
 
@@ -34,9 +33,10 @@ from aesi.pipeline.product.prediction import Prediction
 from aesi.pipeline.product.trained import outside_trained, trained_on
 from aesi.pipeline.written import EFFECTS, HEAD
 from aesi.records import ErrorSeries, FreeRun, Hold, Measurement
-from aesi.records.checked import numbers, row_words
+from aesi.records.checked import checked_dt, is_finite_number, numbers, row_words
 from aesi.records.steps import after_gap, next_stamp
 from aesi.sparse import SparseModel
+from aesi.sparse.terms.inputs import same_step
 from aesi.sparse.yardsticks import Bare
 
 END_BEFORE = ", or end the record before that (--to-s on the command line)."
@@ -71,13 +71,15 @@ class HybridModel:
     finding: str = ""
 
     def __post_init__(self) -> None:
-        """Raises InputError for a wrong cell, effects, step, hold, state of charge or model."""
+        """Raises InputError for a wrong cell, effects, step, hold, state of charge or model, and for a correction that
+        steps otherwise."""
         check_cell(self.cell)
         object.__setattr__(self, "effects", checked_effects(self.effects))
-        step: object = self.dt_s  # a file may hold anything
-        if not isinstance(step, Real) or not 0.0 < float(step) < np.inf:
-            raise InputError(f"dt_s = {self.dt_s!r} has to be a positive number of seconds.")
-        object.__setattr__(self, "dt_s", float(step))
+        object.__setattr__(self, "dt_s", checked_dt(self.dt_s))
+        if self.correction is not None and not same_step(self.correction.dt_s, self.dt_s):
+            raise InputError(
+                f"dt_s = {self.dt_s:g} s, but the correction steps by {self.correction.dt_s:g} s; give that as dt_s."
+            )
         check_choice("hold", self.hold, Hold)
         object.__setattr__(self, "soc0", checked_soc(self.soc0))
         check_choice("model", self.model, ModelName)
@@ -113,8 +115,9 @@ class HybridModel:
         voltage_v : (n,) V, measured, for predictions one step ahead: each sample is predicted from those before it, the
         first by the physics alone and without a band. Rows denser than the model's step are predicted from the mean of
         those in the step before; the band holds for single rows. None for a free run.
-        error0_v : initial error of a free run, V, measured minus physics at the first sample. None takes the error that
-        the inputs give, with the band of a whole drive from the first sample on. Ignored one step ahead.
+        error0_v : initial error of a free run, V, measured minus physics at the first sample, from which the correction
+        starts. None takes the error that the inputs give, with the band of a whole drive from the first sample on.
+        Ignored one step ahead.
         soc0 : state of charge at the first sample, 0 to 1; None takes it from the first measured voltage at rest, else
         the model's own.  temperature_degc : as in `simulate`.
         soc0_sd : standard deviation of soc0, which widens the band of a free run. 0 takes soc0 as exact; if it is not,
@@ -122,7 +125,7 @@ class HybridModel:
 
         Raises DataError where the record cannot be simulated, where its first voltage does not belong to this cell,
         where soc0 is unknown, and, one step ahead, for rows further apart than the step of a model that has a
-        correction or intervals.
+        correction or intervals; InputError as `predict_record`.
         """
         free = voltage_v is None
         measured = np.full(np.shape(time_s), np.nan) if free else numbers(voltage_v, "voltage_v")
@@ -146,11 +149,17 @@ class HybridModel:
         soc0 : None reads it with its standard deviation from the voltage at the start of the record, also for a free
         run; without a voltage it is the model's own.
         soc0_sd : standard deviation of a soc0 that is not read from the voltage; it widens the band of a free run.
-        Raises InputError for a soc0_sd outside 0 to 1, and for an error0_v that is not finite; else as `predict`.
+        Raises InputError for a soc0_sd outside 0 to 1, for an error0_v that is not finite, and for one in a free run of
+        a model without a correction; else as `predict`.
         """
-        if error0_v is not None and not _is_finite(error0_v):
+        if error0_v is not None and not is_finite_number(error0_v):
             raise InputError(f"error0_v = {error0_v!r} is no voltage; give volts, or leave it out.")
-        if not (_is_finite(soc0_sd) and 0.0 <= soc0_sd <= 1.0):
+        if error0_v is not None and not one_step and self.correction is None:
+            raise InputError(
+                f"error0_v = {error0_v:g} V is where a correction starts, and this model has none: physics alone has "
+                "no error to start from; leave it out."
+            )
+        if not (is_finite_number(soc0_sd) and 0.0 <= soc0_sd <= 1.0):
             raise InputError(
                 f"soc0_sd = {soc0_sd!r} is no standard deviation of a state of charge; give 0 to 1."
             )
@@ -208,9 +217,12 @@ class HybridModel:
             ("bands", FreeRunBands.from_dict),
         ):
             with _as_saved(part_file(folder, name)):
-                read[name] = of_content(parts[name]) if parts.get(name) else None
+                read[name] = of_content(parts[name]) if name in parts else None
         with _as_saved(part_file(folder, EFFECTS)):
-            read["effects"] = tuple(active_effect(content, folder) for content in parts.get(EFFECTS, ()))
+            saved = parts.get(EFFECTS, [])
+            if not isinstance(saved, list):
+                raise TypeError("it holds no list of effects")
+            read["effects"] = tuple(active_effect(content, folder) for content in saved)
         with _as_saved(folder / HEAD):
             return HybridModel(
                 cell=Cell.from_bpx(part_file(folder, "cell.bpx"), fitted=True),
@@ -378,11 +390,6 @@ def _as_saved(file: Path) -> Iterator[None]:
         raise InputError(f"{file} lacks {error}; save the model again.") from None
     except (TypeError, ValueError, AttributeError, IndexError) as error:
         raise InputError(f"{file} is not as it was saved ({error}); save the model again.") from None
-
-
-def _is_finite(value: object) -> bool:
-    """Whether an argument is a finite number."""
-    return isinstance(value, Real) and bool(np.isfinite(float(value)))
 
 
 def _each_row(temperature_degc: Numbers | None, rows: tuple[int, ...]) -> Array | None:

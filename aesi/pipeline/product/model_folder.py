@@ -22,7 +22,8 @@ from aesi.pipeline.written import ARRAYS, HEAD, MODEL
 
 SCHEMA = "aesi.model/1"
 ARRAY_KEY = "array:"
-"""Prefix of a string that stands for an array of arrays.npz."""
+"""Prefix of a string that stands for an array of arrays.npz. The rest is the place of the string itself, the part and
+the keys down to it, so that a text of the user's that begins so is taken for what it is."""
 
 
 def write_model(
@@ -73,7 +74,7 @@ def read_model(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     parts = {}
     for name in names:
         try:
-            parts[name] = _with_arrays(_read_json(part_file(folder, name)), arrays)
+            parts[name] = _with_arrays(_read_json(part_file(folder, name)), name, arrays)
         except KeyError as error:
             raise InputError(
                 f"{folder / ARRAYS} lacks {error}, which {part_file(folder, name).name} names; save the model again."
@@ -105,14 +106,14 @@ def _without_arrays(value: Any, path: str, arrays: dict[str, Array]) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _with_arrays(value: Any, arrays: Mapping[str, Array]) -> Any:
+def _with_arrays(value: Any, path: str, arrays: Mapping[str, Array]) -> Any:
     """Inverse of `_without_arrays`."""
-    if isinstance(value, str) and value.startswith(ARRAY_KEY):
-        return arrays[value.removeprefix(ARRAY_KEY)]
+    if isinstance(value, str) and value == ARRAY_KEY + path:
+        return arrays[path]
     if isinstance(value, dict):
-        return {key: _with_arrays(item, arrays) for key, item in value.items()}
+        return {key: _with_arrays(item, f"{path}.{key}", arrays) for key, item in value.items()}
     if isinstance(value, list):
-        return [_with_arrays(item, arrays) for item in value]
+        return [_with_arrays(item, f"{path}.{index}", arrays) for index, item in enumerate(value)]
     return value
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from aesi.errors import FitError
 from aesi.sparse.model import SparseModel
 from aesi.sparse.search.evaluate import sparse_model
 from aesi.sparse.search.problem import Problem
@@ -20,7 +21,12 @@ NAME = "constant"
 
 
 def constant(problem: Problem) -> SparseModel:
-    """The least-squares constant over all training rows, with the weights that rows have in every fit."""
-    place = np.array([problem.library.terms.index(Term())])
+    """The least-squares constant over all training rows, with the weights that rows have in every fit.  Raises FitError
+    for a library without the constant term."""
+    place = np.flatnonzero([term == Term() for term in problem.library.terms])
+    if not len(place):
+        raise FitError(
+            f"{NAME} needs the constant term of the library, Term(); give a library that holds it."
+        )
     value = STRidge(0.0, 0.0).fit_factor(problem.full_factor[:, np.append(place, len(problem.library))])
     return sparse_model(problem, place, value, 0.0, NAME)

@@ -44,12 +44,21 @@ def with_inputs(series: ErrorSeries, names: Sequence[str]) -> ErrorSeries:
     return replace(series, inputs=np.column_stack(columns), input_names=tuple(names))
 
 
+SAME_STEP = 0.01
+"""Largest relative difference of two time steps that count as one. A convention: logged times jitter."""
+
+
+def same_step(one_s: float, other_s: float) -> bool:
+    """Whether two time steps, s, count as one."""
+    return abs(one_s / other_s - 1.0) <= SAME_STEP
+
+
 def model_variables(series: ErrorSeries, names: Sequence[str], dt_s: float) -> Array:
     """(n, 1 + n_inputs): the error (V) and the named inputs along a record, for a model that steps by `dt_s` (s).
 
     Raises DataError for a record that is sampled at another step, else as `with_inputs`.
     """
-    if abs(series.dt_s / dt_s - 1.0) > 0.01:
+    if not same_step(series.dt_s, dt_s):
         raise DataError(
             f"{series.name}: sampled every {series.dt_s:g} s, but the model steps {dt_s:g} s; "
             f"resample the record to {dt_s:g} s."

@@ -23,6 +23,7 @@ from itertools import combinations, permutations, product
 import numpy as np
 
 from aesi.errors import InputError
+from aesi.numerics.files.restored import saved_count
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.sparse.terms.basis import FUNCTIONS, MAX_ORDER, SPECIAL, slopes, values
 
@@ -104,6 +105,29 @@ class Library:
                 for f in SPECIAL
             ]
         return cls(names, tuple(every))
+
+    @classmethod
+    def of_saved(cls, variables: Sequence[str], terms: Iterable[Iterable[Factor]]) -> Library:
+        """The library of a saved model: names of the variables, the error first, and the factors of each term.
+
+        Raises ValueError for other names, no term, and a factor of no variable or no function.
+        """
+        names = tuple(variables)
+        if names[:1] != (ERROR,) or not all(isinstance(name, str) for name in names):
+            raise ValueError(f"the variables {variables!r} are no names, {ERROR!r} first")
+        factors = [
+            tuple((saved_count(v, "a variable", 0), saved_count(f, "a function", 0)) for v, f in term)
+            for term in terms
+        ]
+        if not factors:
+            raise ValueError("it has no terms")
+        for term in factors:
+            held = [v for v, _ in term]
+            if len(set(held)) < len(held) or any(v >= len(names) or f >= len(FUNCTIONS) for v, f in term):
+                raise ValueError(
+                    f"the term {term} is no product of functions of the variables {', '.join(names)}"
+                )
+        return cls(names, tuple(Term(term) for term in factors))
 
     def __len__(self) -> int:
         return len(self.terms)

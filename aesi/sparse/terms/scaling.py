@@ -14,10 +14,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
+from aesi.numerics.files.restored import saved_array
 from aesi.numerics.typing import Array, BoolArray
 
 Outside = Literal["clip", "extrapolate"]
@@ -72,9 +73,15 @@ class Scaling:
         return {"low": self.low.tolist(), "high": self.high.tolist(), "outside": self.outside}
 
     @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> Scaling:
-        """Inverse of `to_dict`."""
-        return cls(np.array(data["low"]), np.array(data["high"]), data["outside"])
+    def from_dict(cls, data: dict[str, Any], n_variables: int) -> Scaling:
+        """Inverse of `to_dict`, for so many variables.  Raises ValueError for anything else."""
+        low, high = (saved_array(data[key], key, (n_variables,)) for key in ("low", "high"))
+        outside = data["outside"]
+        if not (low < high).all():
+            raise ValueError("a variable has no range, from low to high")
+        if outside not in get_args(Outside):
+            raise ValueError(f"outside = {outside!r} is not known")
+        return cls(low, high, outside)
 
     def _not_clipped(self, data: Array) -> Array:
         return 2.0 * (data - self.low) / (self.high - self.low) - 1.0

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aesi.conformal import WHOLE_DRIVE, FreeRunBands
+from aesi.conformal import WHOLE_DRIVE, FreeRunBands, Intervals
+from aesi.conformal.free_run import SCHEMA
 from aesi.errors import FitError, InputError
 from aesi.numerics.visited import Visited
 from aesi.records import ErrorSeries, FreeRun
@@ -95,6 +96,20 @@ def test_bands_read_back_from_json_have_the_same_edges() -> None:
 def test_bands_of_an_earlier_schema_are_refused() -> None:
     with pytest.raises(InputError, match=r"free_run_bands/2.*free_run_bands/8.*run the experiment again"):
         FreeRunBands.from_dict(fitted().to_dict() | {"schema": "aesi.free_run_bands/2"})
+
+
+@pytest.mark.parametrize("content", [{"schema": SCHEMA}, [], None, {"schema": SCHEMA, "alpha": "x"}])
+def test_bands_of_a_schema_alone_ended_in_a_key(content) -> None:
+    with pytest.raises(
+        InputError, match=r"the saved bands of a free run cannot be read back: .*; save the model"
+    ):
+        FreeRunBands.from_dict(content)
+
+
+def test_bands_whose_horizons_fall_were_interpolated_between() -> None:
+    state = fitted().to_dict()
+    with pytest.raises(InputError, match=r"horizons are \[inf, 10\.0\] s, and not one or more that increase"):
+        FreeRunBands.from_dict(state | {"horizons": state["horizons"][::-1]})
 
 
 def test_a_record_outside_the_trained_range_is_flagged() -> None:
@@ -248,9 +263,12 @@ def test_too_few_pieces_are_refused() -> None:
         FreeRunBands.fit({1.0: [np.ones(70)]}, DT, [np.zeros(70)])
 
 
-def test_errors_that_are_all_zero_are_refused() -> None:
-    with pytest.raises(FitError, match="are zero"):
-        FreeRunBands.fit({1.0: [np.zeros(3000)]}, DT, [np.zeros(3000)])
+@pytest.mark.parametrize(
+    ("horizon_s", "words"), [(1.0, "errors 1 s ahead"), (WHOLE_DRIVE, "errors over a whole drive")]
+)
+def test_errors_that_are_all_zero_are_refused(horizon_s, words) -> None:
+    with pytest.raises(FitError, match=f"the {words} are zero"):
+        FreeRunBands.fit({horizon_s: [np.zeros(3000)]}, DT, [np.zeros(3000)])
 
 
 def test_constant_errors_get_a_band_of_their_size() -> None:
@@ -278,6 +296,40 @@ def test_an_excess_or_a_name_too_few_was_no_sentence(given, sentence) -> None:
         FreeRunBands.fit({1.0: [np.ones(40)] * 3}, DT, **given)
 
 
+@pytest.mark.parametrize("alpha", [0.0, 1.0, -0.1, 1.5, math.nan, "a tenth"])
+def test_bands_of_an_impossible_level_were_calibrated(alpha) -> None:
+    with pytest.raises(InputError, match=f"alpha = {alpha} is not a share of misses"):
+        FreeRunBands.fit({1.0: [np.ones(40)] * 3}, DT, alpha=alpha)
+
+
+@pytest.mark.parametrize("horizon_s", [0.0, -1.0, math.nan])
+def test_a_horizon_that_lies_nowhere_ahead_was_calibrated_or_ended_in_an_index(horizon_s) -> None:
+    words = f"a horizon of {horizon_s} s is no time ahead; give a positive number of seconds"
+    with pytest.raises(InputError, match=words):
+        FreeRunBands.fit({horizon_s: [np.ones(40)] * 3}, DT)
+    with pytest.raises(InputError, match=words):
+        fitted().at(horizon_s, np.zeros(2))
+
+
+@pytest.mark.parametrize("dt_s", [0.0, -1.0, math.nan, math.inf])
+def test_a_step_of_no_length_was_counted_by(dt_s) -> None:
+    with pytest.raises(InputError, match=f"dt_s = {dt_s} has to be a positive number of seconds"):
+        FreeRunBands.fit({1.0: [np.ones(40)] * 3}, dt_s)
+    with pytest.raises(InputError, match=f"dt_s = {dt_s} has to be a positive number of seconds"):
+        fitted().along(dt_s, np.zeros(2))
+
+
+def test_rows_of_one_array_were_no_list_of_arrays() -> None:
+    errors = 1e-3 * np.random.default_rng(5).standard_normal((4, 600))
+    spread = np.abs(errors)
+    inside, names = np.ones((4, 600), dtype=bool), np.array(["a", "b", "c", "d"])
+    listed = FreeRunBands.fit(
+        {1.0: list(errors)}, DT, list(spread), inside=list(inside), excess=list(spread), records=list(names)
+    )
+    whole = FreeRunBands.fit({1.0: errors}, DT, spread, inside=inside, excess=spread, records=names)
+    np.testing.assert_array_equal(whole.at(1.0, spread[0])[1], listed.at(1.0, spread[0])[1])
+
+
 def test_pieces_of_the_same_rows_alone_ended_in_an_empty_array() -> None:
     with pytest.raises(FitError, match="no piece is left that shares no row with one of a"):
         FreeRunBands.fit({1.0: [np.ones(40)] * 3}, DT, records=["a"] * 3)
@@ -286,7 +338,7 @@ def test_pieces_of_the_same_rows_alone_ended_in_an_empty_array() -> None:
 def test_the_band_of_errors_that_are_mostly_zero_was_no_number() -> None:
     error = np.where(np.arange(3000) % 20 == 0, 1e-3, 0.0)
     bands = FreeRunBands.fit({1.0: [error]}, DT)
-    np.testing.assert_array_equal(bands.at(1.0, np.zeros(2))[1], 0.0)
+    np.testing.assert_array_equal(Intervals(*bands.at(1.0, np.zeros(2)), np.ones(2, dtype=bool)).width_v, 0.0)
     np.testing.assert_allclose(bands.at(1.0, np.zeros(2), open_v=1e-3)[1], 1.645e-3, rtol=1e-3)
 
 

@@ -18,6 +18,12 @@ def test_too_few_scores_for_the_level() -> None:
         conformal_quantile(np.arange(8.0), 0.1)
 
 
+def test_the_miss_rate_of_a_tail_was_told_as_the_one_that_was_given() -> None:
+    assert conformal_quantile(np.arange(1.0, 20.0), 0.1, tails=2) == 19.0
+    with pytest.raises(FitError, match=r"miss rate of 0.1: at least 19 are needed"):
+        conformal_quantile(np.arange(18.0), 0.1, tails=2)
+
+
 def test_the_share_below_a_fitted_quantile_is_its_level(rng: np.random.Generator) -> None:
     x = np.column_stack([np.ones(5000), rng.standard_normal((5000, 3))])
     y = x @ [1.0, 2.0, -1.0, 0.5] + rng.standard_t(3, 5000)

@@ -7,7 +7,7 @@ import pytest
 
 from aesi.conformal import WHOLE_DRIVE
 from aesi.errors import FitError
-from aesi.pipeline.experiment.intervals.bands import WHOLE, OutOfSampleErrors, bands_of_horizons
+from aesi.pipeline.experiment.intervals.bands import ALL_BUT_FIRST, OutOfSampleErrors, bands_of_horizons
 from aesi.records import ErrorSeries, FreeRun
 from aesi.sparse.yardsticks import Bare
 
@@ -66,13 +66,17 @@ def test_another_record_is_inside_where_the_training_went(drive) -> None:
         drive.model_v,
         drive.input_names,
     )
-    errors = OutOfSampleErrors.of([(Held(), other, WHOLE), (Held(), beyond, WHOLE)], (drive,), ())
+    errors = OutOfSampleErrors.of(
+        [(Held(), other, ALL_BUT_FIRST), (Held(), beyond, ALL_BUT_FIRST)], (drive,), ()
+    )
     assert errors.inside[0].all()
     assert 0 < errors.inside[1].mean() < 0.7
 
 
 def test_errors_are_those_of_the_horizon(drive) -> None:
-    errors = OutOfSampleErrors.of([(Held(), drive, WHOLE)], (drive.take(slice(0, N), "other"),), (10.0,))
+    errors = OutOfSampleErrors.of(
+        [(Held(), drive, ALL_BUT_FIRST)], (drive.take(slice(0, N), "other"),), (10.0,)
+    )
     (ahead,) = errors.by_horizon[10.0]
     assert np.isnan(ahead[:10]).all()
     np.testing.assert_allclose(ahead[10:], 1e-4)
@@ -80,7 +84,7 @@ def test_errors_are_those_of_the_horizon(drive) -> None:
 
 
 def test_a_model_that_holds_nothing_at_an_edge_reaches_nowhere(drive) -> None:
-    errors = OutOfSampleErrors.of([(Held(), drive, WHOLE)], (drive,), (10.0,))
+    errors = OutOfSampleErrors.of([(Held(), drive, ALL_BUT_FIRST)], (drive,), (10.0,))
     assert errors.reach.keys() == errors.by_horizon.keys()
     assert not any(each[0].any() for each in errors.reach.values())
 
@@ -145,7 +149,7 @@ def test_rows_hotter_than_those_of_the_fit_calibrate_no_band(drive, model) -> No
 def test_a_horizon_that_records_are_too_short_for_takes_no_band_from_the_others(drive) -> None:
     rng = np.random.default_rng(0)
     drives = [replace(drive, name=f"{i}", error_v=rng.normal(0.0, 1e-3, N)) for i in range(4)]
-    pairs = [(Held(), each, WHOLE) for each in drives]
+    pairs = [(Held(), each, ALL_BUT_FIRST) for each in drives]
     alone, nothing = bands_of_horizons(OutOfSampleErrors.of(pairs, drives, (1.0,)), 0.1)
     beside, told = bands_of_horizons(OutOfSampleErrors.of(pairs, drives, (1.0, 390.0)), 0.1)
     assert [band.horizon_s for band in beside.horizons] == [1.0, WHOLE_DRIVE]

@@ -563,7 +563,15 @@ def test_a_damaged_folder_is_named(model, tmp_path, damage):
             [{"effect": "series_resistance", "parameters": {"resistance_ohm": 9999}}],
             "effects.json: series_resistance: resistance_ohm = 9999 ohm is outside",
         ),
-        ("correction.json", {"terms": "array:none"}, "arrays.npz lacks 'none', which correction.json names"),
+        (
+            "correction.json",
+            {"terms": "array:correction.terms"},
+            "arrays.npz lacks 'correction.terms', which correction.json names",
+        ),
+        ("correction.json", [], "correction.json: the saved sparse model cannot be read back"),
+        ("intervals.json", [], "intervals.json: the saved intervals cannot be read back"),
+        ("bands.json", None, "bands.json: the saved bands of a free run cannot be read back"),
+        ("effects.json", {}, "effects.json is not as it was saved"),
     ],
 )
 def test_a_damaged_file_of_a_model_was_told_without_its_name_or_as_a_bug(
@@ -577,6 +585,63 @@ def test_a_damaged_file_of_a_model_was_told_without_its_name_or_as_a_bug(
     with pytest.raises(InputError, match=sentence) as caught:
         HybridModel.load(tmp_path / "model")
     assert str(tmp_path / "model") in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("file", "key", "damaged", "sentence"),
+    [
+        ("correction.json", "coefficients", lambda them: them[:-1], "coefficients has the shape"),
+        ("correction.json", "coefficients", lambda them: ["nan"] * len(them), "holds what is no number"),
+        ("correction.json", "terms", lambda _: [], "it has no terms"),
+        ("correction.json", "terms", lambda them: [[[99, 1]], *them[1:]], "is no product of functions"),
+        ("correction.json", "memory", lambda _: None, "memory holds what is no number"),
+        ("correction.json", "scaling", lambda it: it | {"low": it["high"]}, "a variable has no range"),
+        ("correction.json", "dt_s", lambda _: -1.0, "dt_s = -1.0 has to be a positive number of seconds"),
+        ("bands.json", "horizons", lambda _: [], "one or more that increase"),
+        ("bands.json", "alpha", lambda _: 5, "alpha = 5 is not a share of misses"),
+        ("intervals.json", "alpha", lambda _: 5, "alpha = 5 is not a share of misses"),
+        ("intervals.json", "window", lambda _: 3, "window = 3 samples is too short a history"),
+        ("intervals.json", "marginal_v", lambda them: them[::-1], "marginal_v falls from"),
+        ("intervals.json", "scale", lambda it: it | {"log_ratio": [0.0] * 99}, "log_ratio has the shape"),
+    ],
+)
+def test_a_damaged_part_was_loaded_and_ended_in_an_index_or_in_no_numbers(
+    model, tmp_path, file, key, damaged, sentence
+):
+    path = model.save(tmp_path / "model") / file
+    content = json.loads(path.read_text())
+    path.write_text(json.dumps(content | {key: damaged(content[key])}))
+    with pytest.raises(InputError, match=sentence) as caught:
+        HybridModel.load(tmp_path / "model")
+    assert str(caught.value).startswith(str(path))
+    assert str(caught.value).count("\n") == 0
+
+
+def test_a_correction_of_another_step_asked_for_a_record_that_nobody_could_give(model, tmp_path):
+    path = model.save(tmp_path / "model") / "correction.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"dt_s": 2.0}))
+    with pytest.raises(InputError, match=r"model\.json: dt_s = 1 s, but the correction steps by 2 s"):
+        HybridModel.load(tmp_path / "model")
+
+
+def test_a_cell_whose_name_begins_as_a_reference_to_an_array_could_not_be_loaded(model, data, tmp_path):
+    named = replace(model, cell=replace(model.cell, name="array:of cells"))
+    again = HybridModel.load(named.save(tmp_path / "model"))
+    assert again.cell.name == "array:of cells"
+    told, was = (each.predict(data.time_s, data.current_a, SOC0) for each in (again, model))
+    np.testing.assert_allclose(told.upper_v, was.upper_v, atol=1e-12)
+
+
+def test_an_error_to_start_from_moved_nothing_of_physics_alone_but_its_band(model, data):
+    physics = replace(model, correction=None)
+    with pytest.raises(
+        InputError, match=r"error0_v = 0\.05 V is where a correction starts, and this model has none"
+    ):
+        physics.predict(data.time_s, data.current_a, SOC0, error0_v=0.05)
+    one_step = data.time_s, data.current_a, SOC0, data.voltage_v
+    physics.predict(*one_step, error0_v=0.05)  # ignored there, as documented
+    with pytest.raises(InputError, match="error0_v = True is no voltage"):
+        model.predict(data.time_s, data.current_a, SOC0, error0_v=True)
 
 
 def test_a_record_of_other_sampling_is_loaded_at_the_experiments_step(record):

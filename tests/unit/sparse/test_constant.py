@@ -3,11 +3,14 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from sparse_records import make_record
 
+from aesi.errors import FitError
 from aesi.records import Split
 from aesi.sparse import Options, Problem
 from aesi.sparse.baselines.constant import constant
+from aesi.sparse.terms.library import Library, Term
 
 
 def fitted(shift_v: float):
@@ -37,3 +40,12 @@ def test_it_lies_at_the_mean_of_the_errors():
 def test_nothing_measured_moves_it():
     series = make_record(120, seed=4)
     np.testing.assert_array_equal(fitted(0.0).one_step(series)[1:], said(fitted(0.0)))
+
+
+def test_a_library_without_the_constant_was_told_by_a_tuple():
+    record = make_record(700, seed=1)
+    whole = Library.build(record.input_names, p_c=1, d=1, special=False, mixed=False)
+    without = whole.take(j for j, term in enumerate(whole.terms) if term != Term())
+    problem = Problem.build(Split((record,), (), ()), Options(resamples=4, block=60), without)
+    with pytest.raises(FitError, match="constant needs the constant term of the library"):
+        constant(problem)

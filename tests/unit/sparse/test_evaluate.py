@@ -351,6 +351,15 @@ def test_a_constant_ranks_nothing(problem, split):
     assert svd_ranking(constant, split.train) == []
 
 
+def test_a_first_error_that_was_not_measured_ended_the_ranking_of_terms_in_it(feedback_problem):
+    model = evaluate(feedback_problem, whole(feedback_problem, 1e-2, 2e-2)).bagging
+    assert model.has_feedback
+    records = feedback_problem.split.train
+    begun = [replace(each, error_v=np.append(np.nan, each.error_v[1:])) for each in records]
+    cut = [each.take(slice(1, None)) for each in records]
+    assert svd_ranking(model, begun) == svd_ranking(model, cut)
+
+
 def test_one_lucky_validation_drive_does_not_choose_alone(split):
     # Half of the validation loss is on the left-out pieces, so that a drive that bears a candidate out by chance
     # cannot hide that it errs where training has been.

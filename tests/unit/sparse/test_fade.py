@@ -62,6 +62,12 @@ def test_pieces_of_a_single_drive_stand_for_drives():
     assert shrunken_slope(sums([0.5]), one[:1]) == pytest.approx(0.5 / (1.0 + DOUBT))
 
 
+def test_a_slope_that_one_drive_alone_determines_was_no_number():
+    alone = np.array([[1.0, 0.9, 0.9], [0.0, 0.0, 0.0]])
+    assert shrunken_slope(alone, np.arange(2)) == 0.0
+    assert shrunken_slope(np.vstack([alone, alone[1:]]), np.arange(3)) == 0.0
+
+
 def test_records_are_the_folds_and_a_true_error_is_kept():
     problem, candidate = fitted(drives(range(4)))
     assert problem.folds == problem.spans

@@ -45,11 +45,23 @@ def test_a_model_tells_the_excess_and_keeps_it_through_json(problem, split):
     assert candidate.bagging.free_run(split.test[0]).excess is None
     excess = model.free_run(split.train[0]).excess
     assert 0.6 < np.mean(excess == 0) < 0.9  # the upper quartile, over both training records
+    assert set(model.to_dict()["leverage"]) == {"root", "upper_quartile"}
     text = json.dumps(model.to_dict(), default=lambda a: a.tolist())
     again = SparseModel.from_dict(json.loads(text))
     np.testing.assert_array_equal(again.free_run(split.train[0]).excess, excess)
-    with pytest.raises(DataError, match=r"sparse_model/1.*sparse_model/6.*run the experiment again"):
+    with pytest.raises(DataError, match=r"sparse_model/1.*sparse_model/7.*run the experiment again"):
         SparseModel.from_dict(model.to_dict() | {"schema": "aesi.sparse_model/1"})
+
+
+def test_a_correction_of_a_schema_alone_ended_in_a_key(problem):
+    genome = Genome.whole(problem.library, 1e-2, 2e-2, 0.5, 2, 2, feedback=False)
+    state = with_leverage(evaluate(problem, genome).bagging, problem, genome.lambda1).to_dict()
+    for content in ({"schema": state["schema"]}, [], None):
+        with pytest.raises(DataError, match=r"saved sparse model cannot be read back: .*; save the model"):
+            SparseModel.from_dict(content)
+    for key in state.keys() - {"schema", "term_names"}:
+        with pytest.raises(DataError, match=f"it lacks '{key}'"):
+            SparseModel.from_dict({name: value for name, value in state.items() if name != key})
 
 
 def test_left_out_pieces_lie_farther_off_than_fitted_ones(problem):

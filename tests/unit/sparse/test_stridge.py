@@ -59,7 +59,8 @@ def test_fewer_rows_than_terms_is_solved_by_the_ridge(rng):
 
 
 @pytest.mark.parametrize(
-    ("lambda1", "lambda2", "times"), [(-1, 0, 1), (0, -1, 1), (0, 0, 0), (float("nan"), 0, 1)]
+    ("lambda1", "lambda2", "times"),
+    [(-1, 0, 1), (0, -1, 1), (0, 0, 0), (float("nan"), 0, 1), (np.inf, 0, 1), (0, np.inf, 1)],
 )
 def test_inadmissible_settings_are_named(lambda1, lambda2, times):
     with pytest.raises(ParameterError, match="must not be negative"):
@@ -73,8 +74,26 @@ def test_inadmissible_settings_are_named(lambda1, lambda2, times):
         (np.ones(4), np.ones(4), r"shapes \(4,\) and \(4,\)"),
         (np.ones((0, 2)), np.ones(0), "n at least 1"),
         (np.array([[1.0], [np.nan]]), np.ones(2), "not finite"),
+        (np.ones((5, 0)), np.ones(5), "n at least 1 and m too"),
+        (np.ones((2, 1)) * 1j, np.ones(2), "theta holds complex numbers"),
     ],
 )
 def test_what_no_problem_can_be_posed_with_is_refused(theta, y, words):
     with pytest.raises(DataError, match=words):
         STRidge(1e-3, 1e-2).fit(theta, y)
+
+
+@pytest.mark.parametrize(
+    ("weights", "words"),
+    [
+        (np.ones(3), r"weights have the shape \(3,\), and theta has 4 rows"),
+        (np.ones(1), r"weights have the shape \(1,\)"),
+        (np.ones((4, 1)), r"weights have the shape \(4, 1\)"),
+        ([1.0, np.nan, 1.0, 1.0], r"weights is nan in row 2, counted from 1; give finite weights from 0 on"),
+        ([1.0, 1.0, -2.0, 1.0], r"weights is -2 in row 3"),
+        ([np.inf, 1.0, 1.0, 1.0], r"weights is inf in row 1"),
+    ],
+)
+def test_weights_of_no_row_or_of_no_size_ended_in_lapack_or_were_spread_over_all(weights, words):
+    with pytest.raises(DataError, match=words):
+        STRidge(1e-3, 1e-2).fit(np.eye(4), np.ones(4), weights)

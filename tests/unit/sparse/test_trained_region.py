@@ -49,7 +49,7 @@ def test_the_search_judges_left_out_drives_by_the_rows_of_the_others():
 
 def test_it_is_saved_with_the_model():
     trained = region(np.linspace(0.9, 0.4, 50))
-    again = TrainedRegion.from_dict(json.loads(json.dumps(trained.to_dict())))
+    again = TrainedRegion.from_dict(json.loads(json.dumps(trained.to_dict())), 2)
     scaled, soc = np.random.default_rng(1).uniform(-2, 2, (20, 2)), np.linspace(0, 1, 20)
     warm = np.linspace(20.0, 35.0, 20)
     np.testing.assert_array_equal(again.nearness(scaled, soc, warm), trained.nearness(scaled, soc, warm))

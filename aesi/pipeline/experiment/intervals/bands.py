@@ -22,7 +22,7 @@ from aesi.sparse.yardsticks import Bare
 
 Unseen = tuple[ErrorModel, ErrorSeries, slice]
 """(model, error series of a record, rows of it that the model was not fitted to)."""
-WHOLE = slice(1, None)
+ALL_BUT_FIRST = slice(1, None)
 """All samples of a record but the first, whose voltage is given."""
 
 
@@ -190,7 +190,7 @@ def _root(
     train: Sequence[ErrorSeries],
     missed_v: float | None,
     left_out: ErrorSeries | None = None,
-    rows: slice = WHOLE,
+    rows: slice = ALL_BUT_FIRST,
 ) -> Array | None:
     """Root of the parameters' covariance by the training records; None without slopes.
 

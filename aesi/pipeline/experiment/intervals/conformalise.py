@@ -16,7 +16,12 @@ from aesi.errors import FitError
 from aesi.pipeline.experiment.candidate import method
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.fit import Fitted
-from aesi.pipeline.experiment.intervals.bands import WHOLE, OutOfSampleErrors, Unseen, bands_of_horizons
+from aesi.pipeline.experiment.intervals.bands import (
+    ALL_BUT_FIRST,
+    OutOfSampleErrors,
+    Unseen,
+    bands_of_horizons,
+)
 from aesi.pipeline.product.one_step import rows_ahead
 from aesi.records import ErrorModel, LeftOutDrives
 from aesi.records.horizons import in_whole_steps
@@ -72,9 +77,9 @@ def _unseen_predictions(
         pairs += [(model, each.series, each.rows) for each in left_out.parts]
         drives += [(model, each.series, each.rows) for each in left_out.drives]
         if not left_out.parts:
-            pairs += [(model, series, WHOLE) for series in problem.split.train]
+            pairs += [(model, series, ALL_BUT_FIRST) for series in problem.split.train]
     # Validation records are predicted by the served model, whose leverage determines how its correction fades.
-    return [(model, series, WHOLE) for series in problem.split.valid] + pairs, drives, model
+    return [(model, series, ALL_BUT_FIRST) for series in problem.split.valid] + pairs, drives, model
 
 
 def _calibrated(
