@@ -179,6 +179,12 @@ def band_sentences(
         said = [trained_sentence(record.name, figures, one_step=measured)]
         if model.correction.fade is not None and model.correction.fade.amplitude == 0.0:
             said.append("the correction improved no left-out training drive, so that it is applied nowhere.")
+        if prediction.diverged_s is not None:
+            said.append(
+                f"{record.name}: the correction, which feeds its own prediction back, diverges at "
+                f"{stamp(prediction.diverged_s)} s and is held at its last value from there on: do not use the voltage "
+                "after that."
+            )
     banded = np.isfinite(prediction.lower_v)
     if prediction.nominal is not None and np.all(np.isfinite(record.voltage_v)):
         low, high = prediction.lower_v[banded], prediction.upper_v[banded]

@@ -330,7 +330,9 @@ class HybridModel:
             band = self.bands.intervals(series, run, reach, None if measured else WHOLE_DRIVE)
             low, high = band.lower_v, band.upper_v
         alpha = None if self.bands is None else self.bands.alpha
-        return Prediction.of(series, run.error_v, low, high, run.outside, weight, alpha)
+        diverged_s = None if run.diverged_at is None else float(series.time_s[run.diverged_at])
+        found = Prediction.of(series, run.error_v, low, high, run.outside, weight, alpha)
+        return replace(found, diverged_s=diverged_s)
 
     def _one_step(self, series: ErrorSeries) -> Prediction:
         """Prediction of the record's own rows. Each counts as the last row of its step, of which no earlier row is

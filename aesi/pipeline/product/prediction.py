@@ -25,6 +25,8 @@ class Prediction:
     the training data. 1 for a correction that does not fade, NaN without one.
     nominal : coverage of the band, 0 to 1; None without one.  temperature_degc : (n,) degC, of the simulated cell.
     collector_mol_m3 : (n,) the lower one of the salt concentrations at the two collectors, mol/m3, by the physics.
+    diverged_s : time, s, from which a correction that feeds back is held, since it left ten times its trained range;
+    None where it did not.
     """
 
     time_s: Array
@@ -38,6 +40,7 @@ class Prediction:
     nominal: float | None = None
     temperature_degc: Array | None = None
     collector_mol_m3: Array | None = None
+    diverged_s: float | None = None
 
     def __len__(self) -> int:
         return len(self.time_s)

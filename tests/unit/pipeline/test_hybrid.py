@@ -23,10 +23,12 @@ from aesi.pipeline.product.error_series import error_series
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.product.model_folder import SCHEMA
 from aesi.pipeline.simulation import ProfileRequest, predict_file, simulate_file
-from aesi.pipeline.simulation_words import simulated_record_sentences, voltage_words
+from aesi.pipeline.simulation_words import band_sentences, simulated_record_sentences, voltage_words
 from aesi.records import Run
 from aesi.sparse import SparseModel
 from aesi.sparse.fade import Fade
+from aesi.sparse.terms.library import Library, Term
+from aesi.sparse.terms.scaling import Scaling
 from aesi.sparse.trained_region import TrainedRegion
 
 
@@ -882,3 +884,22 @@ def test_the_band_of_physics_alone_was_called_empty(model, record, tmp_path, ban
     assert pd.read_csv(tmp_path / "o.csv")["lower_v"].notna().all() == banded
     (told,) = [note for note in said if "no learnt correction" in note]
     assert told.endswith("lower_v and upper_v are empty.") != banded
+
+
+def test_a_correction_that_diverges_is_told_with_the_time(model, data):
+    unstable = SparseModel(
+        "AESI I",
+        Library(("e", "I"), (Term(((0, 1),)),)),
+        np.array([1.5]),
+        Scaling(np.array([-0.01, -50.0]), np.array([0.01, 50.0]), "extrapolate"),
+        1.0,
+    )
+    alone = replace(model, correction=unstable, bands=None, intervals=None)
+    prediction = alone.predict_record(data, SOC0, error0_v=5e-3)
+    at = int(np.searchsorted(prediction.time_s, prediction.diverged_s))
+    held_v = (prediction.voltage_v - prediction.physics_v)[at - 1 :]
+    np.testing.assert_allclose(held_v, 5e-3 * 1.5 ** (at - 1))
+    assert 0.1 / 1.5 < held_v[0] <= 0.1
+    sentence = band_sentences(data, prediction, alone, measured=False)[1]
+    assert f"diverges at {at} s and is held at its last value" in sentence
+    assert model.predict_record(data, SOC0).diverged_s is None
