@@ -110,9 +110,14 @@ class SparseModel:
         )
 
     def k_step(self, series: ErrorSeries, steps: int) -> Array:
-        """(n,) V: the prediction of error_v[k] given error_v[k - steps]; the first ones from error_v[0]."""
-        if steps < 1:
-            raise DataError(f"{self.name}: a prediction {steps} steps ahead is none; give at least 1.")
+        """(n,) V: the prediction of error_v[k] given error_v[k - steps]; the first ones from error_v[0].
+
+        steps : whole number, at least 1.  Raises DataError for any other.
+        """
+        if not (isinstance(steps, int | np.integer) and steps >= 1):
+            raise DataError(
+                f"{self.name}: a prediction {steps} steps ahead is none; give a whole number, at least 1."
+            )
         return self._predicted_ahead(self._drive(self._variables(series), series), series.error_v, steps)
 
     def reach(self, series: ErrorSeries, steps: int | None = None, error0_v: float | None = None) -> Array:

@@ -49,6 +49,12 @@ def test_k_steps_lie_between_one_step_and_free_run():
             assert model.k_step(series, 5)[15] == pytest.approx(by_hand, abs=1e-15)
 
 
+@pytest.mark.parametrize("steps", [0, 2.5])
+def test_a_prediction_ahead_is_a_whole_number_of_steps(steps):
+    with pytest.raises(DataError, match=f"a prediction {steps} steps ahead is none; give a whole number"):
+        linear(0.5, 0.1).k_step(make_record(20), steps)
+
+
 def test_five_steps_ahead_a_measured_error_is_remembered_as_worked_by_hand():
     error, current = np.random.default_rng(0).uniform(-0.9, 0.9, (2, 20))
     by_inputs = 0.05 * current  # the prediction of the sample after each

@@ -1,8 +1,9 @@
-"""Nested cross-validation of a search: the whole selection repeated without each drive in turn.
+"""Nested cross-validation of a search: the whole selection repeated without each fold in turn.
 
-For each left-out drive the candidate and its amplitude are chosen by the other drives, with coefficients from fits
-without it. The error on that drive then estimates the error on an unseen drive. The validation loss that a search
-reports of its own pick is optimistic, since the pick is the best of many (selection bias).
+For each left-out fold the candidate and its amplitude are chosen by the other folds, with coefficients from fits
+without it. The error on that fold then estimates the error on unseen rows: on an unseen drive where a fold is one, and
+somewhat less where drives are cut into several, since the rest of the same drive stays. The validation loss that a
+search reports of its own pick is optimistic, since the pick is the best of many (selection bias).
 Varma & Simon, BMC Bioinformatics 7 (2006) 91, doi:10.1186/1471-2105-7-91.
 """
 
