@@ -30,6 +30,12 @@ NEWTON_STEPS = 60
 """Largest number of Newton's steps; a handful is usual."""
 NEWTON_TOLERANCE_V = 1e-11
 """Tolerance of every potential: well below the 1e-9 V to which an effect vanishes at its neutral value."""
+UNSOLVED_V = 1e-6
+"""Residual of a potential, V, from which on the result of Newton's method is no solution: well below any noise."""
+FARTHEST_V = 20.0
+"""Potentials of an electrode against the electrolyte lie within this, V, also far beyond the ends of a cell."""
+BISECTIONS = 60
+"""Halvings of an interval, which leave it at the last digit of a float."""
 SMALLEST_STEP = 1.0 / 256.0
 """Smallest share of a Newton step; it is taken even if it does not reduce the residual."""
 SMALLEST_SLOPE = 1e-9
@@ -94,17 +100,18 @@ def solve_units(lo, hi, side, total, at, particles, surfaces, memory):  # type: 
     """Newton's method on the currents of several units and on Phi, which is returned.
 
     Where a unit fills, its kinetic drop is a logarithm of the remaining room, and a full step passes the end of it:
-    steps are halved until they reduce the residual.
+    steps are halved until they reduce the residual. Where that leads nowhere, the units of a single region are solved
+    by `solve_between`; several regions have no solution then, and Phi is NaN.
     """
     matrix, move, n, phi = memory.matrix, memory.move, hi - lo, 0.0
-    share, nearest, ohm = 1.0, math.inf, 0.0
+    share, nearest, ohm, away = 1.0, math.inf, 0.0, math.inf
     for step in range(NEWTON_STEPS):
         evaluate_electrode(lo, hi, side, total, step == 0, at, particles, surfaces, memory)
         if step == 0:
             phi, ohm = memory.potential[0], memory.slope[0]
         worst, off = linearise(lo, hi, side, total, phi, at.chi, particles, memory)
         if worst < NEWTON_TOLERANCE_V and abs(off) * memory.slope[0] < NEWTON_TOLERANCE_V:
-            break
+            return phi
         away = max(worst, abs(off) * ohm)
         if away < nearest or share < SMALLEST_STEP:
             eliminate(matrix, n + 1)
@@ -117,7 +124,47 @@ def solve_units(lo, hi, side, total, at, particles, surfaces, memory):  # type: 
         for i in range(n):
             memory.y[lo + i] += ahead * move[i]
         phi += ahead * move[n]
-    return phi
+    if away < UNSOLVED_V:
+        return phi
+    if memory.ohm.shape[0] == 1:
+        return solve_between(lo, hi, side, total, at, particles, surfaces, memory)
+    return math.nan
+
+
+@compiled
+def solve_between(lo, hi, side, total, at, particles, surfaces, memory):  # type: ignore[no-untyped-def]
+    """The currents of the units of one region and Phi, which is returned, by bisection: of the potential that all units
+    have against the electrolyte beside them, and within it of the current of each. Both rise with each other.
+
+    NaN where the electrode does not move lithium over the step, so that no current is bounded.
+    """
+    first = side * memory.ohm.shape[0]
+    lowest, highest = -FARTHEST_V, FARTHEST_V
+    beyond = (
+        1.0 + FARTHEST_V / BEYOND_RANGE_V
+    )  # a potential within bounds has its stoichiometry within 1 +/- this
+    for _ in range(BISECTIONS):
+        potential = 0.5 * (lowest + highest)
+        for u in range(lo, hi):
+            if not memory.theta_per_y[u] > 0.0:
+                return math.nan
+            even = particles.share[u] * total
+            least = even + (memory.pred[u] - 1.0 - beyond) / memory.theta_per_y[u]
+            most = even + (memory.pred[u] + beyond) / memory.theta_per_y[u]
+            for _ in range(BISECTIONS):
+                memory.y[u] = 0.5 * (least + most)
+                here, _ = surface_potential(u, side, total, at, particles, surfaces, memory)
+                if here > potential:
+                    most = memory.y[u]
+                else:
+                    least = memory.y[u]
+        evaluate_electrode(lo, hi, side, total, False, at, particles, surfaces, memory)
+        if memory.total[first] > total:
+            highest = potential
+        else:
+            lowest = potential
+    memory.total[first] = total
+    return potential + memory.ohm[0, 0] * total + at.chi * memory.log_salt[first]
 
 
 @compiled

@@ -58,6 +58,9 @@ aesi.bench.fast_error`)."""
 STEP = 4e-3
 """Step of finite differences, in standard deviations of a parameter's prior: short against the posterior standard
 deviation. Rows at 10 Hz determine a lag to a thousandth of its spread."""
+NO_CELLS_V = 100.0
+"""A simulated voltage beyond this, V, either way, is no cell's: a run that goes on beyond empty ends at some -5 V, and
+one whose exponents end at their limits at up to 1e152 V. A convention."""
 CACHED_VOLTAGES = 64
 """Number of simulated voltages of good records in the cache: enough for a dozen hypotheses that grow in parallel."""
 
@@ -178,7 +181,7 @@ class InverseProblem:
 
     def predict(self, values: ValuesByOwner, only: int | None = None) -> Array | None:
         """(n,) V, voltage of the model over the fit parts of all records, or of record `only`; None where it cannot be
-        simulated or is not finite."""
+        simulated or is no cell's."""
         out = []
         indices = range(len(self.records)) if only is None else (only,)
         try:
@@ -194,7 +197,9 @@ class InverseProblem:
         except (AesiError, FloatingPointError, ZeroDivisionError, OverflowError):
             return None
         joined = np.concatenate(out)
-        return joined if np.isfinite(joined).all() else None
+        return (
+            joined if (np.abs(joined) < NO_CELLS_V).all() else None
+        )  # this way round, NaN is no voltage either
 
     def _voltage_v(self, i: int, soc0: float, effects: tuple[ActiveEffect, ...], share: float = 1.0) -> Array:
         return self.run(self.fit_parts[i], soc0, effects, self.records[i].thin_hold, share=share).voltage_v

@@ -9,6 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
+from aesi.errors import FitError
 from aesi.numerics.bounded import descend, slope_within
 from aesi.numerics.metrics import rms
 from aesi.numerics.threads import side_by_side
@@ -149,14 +150,17 @@ class HypothesisFitter:
         return descend(objective, x, self.low, self.high, rounds, tolerance, begin).known_x
 
     def finished(self, x: Array) -> FittedHypothesis | None:
-        """The fit that ended at x, with its score; None where the model fails there."""
+        """The fit that ended at x, with its score; None where the model fails there, or has no score."""
         e = self.residual(x)
         jacobian = None if e is None else self.jacobian(x, e)
         if e is None or jacobian is None:
             return None
         fast_errors_v = fast_file_errors_v(self.problem, self.blocks, self.hypothesis)
         point = Linearised(x, e, jacobian, np.column_stack([self.low, self.high]), fast_errors_v)
-        score = scored(self.problem, self.blocks, point)
+        try:
+            score = scored(self.problem, self.blocks, point)
+        except FitError:
+            return None
         return FittedHypothesis(self.hypothesis, self.free, point, score, self.simulations)
 
 
@@ -170,7 +174,8 @@ def beyond_expected(white: Array) -> float:
 
 
 def scored(problem: InverseProblem, blocks: Blocks, point: Linearised) -> PredictiveScore:
-    """The predictive score of a linearised hypothesis, at the size of the model error where it is highest."""
+    """The predictive score of a linearised hypothesis, at the size of the model error where it is highest.  Raises
+    FitError as `score_at_size`."""
     prior, sums = PRIORS[problem.trust], SizeSums(SplitTable(problem, blocks, point.table()))
     scores = [point_score_at_size(sums, point, size, prior.log_density(size)) for size in prior.sizes]
     return best_over_sizes(scores, len(point.x))

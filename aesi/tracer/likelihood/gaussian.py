@@ -28,6 +28,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 from scipy.special import log_ndtr
 
+from aesi.errors import FitError
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.free_parameter import FURTHEST_SDS, ON_BOUND_SDS, at_ends
@@ -393,7 +394,10 @@ def score_at_size(
 
     sums : whitened at that size, about the point x (m,).  bounds : (m, 2) of the coordinates.  log_prior : of the size,
     nats.
+    Raises FitError for sensitivities so large that the prior, the 1 of A in (2), is lost in the rounding of the sums.
     """
+    if not np.finfo(float).eps * float(np.trace(sums.gram.sum(axis=0))) < 1.0:
+        raise FitError("the voltage changes too steeply with the parameters: no score can be told.")
     folds = tuple(fold for of_name in blocks.folds.values() for fold in of_name)
     posterior = Posterior(sums, x, folds)
     to_bounds, held = held_at_bounds(posterior, bounds)

@@ -15,6 +15,7 @@ from threading import Lock
 
 import numpy as np
 
+from aesi.errors import FitError
 from aesi.numerics.bounded import descend, foreseen_cost, slope_within
 from aesi.numerics.typing import Array, IntArray
 from aesi.tracer.case.blocks import Blocks
@@ -237,13 +238,16 @@ class EffectGrowth:
 
     def grow(self) -> Grown | None:
         """The effect fitted on its parent: the end of its descent within the bounds, scored; None where the effect
-        cannot be simulated."""
+        cannot be simulated, or has no score."""
         self.end_u = u = self._descended() if self.end_u is None else self.end_u
         if u is None:
             return None
         e = self.error_v(u)
         jacobian = None if e is None else self.jacobian(u, e)
-        return None if e is None or jacobian is None else _scored(self, u, e, jacobian)
+        try:
+            return None if e is None or jacobian is None else _scored(self, u, e, jacobian)
+        except FitError:
+            return None
 
     def _descended(self) -> Array | None:
         start = self._most_promising()
@@ -278,7 +282,8 @@ def expected_score(parent: Parent, slopes_v: Array) -> float:
     simulation. The gain over the parent is this minus the parent's own score.
 
     slopes_v : (n, k) V, sensitivities of the effect as they were on another parent.
-    The model error has the size of the parent's score or that of a right hypothesis, whichever scores higher.
+    The model error has the size of the parent's score or that of a right hypothesis, whichever scores higher; -inf
+    where there is no score.
     """
     fit, prior = parent.fit, PRIORS[parent.problem.trust]
     own = SplitTable(parent.problem, parent.blocks, np.column_stack([fit.point.residual_v, slopes_v]))
@@ -290,7 +295,10 @@ def expected_score(parent: Parent, slopes_v: Array) -> float:
         known, log_det = parent.whitened_columns(size)
         new, _ = own.whitened(size)
         sums = block_sums(parent.blocks, np.column_stack([new[:, :1], known, new[:, 1:]]), log_det)
-        totals.append(score_at_size(parent.blocks, sums, x, bounds, size, prior.log_density(size)).total)
+        try:
+            totals.append(score_at_size(parent.blocks, sums, x, bounds, size, prior.log_density(size)).total)
+        except FitError:
+            return -np.inf
     return max(totals)
 
 

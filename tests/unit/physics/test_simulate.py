@@ -115,6 +115,20 @@ def test_a_jump_of_the_current_left_regions_with_currents_that_solve_nothing():
     assert np.abs(voltages[0] - voltages[1]).max() < 5e-3
 
 
+def test_particles_of_several_sizes_were_lost_beyond_empty():
+    """The symptom: Newton's method found no currents there, and voltages of 1e6 V or none followed."""
+    cell = Cell.from_bpx(CELLS / "panasonic_ncr18650pf.bpx.json")
+    time_s = np.arange(0.0, 77400.0, 60.0)
+    current_a = np.full(len(time_s), 0.145)
+    sizes = CATALOGUE["particle_size_distribution"].activate(negative_sd=0.25, positive_sd=0.097)
+    several, single = (
+        simulate(cell, time_s, current_a, 1.0, effects, on_depletion="clip") for effects in ((sizes,), ())
+    )
+    assert several.series["depleted"][-1] == 1.0
+    assert np.abs(np.diff(several.voltage_v)).max() < 0.3
+    assert np.abs(several.voltage_v - single.voltage_v).max() < 0.5
+
+
 @pytest.mark.parametrize("model", ["espm", "dfn"])
 def test_a_rate_factor_is_a_rate_and_a_double_layer_of_the_file_that_of_the_effect(nmc, load, model):
     time, current = load

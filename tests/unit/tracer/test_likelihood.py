@@ -1,16 +1,19 @@
 """The likelihood against brute force: dense covariances, refits without a block, draws of its noise."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from aesi.errors import FitError
 from aesi.numerics.metrics import rms
 from aesi.numerics.noise.discrepancy import CORRELATION_LENGTHS_S, whiten
 from aesi.physics import simulate
 from aesi.physics.effects import CATALOGUE
 from aesi.records import Measurement
 from aesi.tracer.case.blocks import Blocks, blocks_of
+from aesi.tracer.case.free_parameter import values_of
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import prepare_all
 from aesi.tracer.likelihood.fit import HypothesisFitter, beyond_expected
@@ -92,6 +95,33 @@ def test_what_the_data_push_beyond_a_bound_is_held_there_and_scored_as_if_it_wer
     assert score.shift == pytest.approx([1.0, *two.shift])
     assert score.covariance[1:, 1:] == pytest.approx(two.covariance)
     assert not score.covariance[0].any()
+
+
+def test_sensitivities_that_lose_the_prior_in_the_rounding_of_their_sums_have_no_score(
+    cell, few, make, monkeypatch
+):
+    steep = 1e10 * RNG.normal(size=(N, 1)) + RNG.normal(size=(N, 2))
+    table, log_det = whiten(np.column_stack([RNG.normal(size=N), steep]), TIME, STARTS[:-1], AMPLITUDE, WHITE)
+    bounds = np.tile([-1.0, 1.0], (2, 1))
+    with pytest.raises(FitError, match="too steeply"):
+        score_at_size(BLOCKS, block_sums(BLOCKS, table, log_det), np.zeros(2), bounds, Size(1.0), 0.0)
+    problem = InverseProblem(cell, prepare_all(cell, [make()], 0.9, 0.3), few)
+    fitter = HypothesisFitter(problem, blocks_of(problem), ())
+    x, rows = np.zeros(len(fitter.free)), len(problem.measured)
+    assert fitter.finished(x) is not None
+    monkeypatch.setattr(fitter, "jacobian", lambda x, e: 1e10 * RNG.normal(size=(rows, len(x))))
+    assert fitter.finished(x) is None
+
+
+def test_a_voltage_of_no_cell_is_no_prediction(cell, few, make, monkeypatch):
+    """The symptom: an empty cell with plating at 1e120 V ended a search in `Matrix is not positive definite`."""
+    problem = InverseProblem(cell, prepare_all(cell, [make()], 0.9, 0.3), few)
+    values = values_of(problem.free(()), np.zeros(len(problem.free(()))), ())
+    assert problem.predict(values) is not None
+    for beyond in (1e120, -200.0, np.nan):
+        far = SimpleNamespace(voltage_v=np.full(len(problem.measured), beyond))
+        monkeypatch.setattr(InverseProblem, "run", lambda self, *a, far=far, **k: far)
+        assert problem.predict(values) is None
 
 
 @pytest.mark.parametrize("bounds", [(-1.0, 1.0), (-1.0, 0.0)])
