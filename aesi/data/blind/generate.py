@@ -15,6 +15,7 @@ from aesi.data.blind.duty import TESTS, DutyConditions
 from aesi.data.blind.recipes import RECIPES, Recipe, Written
 from aesi.data.blind.spread import parametrisation
 from aesi.data.blind.strangers import STRANGERS
+from aesi.data.laboratory.change import Values
 from aesi.data.laboratory.instrument import Instrument
 from aesi.data.laboratory.simulator import Applied, LaboratoryModel, Setup, TrueRun, simulate_truth
 from aesi.data.profiles.profile import Profile
@@ -98,7 +99,7 @@ def generate(spec: CaseSpec, cells: Mapping[str, Path]) -> BlindCase:
     truth = {f"own.{a.change}.{k}": v for a in base.own for k, v in a.values.items()}
     for name, values in sizes.items():
         as_named = RECIPES[name].as_named(values, base.declared)
-        truth.update({f"{RECIPES[name].label}.{key}": value for key, value in as_named.items()})
+        truth.update(_relative_to_file(RECIPES[name].label, as_named, base.own))
     between = max((RECIPES[name].between for name in known), default=1)
     traces = _records_with_effects(base, sizes, between)
     for name in strange:
@@ -115,6 +116,13 @@ def generate(spec: CaseSpec, cells: Mapping[str, Path]) -> BlindCase:
     )
     soc0 = spec.soc0 if spec.soc0_given else None
     return BlindCase(spec, measurements, label, also, neutral, soc0, base.declared, truth)
+
+
+def _relative_to_file(label: str, values: Values, own: Sequence[Applied]) -> dict[str, float]:
+    """Values of an effect by `label.name`, relative to the declared file as in a finding: where the cell itself has
+    another value than its file, a factor of the effect multiplies that.  own : changes of the cell itself."""
+    of_cell = {key: factor for each in own if each.change == label for key, factor in each.values.items()}
+    return {f"{label}.{key}": value * of_cell.get(key, 1.0) for key, value in values.items()}
 
 
 def _base_showing_all(

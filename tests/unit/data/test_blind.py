@@ -157,6 +157,17 @@ def test_nothing_is_nothing_and_the_noise_is_what_was_said(short_duty, cells):
     assert np.std(record.current_a[:120]) == pytest.approx(4e-3, rel=0.25)
 
 
+def test_the_size_of_an_effect_is_told_relative_to_the_file_as_a_finding_tells_it(short_duty, cells):
+    spec = CaseSpec("c", "nmc", ("positive_diffusivity",), 4.0, soc0=0.6, seed=1, spread=True)
+    truth = generate(spec, cells_in(cells)).truth
+    name = "solid_diffusivity.positive_factor"
+    of_effect = truth[name] / truth[f"own.{name}"]
+    assert truth[f"own.{name}"] != pytest.approx(1.0, abs=0.01)
+    assert of_effect == pytest.approx(1.5 ** round(np.log(of_effect) / np.log(1.5), 9))
+    assert of_effect < 1.0  # the recipe slows diffusion down
+    assert "solid_diffusivity.negative_factor" not in truth
+
+
 def test_pairs_carry_both_labels_and_strangers_are_unknown(short_duty, cells):
     pair = generate(
         CaseSpec("c", "nmc", ("series_resistance", "film_growth"), 4.0, soc0=0.6, seed=1), cells_in(cells)
