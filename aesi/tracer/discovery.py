@@ -45,6 +45,7 @@ from aesi.tracer.report.tell_apart import telling_experiment
 from aesi.tracer.report.warning import contradicted_by_v, warnings
 from aesi.tracer.report.yardstick import Yardstick, yardstick_of
 from aesi.tracer.search.archive import Archive, context_of
+from aesi.tracer.search.growths import is_testable
 
 
 @dataclass(frozen=True, eq=False)
@@ -279,6 +280,14 @@ def _discovery_of(
     files = outcomes(records, states, tested, rng)
     inside, soc0 = evidence.after.folded_cell()
     left = _structure_of(records, states["after"])
+    # A finding that may not be written is judged on the test part all the same.
+    explained = (
+        files
+        if evidence.fault is None
+        else outcomes(
+            records, states | {"after": fitted.with_file_capacity()}, tested, np.random.default_rng(0)
+        )
+    )
     return Discovery(
         cell=inside.cell,
         verdict=verdict,
@@ -296,19 +305,24 @@ def _discovery_of(
         choice=choice,
         not_adopted=evidence.fault,
         notes=(choice.sentence, *_notes(evidence, tested, left), *depletion_notes(files)),
-        contradicted=contradicted_by_v(files, verdict) is not None,
+        contradicted=contradicted_by_v(explained, verdict) is not None,
         warnings=(
             *(other.sentence(name) for name, other in at_other.items()),
-            *warnings(files, verdict, REST_C_RATE * problem.cell.capacity_ah),
+            *warnings(files, verdict, REST_C_RATE * problem.cell.capacity_ah, explained),
         ),
         other_temperature=tuple(at_other),
         good=tuple(record.name for record in records if record.good),
         written={name: (evidence.after.values or {})[name] for name in evidence.after.hypothesis},
         own={state: own_parameters(fits[state]) for state in ("recalibrated", "after")},
-        tried=problem.competing(),
+        tried=tuple(name for name in problem.competing() if _was_tried(evidence, name)),
         seconds=seconds,
         simulations=simulations,
     )
+
+
+def _was_tried(evidence: Evidence, effect: str) -> bool:
+    """Whether the records could decide on an effect in one of the searches."""
+    return any(is_testable(path.problem, effect) for path in evidence.paths.values())
 
 
 def _fitted(evidence: Evidence) -> ModelState:
@@ -329,12 +343,12 @@ def _without_fault(evidence: Evidence, others: Mapping[int, OtherTemperature]) -
 def _test_error_v(
     problem: InverseProblem, tested: Sequence[PreparedRecord], one: Explanation
 ) -> float | None:
-    """RMSE on data that no fit has seen, V; None where the model cannot be simulated there."""
+    """RMSE on data that no fit has seen, V; None without such data, or where the model cannot be simulated there."""
     try:
         error_v = held_out_rmse_v(ModelState.of(problem, one).with_file_capacity(), problem.records, tested)
     except AesiError:  # it was simulated on the fit part alone
         return None
-    return error_v if np.isfinite(error_v) else None
+    return error_v if error_v is not None and np.isfinite(error_v) else None
 
 
 def _notes(evidence: Evidence, tested: Sequence[PreparedRecord], left: ResidualStructure) -> tuple[str, ...]:

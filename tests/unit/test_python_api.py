@@ -130,6 +130,10 @@ def test_a_discovery_takes_records_and_gives_table_plot_and_model(cell, record, 
     assert found.model.cell.contact_resistance_ohm == pytest.approx(1e-3, rel=0.01), "a cell file can hold it"
     folder = found.save(tmp_path / "found")
     assert {path.name for path in folder.iterdir()} == {"discovery.json", "report.html", "model"}
+    whole = aesi.discover(cell, record, soc0=SOC0, holdout=0.0, only=["series_resistance"])
+    assert whole.content["candidates"][0]["test_rmse_mv"] is None
+    with pytest.raises(InputError, match="no test part to plot; give part='fit'"):
+        whole.plot()
     assert found.warnings == ()
     assert "tracking store" not in (folder / "report.html").read_text()
 

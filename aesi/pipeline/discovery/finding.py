@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from aesi.errors import InputError
 from aesi.pipeline.discovery.discover import (
     Case,
     discovery_content,
@@ -107,10 +108,17 @@ class Finding:
         return pd.DataFrame(rows, columns=list(columns))
 
     def plot(self, part: Literal["fit", "test"] = "test") -> Figure:
-        """Measured voltage, current, and the residual of each model over time: a plotly figure."""
+        """Measured voltage, current, and the residual of each model over time: a plotly figure.
+
+        Raises InputError for the test part of a search that held none out.
+        """
         from aesi.pipeline.report.plots.records import residual_figure
 
         traces = discovery_view(self.found, self.content, "").of(part)
+        if not traces:
+            raise InputError(
+                f"nothing was held out, so that there is no {part} part to plot; give part='fit'."
+            )
         return residual_figure(traces, LABELS)
 
     def save(self, out: str | Path) -> Path:

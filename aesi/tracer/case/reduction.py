@@ -56,8 +56,8 @@ class Reduction:
 
     @property
     def notable(self) -> bool:
-        """True where the difference is too large to be neglected, or is NaN."""
-        return not self.shift_v <= max(NOTABLE_SHARE * self.noise_v, LEAST_V)
+        """True where the difference is too large to be neglected."""
+        return self.shift_v > max(NOTABLE_SHARE * self.noise_v, LEAST_V)
 
     @property
     def sentence(self) -> str:

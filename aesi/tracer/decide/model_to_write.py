@@ -76,10 +76,13 @@ def _tested(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis, allo
 
 
 def worst_ratio(one: Option, options: Sequence[Option]) -> float:
-    """The largest ratio, over left-out records, of the model's RMS error to that of the best model."""
+    """The largest ratio, over left-out records, of the model's RMS error to that of the best model; 1 where both are
+    zero."""
     least = np.min([other.left_out.by_record for other in options], axis=0)
     told = np.isfinite(least)  # a record that no model can run decides nothing
-    return float(np.max(np.array(one.left_out.by_record)[told] / least[told], initial=0.0))
+    own, least = np.array(one.left_out.by_record)[told], least[told]
+    ratios = np.divide(own, least, out=np.where(own > 0.0, np.inf, 1.0), where=least > 0.0)
+    return float(np.max(ratios, initial=0.0))
 
 
 def carries_best(options: Sequence[Option]) -> Option:

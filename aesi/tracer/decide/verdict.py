@@ -41,10 +41,10 @@ class Thresholds:
     noise raises an error by a tenth of the noise. On development cases right hypotheses left at most 0.4 mV.
     alike_sds, alike_nats : hypotheses that lag by fewer standard deviations of the paired block differences, or by
     fewer nats, are look-alikes.
-    foretold_share : least share of the rows that a hypothesis has to predict where ranges of the current, or of charge,
-    are left out; one of the two suffices. 31 right hypotheses predicted 69 to 98 % on development cases of `aesi bench
-    blind`; fits of a smooth discharge of a measured cell to its noise (the NMC cell's at 1C and C/20, cut at 50 to
-    85 %) 9 to 12 %.
+    predicted_share : least share of the rows that a hypothesis has to predict where ranges of the current, or of
+    charge, are left out; one of the two suffices. 31 right hypotheses predicted 69 to 98 % on development cases of
+    `aesi bench blind`; fits of a smooth discharge of a measured cell to its noise (the NMC cell's at 1C and C/20, cut
+    at 50 to 85 %) 9 to 12 %.
     """
 
     noise_share: float = 0.45

@@ -38,7 +38,7 @@ class CandidateEffect:
     """One effect in the ranking, in its best hypothesis.
 
     score : gain of that hypothesis on unseen data over the one without effects, nats.  test_rmse_v : its RMSE on the
-    test part, V; None where it cannot be simulated there.  parameters : name -> estimate.
+    test part, V; None without one, or where it cannot be simulated there.  parameters : name -> estimate.
     hypothesis : ids of all its effects.  remark : "in the verdict", or why the hypothesis was not chosen.
     """
 
@@ -55,23 +55,24 @@ def ranking(
     path: Path, verdict: Verdict, test_rmse_v: Callable[[Explanation], float | None]
 ) -> tuple[CandidateEffect, ...]:
     """A row for every effect that could be simulated, best first. An effect of the verdict is shown in the chosen
-    hypothesis, any other in its best one."""
-    chosen = path.chosen
+    hypothesis, any other in its best one, each with its gain at the trust that it was fitted at."""
+    chosen, search = path.chosen, path.search or path
     rows = []
     for effect in path.problem.effects.values():
-        held = [e for e in path.explanations() if effect.id in e.hypothesis]
+        held = [e for e in search.explanations() if effect.id in e.hypothesis]
         if not held:
             continue
-        best = chosen if effect.id in chosen.hypothesis else max(held, key=lambda e: e.score.total)
+        is_chosen = effect.id in chosen.hypothesis
+        where, best = (path, chosen) if is_chosen else (search, max(held, key=lambda e: e.score.total))
         named = effect.id in verdict.effects
-        remark = "in the verdict" if named else why_not_chosen(path, best)
+        remark = "in the verdict" if named else why_not_chosen(where, best)
         rows.append(
             CandidateEffect(
                 effect.id,
                 str(effect.kind),
-                path.gain(best),
+                where.gain(best),
                 test_rmse_v(best),
-                estimates(path, best, effect.id),
+                estimates(where, best, effect.id),
                 best.hypothesis,
                 remark,
             )
@@ -89,8 +90,10 @@ def why_not_chosen(path: Path, one: Explanation) -> str:
     rest = path.chosen.score.total
     if isinstance(one, FittedHypothesis) and one.at_bounds:
         return f"ends on a bound: {', '.join(one.at_bounds)}"
+    if set(one.hypothesis) == set(path.chosen.hypothesis):
+        return "the choice of the search, with which too much is left unexplained"
     gained = one.score.total - rest
-    chosen = "the chosen hypothesis" if path.chosen.hypothesis else "the declared model"
+    chosen = "the chosen hypothesis" if path.chosen.hypothesis else "the model without effects"
     higher = "higher" if gained > 0.0 else "lower"
     remark = f"scores {abs(gained):.1f} nats {higher} on unseen data than {chosen}"
     return f"{remark}, {_deciding_rule(path, one)}" if gained > 0.0 else remark

@@ -218,16 +218,14 @@ def rmse_difference(
 
 def held_out_rmse_v(
     state: ModelState, records: Sequence[PreparedRecord], tests: Sequence[PreparedRecord]
-) -> float:
-    """RMSE on the test data, thinned, V; on the fit parts where there are no test data."""
+) -> float | None:
+    """RMSE on the test data, thinned, V; None where there are none."""
     parts = [_residual_v(state, record, None)[record.lead_rows_thin :] for record in tests]
     for index, record in enumerate(records):
         if record.n_fit < len(record.thin):
             parts.append(_residual_v(state, record, index)[record.n_fit :])
     held_out = [part for part in parts if len(part)]
-    return rms(
-        np.concatenate(held_out or [_residual_v(state, record, k) for k, record in enumerate(records)])
-    )
+    return rms(np.concatenate(held_out)) if held_out else None
 
 
 def _residual_v(state: ModelState, record: PreparedRecord, index: int | None) -> Array:

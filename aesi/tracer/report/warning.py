@@ -28,17 +28,23 @@ def contradicted_by_v(files: Sequence[FileOutcome], verdict: Verdict) -> float |
     return over_v if over_v > verdict.tolerance_v else None
 
 
-def warnings(files: Sequence[FileOutcome], verdict: Verdict, rest_a: float = 0.0) -> tuple[str, ...]:
+def warnings(
+    files: Sequence[FileOutcome],
+    verdict: Verdict,
+    rest_a: float = 0.0,
+    explained: Sequence[FileOutcome] | None = None,
+) -> tuple[str, ...]:
     """Sentences where the test part contradicts a verdict that explains the data; where the written model is worse than
     another one, on the test part or on the fitted rows; where a model cannot be simulated; and where the test part has
     no load.
 
-    rest_a : current below which the cell rests, A.
+    rest_a : current below which the cell rests, A.  explained : outcomes with the model that the verdict is about in
+    place of the written one, where that is another; None where it is the same.
     """
     told = [f for f in files if not f.unsimulated]
     said = (
         *_of_unsimulated(files),
-        _of_contradiction(files, verdict),
+        _of_contradiction(files if explained is None else explained, verdict),
         _of_worse_on_tests(_tests(told), bool(verdict.effects)),
         _of_worse_on_fitted([f for f in told if f.part == "fit"]),
         _of_rest(_tests(files), rest_a),

@@ -255,7 +255,8 @@ def refitted(problem: InverseProblem, path: Path, archive: Archive) -> Path | No
     if base is None:
         return None
     fit = fitted_hypothesis(problem, blocks, path.chosen.hypothesis, path.chosen, archive)
-    return None if fit is None else Path(problem, blocks, base, path.steps, fit, path.notes)
+    search = path.search or path
+    return None if fit is None else Path(problem, blocks, base, path.steps, fit, path.notes, search=search)
 
 
 def _grown(growths: Sequence[EffectGrowth], archive: Archive) -> tuple[list[Grown], list[str]]:

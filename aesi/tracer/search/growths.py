@@ -118,7 +118,7 @@ def addable(parent: Parent) -> list[str]:
     return [
         name
         for name in parent.problem.competing()
-        if name not in parent.fit.hypothesis and _is_testable(parent.problem, name)
+        if name not in parent.fit.hypothesis and is_testable(parent.problem, name)
     ]
 
 
@@ -129,7 +129,7 @@ def grown_with(parent: Parent, names: Sequence[str], archive: Archive) -> list[G
     return [one for one in grow_all(growths, archive) if one is not None]
 
 
-def _is_testable(problem: InverseProblem, name: str) -> bool:
+def is_testable(problem: InverseProblem, name: str) -> bool:
     """Whether the records can decide on an effect. They cannot where it infers a quantity that every record holds,
     where it restates parameters of a file that was fitted to this very cell, or where, beside good records, all records
     of a cell share it."""

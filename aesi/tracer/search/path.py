@@ -38,6 +38,8 @@ class Path:
     """A finished search.
 
     base : the hypothesis without effects.  chosen : the hypothesis that was chosen.
+    search : the search whose choice this one is, refitted at another trust; None for a search itself. Scores at one
+    trust do not compare with those at another, and `steps` are those of the search.
     beyond_reach_v : error beyond noise that all effects together leave, V, where that was too large to fit any; else
     None.
     """
@@ -49,6 +51,7 @@ class Path:
     chosen: FittedHypothesis
     notes: tuple[str, ...] = ()
     beyond_reach_v: float | None = None
+    search: Path | None = None
 
     def explanations(self) -> list[Explanation]:
         """Every hypothesis that was tried, once: its best fit with the whole model, else its best growth."""

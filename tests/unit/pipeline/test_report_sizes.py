@@ -28,6 +28,7 @@ def discovery(effect, kind, parameters, verdict="found", recalibrated=5.0):
         (value(-14.1, -15.2, -12.9, "K"), "-14.1 K [-15.2, -12.9]"),
         (value(0.6, 0.5, 0.7, "dimensionless"), "0.60 [0.50, 0.70]"),
         (value(1250.0, 900.0, 1600.0, "J/K"), "1250 J/K [900, 1600]"),
+        (value(3.2e-9, 1e-9, 1e-8, "m/s"), "3.20e-09 m/s [1.00e-09, 1.00e-08]"),
     ],
 )
 def test_a_quantity_has_its_interval_and_the_digits_that_it_deserves(given, text):

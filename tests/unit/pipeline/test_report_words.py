@@ -523,6 +523,15 @@ def test_an_unknown_says_which_effects_were_tried(views, tried, phrase):
     )
 
 
+def test_who_gave_a_known_good_record_was_told_to_give_one(views):
+    alone = views.discovery_view(200, verdict="unknown").discovery
+    beside = alone | {"good": ["drive"]}
+    for said in (discoveries.reason_finding, discoveries.next_finding):
+        assert "known-good record" in said(alone)
+        assert "known-good record" not in said(beside)
+    assert discoveries.next_finding(beside).endswith("start it from the declared file.")
+
+
 def test_an_unknown_says_what_came_nearest_and_what_to_do_next(views):
     view = views.discovery_view(200, verdict="unknown")
     said = discoveries.next_finding(view.discovery, view.titles)

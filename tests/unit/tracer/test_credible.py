@@ -1,5 +1,6 @@
 """Intervals of parameters inside their bounds and on them, against densities worked out by quadrature."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from unittest.mock import Mock
 
@@ -21,7 +22,7 @@ from aesi.tracer.report.candidate_effects import (
     why_not_chosen,
 )
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.forward import forward_search
+from aesi.tracer.search.forward import forward_search, refitted
 
 
 def posterior(gram, moment, x):
@@ -103,6 +104,27 @@ def test_what_said_more_of_unseen_data_and_was_not_taken_had_no_reason():
     assert why_not_chosen(path, fitted(("porosity",), 99.0, 95.0)) == (
         "scores 1.0 nats lower on unseen data than the chosen hypothesis"
     )
+    assert why_not_chosen(path, chosen) == "the choice of the search, with which too much is left unexplained"
+
+
+def test_gains_of_what_was_not_chosen_are_of_the_search_not_of_the_trust_that_its_choice_was_refitted_at(
+    cell, few, make
+):
+    """The symptom: effects that gain nothing stood in the ranking with a hundred nats."""
+    data = make((CATALOGUE["series_resistance"].activate(resistance_ohm=3e-4),))
+    problem = InverseProblem(cell, prepare_all(cell, [data], 0.9, 0.3), few)
+    search = forward_search(problem, 2, Archive(None, ""))
+    exact = refitted(replace(problem, trust="exact"), search, Archive(None, ""))
+    assert exact.search is search
+    of_search, of_exact = (
+        {row.effect: row for row in ranking(one, verdict_on(search, Thresholds()), lambda _: None)}
+        for one in (search, exact)
+    )
+    for name in set(of_search) - set(search.chosen.hypothesis):
+        assert of_exact[name].score == of_search[name].score
+        assert of_exact[name].remark == of_search[name].remark
+    (named,) = search.chosen.hypothesis
+    assert of_exact[named].score == pytest.approx(exact.gain(exact.chosen))
 
 
 def test_what_a_growth_left_on_a_bound_of_its_parent_has_an_interval_too(cell, make):

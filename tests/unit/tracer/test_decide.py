@@ -347,6 +347,9 @@ def test_what_is_written_is_never_far_worse_than_another_model_on_a_record_left_
     assert worst_ratio(cold, [cold, declared, both]) == pytest.approx(1.6)
     assert carries_best([declared, cold, both]) is both
     assert carries_best([declared, option(1.0, np.inf)]) is declared
+    exact, off = option(0.0), option(1.0)
+    assert carries_best([off, exact]) is exact
+    assert (worst_ratio(exact, [exact, off]), worst_ratio(off, [exact, off])) == (1.0, np.inf)
     assert model_to_write(declared, [cold, both])[0] is both.state
     nowhere = [option(20.0, np.inf), option(5.0, np.inf)]  # of a record that none runs on nothing is told
     assert carries_best(nowhere) is nowhere[1]

@@ -39,6 +39,14 @@ def test_what_explains_the_data_and_not_the_test_part_is_contradicted(word, effe
     assert ("the finding" in sentence) == bool(effects)
 
 
+def test_a_finding_that_is_not_written_was_contradicted_by_the_declared_model():
+    right, wrong = NOISE_V * np.hypot(1.0, 0.5), NOISE_V * np.hypot(1.0, 2.0)
+    said = verdict("found", "series_resistance")
+    assert any("contradicts" in sentence for sentence in warnings([outcome(wrong)], said))
+    told = warnings([outcome(wrong)], said, explained=[outcome(right)])
+    assert not any("contradicts" in sentence for sentence in told)
+
+
 def test_nothing_contradicts_an_unknown_or_a_discovery_without_a_test_part():
     assert contradicted_by_v([outcome(4e-3)], verdict("unknown")) is None
     assert contradicted_by_v([outcome(4e-3, part="fit")], verdict("found", "film_growth")) is None

@@ -207,7 +207,7 @@ def reason_finding(discovery: Mapping[str, Any]) -> str:
     if left > allowed:
         found = "with the finding added, " if discovery["effects"] else ""
         why = f"Why: {found}{amount}; only up to {allowed:.2f} mV would count as explained."
-        return f"{why} {OF_MEASURED}" if _tried(discovery) else why
+        return f"{why} {OF_MEASURED}" if _tried(discovery) and not discovery.get("good") else why
     return f"Why: {discovery['reason']}."
 
 
@@ -220,10 +220,14 @@ def next_finding(discovery: Mapping[str, Any], titles: Mapping[str, str] | None 
     nearest = "" if best is None else f"Best candidate, not named: {hypothesis_title(best, titles or {})}"
     remark = best.get("remark") if best else ""
     nearest += f" ({remark})" if remark else ""
+    beside = (
+        ""
+        if discovery.get("good")
+        else ", or a known-good record of the cell (--good), with which the verdict can be 'found' or 'none'"
+    )
     return (
         f"{nearest}{'. ' if nearest else ''}Next: add data of another kind (a slow discharge, pulses with rests, "
-        "another temperature) to narrow down the cause, or a known-good record of the cell (--good), with which the "
-        "verdict can be 'found' or 'none'. aesi run learns a correction of the remaining error"
+        f"another temperature) to narrow down the cause{beside}. aesi run learns a correction of the remaining error"
         f"{'' if discovery['effects'] else '; start it from the declared file'}."
     )
 

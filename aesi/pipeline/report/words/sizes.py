@@ -22,6 +22,8 @@ PREFIXES = {"ohm": ("mohm", 1e3), "V": ("mV", 1e3), "A": ("mA", 1e3), "m": ("um"
 PERCENT = 100.0
 SMALL = 0.5
 """Values below this, in their own unit, are written in thousandths."""
+TINY = 1e-4
+"""Numbers below this, as they would be written, are written with an exponent."""
 ENDINGS = {"ohm/(A*hour)": "_ohm_ah", "ohm/hour**0.5": "_ohm"}
 """Unit -> ending of a name that does not spell it out."""
 
@@ -116,6 +118,8 @@ def _digits_of(value: Mapping[str, Any], numbers: Sequence[float]) -> tuple[str,
         unit, factor = PREFIXES[unit]
     digits = _digits(factor * (value["high"] - value["low"]), factor * value["value"])
     shown = "" if unit == "dimensionless" else f" {unit}"
+    if 0.0 < factor * largest < TINY:
+        return shown, [f"{factor * number:.2e}" for number in numbers]
     return shown, [f"{factor * number:.{digits}f}" for number in numbers]
 
 
