@@ -186,11 +186,38 @@ def noise_floor_v(voltage_v: Array, current_a: Array) -> float:
 
 
 def _second_difference_sd_v(voltage_v: Array, current_a: Array) -> float:
-    """As `noise_floor_v`, without its lower limits: RMS of the second differences over the root of 6, V."""
-    second = voltage_v[2:] - 2.0 * voltage_v[1:-1] + voltage_v[:-2]
+    """As `noise_floor_v`, without its lower limits: RMS of the second differences over the root of 6, V, without the
+    ohmic drop of a current that is never steady."""
+    second_v, second_a = (one[2:] - 2.0 * one[1:-1] + one[:-2] for one in (voltage_v, current_a))
     change = np.abs(np.diff(current_a))
     change = np.maximum(change[1:], change[:-1])
-    return _rms_without_outliers(second[change <= np.quantile(change, STEADIEST_SHARE)]) / float(np.sqrt(6.0))
+    steadiest = change <= np.quantile(change, STEADIEST_SHARE)
+    return _rms_without_outliers(_without_drop(second_v[steadiest], second_a[steadiest])) / float(
+        np.sqrt(6.0)
+    )
+
+
+def _without_drop(second_v: Array, second_a: Array) -> Array:
+    """(m,) V, second differences of a voltage minus their part that is proportional to those of the current (m,) A.
+
+    Of the US06 schedule at 1 Hz, whose current changes in every row, 3.9 mV of noise were told where there are 0.2,
+    and 0.5 are so; of the UDDS with 1 mV 1.8, and 1.0 are so.
+    """
+    left_v = second_v
+    for _ in range(2):  # the second time without the outliers about the first drop
+        kept = np.abs(left_v) <= LARGEST_SDS * _sd_of_quantile(left_v, 0.5)
+        square = float(second_a[kept] @ second_a[kept])
+        if not square > 0.0:
+            return left_v
+        left_v = second_v - float(second_a[kept] @ second_v[kept]) / square * second_a
+    return left_v
+
+
+def _sd_of_quantile(differences: Array, share: float) -> float:
+    """Standard deviation of differences (m,), V, read from a quantile of their magnitude as of a normal distribution;
+    at least 1 nV.  share : of that quantile."""
+    sd = float(np.quantile(np.abs(differences), share)) / float(ndtri(0.5 * (1.0 + share)))
+    return max(sd, 1e-9)
 
 
 def _rms_without_outliers(differences: Array, share: float = 0.5) -> float:
@@ -198,9 +225,7 @@ def _rms_without_outliers(differences: Array, share: float = 0.5) -> float:
 
     share : quantile of their magnitude from which that standard deviation is read, as of a normal distribution.
     """
-    size = np.abs(differences)
-    sd = float(np.quantile(size, share)) / float(ndtri(0.5 * (1.0 + share)))
-    kept = differences[size <= LARGEST_SDS * max(sd, 1e-9)]
+    kept = differences[np.abs(differences) <= LARGEST_SDS * _sd_of_quantile(differences, share)]
     return rms(kept if len(kept) > 5 else differences)
 
 

@@ -121,8 +121,18 @@ def test_averages_are_not_noisier_than_the_rows_of_a_drive_that_never_rests(cell
     current = 10.0 + np.convolve(rng.normal(0.0, 30.0, len(time)), np.ones(15) / 15, mode="same")
     voltage = simulate(cell, time, current, soc0=0.8).voltage_v + 1e-3 * rng.normal(size=len(time))
     record = prepare(cell, Measurement(time, current, voltage, name="restless"), 0.8, 0.0)
-    assert noise_floor_v(record.thin.voltage_v, record.thin.current_a) > 1.5 * record.noise_full_v
-    assert record.noise_v == pytest.approx(record.noise_full_v, rel=0.01)
+    assert record.noise_full_v == pytest.approx(1e-3, rel=0.05)
+    assert 1e-3 / np.sqrt(10.0) < record.noise_v < record.noise_full_v
+
+
+@pytest.mark.parametrize(("noise_v", "most_v"), [(2e-4, 7e-4), (1e-3, 1.3e-3)])
+def test_the_drop_of_a_current_that_is_never_steady_was_told_as_noise(cell, rng, noise_v, most_v):
+    """The symptom: 3.9 mV of noise in a US06 at 1 Hz, below which nothing was found."""
+    time = np.arange(1200.0)
+    current = 10.0 + np.convolve(rng.normal(0.0, 60.0, len(time)), np.ones(15) / 15, mode="same")
+    voltage = simulate(cell, time, current, soc0=0.8).voltage_v
+    told = noise_floor_v(voltage + noise_v * rng.normal(size=len(time)), current)
+    assert noise_v < told < most_v  # what is left is the answer of kinetics and diffusion
 
 
 def test_noise_floor_is_found_under_a_drive(rng):
