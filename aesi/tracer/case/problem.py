@@ -304,7 +304,7 @@ class InverseProblem:
 
     @cached_property
     def independent(self) -> Array:
-        """(n,) number of independent samples of the model error that each row stands for.
+        """(n,) number of independent samples of the model error that each row stands for, at most 1.
 
         A record has as many as its time or its charge allows, whichever is less, shared out over its rows by time. The
         error does not change while no charge moves, so that a rest or a pause of the logger, however long, counts as
@@ -318,7 +318,7 @@ class InverseProblem:
             number = min(float(duration_s.sum()) / INDEPENDENT_S, by_charge)
             if self.trust == "beside":
                 number *= BESIDE_TIMES
-            out.append(duration_s / duration_s.sum() * max(number, 1.0))
+            out.append(np.minimum(duration_s / duration_s.sum() * max(number, 1.0), 1.0))
         joined = np.concatenate(out)
         return joined * self.compared if self.trust == "beside" else joined
 

@@ -167,6 +167,13 @@ def test_a_rest_and_a_pause_of_the_logger_took_the_evidence_from_the_load(cell, 
     assert samples_under_load(cell, paused) > alone - 1.0
 
 
+def test_a_row_is_no_more_than_one_independent_sample(cell):
+    """The symptom: thirty rows, 600 s apart under C/2, counted as 48 samples."""
+    time = np.append(np.arange(0.0, 600.0, 5.0), 600.0 * np.arange(1.0, 11.0))
+    run = simulate(cell, time, np.where(time < 100.0, 0.0, 0.5 * cell.nominal_capacity_ah), soc0=0.9)
+    assert samples_under_load(cell, Measurement(time, run.current_a, run.voltage_v, name="sparse")) <= 13.0
+
+
 def test_draws_have_the_variance_that_is_whitened():
     rng = np.random.default_rng(0)
     draws = np.linalg.cholesky(covariance()) @ rng.normal(size=(N, 400))
