@@ -353,7 +353,7 @@ class SearchConfig(Section):
     weights : weights of the losses (out-of-bag, validation, sparsity) in the scalar fitness, gamma in the paper.
     warm_start : whether the search begins with a few simple candidates (strong ridge, whole library).
     timeout_s : s, time after which one candidate counts as failed.
-    memory_mb : MB of address space that a candidate may take beyond what its process has before it; one that takes more
+    memory_mb : MB, address space that a candidate may take beyond what its process has before it; one that takes more
     counts as failed. On Linux only. Under Dask it is the limit of each thread of a worker, whose threads share the sum
     of their limits.
     workers : number of processes that evaluate candidates.
