@@ -112,7 +112,7 @@ class Discovery:
     other_temperature : names of the records, tests included, that contradict their temperature and that no model
     fitted at that temperature explains.
     good : names of the records that are known to be good, from which the verdict says how the others differ.
-    seconds : spent.  simulations : spent on the hypotheses that were tried, not on judging them.
+    seconds : spent on the search.  simulations : spent on the hypotheses that were tried, not on judging them.
     """
 
     cell: Cell

@@ -132,7 +132,7 @@ def rounded(value: float, unit: str) -> str:
 
 
 def two_digits(value: float) -> str:
-    """A number to two digits, without an exponent where it is large: '170' and not '1.7e+02'."""
+    """A number to two digits, without an exponent up to a million: '170' and not '1.7e+02'."""
     return f"{float(f'{value:.2g}'):g}"
 
 
