@@ -67,7 +67,9 @@ def _objections(discovery: Mapping[str, Any]) -> list[str]:
     """Clauses on what contradicts a verdict or the written model; empty if nothing does."""
     records = discovery.get("other_temperature", ())
     said = (
-        f"the voltage of {listed(records)} contradicts its temperature" if records else "",
+        f"the voltage of {listed(records)} contradicts {'its' if len(records) == 1 else 'their'} temperature"
+        if records
+        else "",
         "the test part contradicts it" if discovery.get("contradicted") else "",
         _worse_on_test(discovery) or _worse_on_fit(discovery),
     )
