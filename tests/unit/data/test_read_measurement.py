@@ -337,6 +337,26 @@ def test_a_unit_in_the_name_is_believed(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("quantity", "name"),
+    [
+        ("time_s", "Time [m]"),
+        ("time_s", "Time (mn)"),
+        ("time_s", "Time / ks"),
+        ("current_a", "Current [mA/cm2]"),
+        ("current_a", "Current [% of C]"),
+        ("current_a", "Current [dA]"),
+        ("voltage_v", "U (cV)"),
+    ],
+)
+def test_an_unknown_unit_in_a_name_was_taken_for_si(tmp_path, quantity, name):
+    content = text(header=HEADER.replace(quantity, name))
+    message = refusal(tmp_path, content, columns={quantity: name})
+    assert f"declare the one it is in, as in --unit {quantity}=" in message
+    si = quantity.rpartition("_")[2]
+    assert len(read_measurement(tmp_path / "drive.csv", {quantity: name}, units={quantity: si})) == N
+
+
+@pytest.mark.parametrize(
     ("content", "word"),
     [
         (b"", "empty"),
