@@ -145,24 +145,22 @@ def run_within(rows: int, most: int) -> int:
 def in_runs(measurement: Measurement, run: int) -> Measurement:
     """`decimate` by the number of rows in each run; unchanged where that is one.
 
-    The averages hold since the row before, whatever the rows did: a current that was declared linear between rows is
-    declared as held from then on, which keeps the charge.
+    The averages hold since the row before, whatever the rows did: the current is averaged as it is taken to run between
+    the rows, and declared as held from then on, which keeps the charge.
     """
     if run == 1:
         return measurement
     n = len(measurement)
     left = (n - 1) % run
     last = "the last row, no whole run, was" if left == 1 else f"the last {left} rows, no whole run, were"
-    straight = measurement.hold == "linear"
     note = f"Decimated from {n:,} to {{rows:,}} rows: runs of {run} rows, {{how}}"
-    note += ", over which the current is constant from here on" if straight else ""
+    note += ", over which the current is constant from here on" if measurement.hold != "backward" else ""
     note += f"; {last} left out." if left else "."
     stamps = measurement.time_s[::run]
-    few = _resampled_to(measurement, stamps, note, "backward")
-    if not straight:
+    few = _resampled_to(measurement, stamps, note, "backward").held("backward")
+    if measurement.hold_taken == "backward":
         return few
-    current = BetweenStamps(measurement.time_s, stamps).linear(measurement.current_a)
-    return replace(few, current_a=current, hold="backward")
+    return replace(few, current_a=BetweenStamps(measurement.time_s, stamps).linear(measurement.current_a))
 
 
 def _resampled_to(measurement: Measurement, stamps: Array, note: str, hold: Hold) -> Measurement:

@@ -120,6 +120,16 @@ def test_a_ramp_declared_straight_between_rows_lost_charge_where_it_was_thinned(
     assert "constant from here on" in few.notes[0]
 
 
+@pytest.mark.parametrize("step_s", [1.0, 10.0])
+def test_a_record_without_a_declared_hold_lost_charge_where_it_was_thinned(step_s):
+    time = step_s * np.arange(101.0)
+    record = measurement(time, 1.0 + time**2)
+    few = decimate(record, 11)
+    taken_ah, given_ah = (m.discharged_ah(m.hold_taken)[-1] for m in (few, record))
+    assert taken_ah == pytest.approx(given_ah, rel=1e-12)
+    assert few.hold == "backward"
+
+
 def test_a_row_is_after_a_gap_where_none_is_a_step_before_it():
     time_s = np.array([0.0, 1.0, 2.4, 5.0, 8.0])
     np.testing.assert_array_equal(after_gap(time_s, 1.0), [False, False, False, True, True])
