@@ -87,6 +87,27 @@ class Rows:
         )
         return current, voltage
 
+    def held_charge(self, at_s: Array) -> Array:
+        """(m,) A s from the first row up to these times, with the current held since the row before."""
+        charge = np.concatenate([[0.0], np.cumsum(self.current_a[1:] * np.diff(self.time_s))])
+        return np.interp(at_s, self.time_s, charge)
+
+    def straight_charge(self, at_s: Array) -> Array:
+        """(m,) A s from the first row up to these times, with the current straight between rows."""
+        return self._straight_area(self.current_a, at_s)
+
+    def straight_voltage(self, at_s: Array) -> Array:
+        """(m,) V s from the first row up to these times, with the voltage straight between rows."""
+        return self._straight_area(self.voltage_v, at_s)
+
+    def _straight_area(self, column: Array, at_s: Array) -> Array:
+        step = np.diff(self.time_s)
+        area = np.concatenate([[0.0], np.cumsum(0.5 * (column[1:] + column[:-1]) * step)])
+        row = np.clip(np.searchsorted(self.time_s, at_s, side="right") - 1, 0, len(step) - 1)
+        since = at_s - self.time_s[row]
+        slope = (column[row + 1] - column[row]) / step[row]
+        return np.asarray(area[row] + column[row] * since + 0.5 * slope * since**2)
+
 
 def written_decimals(column: Array) -> int:
     """Number of decimals in which a column (n,) is written, at most MOST_DECIMALS."""
