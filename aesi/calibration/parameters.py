@@ -213,8 +213,8 @@ def _check_name(name: str, known: Collection[str]) -> None:
 
 
 def _with_prior(one: FitParameter, prior: Prior) -> FitParameter:
-    above = 0.0 < prior.value < np.inf
-    if not (above if one.factor else one.low <= prior.value <= one.high) or not 0.0 < prior.sd < np.inf:
+    inside = prior.value > 0.0 if one.factor else one.low <= prior.value <= one.high
+    if not (inside and np.isfinite(prior.value)) or not 0.0 < prior.sd < np.inf:
         most = "" if np.isinf(one.high) else f" to {one.high:.4g}"
         between = "above 0" if one.factor else f"from {one.low:.4g}{most}"
         raise InputError(

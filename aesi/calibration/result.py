@@ -48,15 +48,20 @@ class Interval:
 
 
 def ends_sentences(
-    costs: Sequence[float], ends: Sequence[Mapping[str, Interval]], of_file: int
+    costs: Sequence[float], ends: Sequence[Mapping[str, Interval]], of_file: int, failed: int = 0
 ) -> tuple[str, ...]:
-    """A sentence on how far apart the fits from several starts end; empty for a single start.
+    """Sentences on how far apart the fits from several starts end, and on those that failed; empty for a single start.
 
     costs : of each end, nats, the end that is taken first.  ends : the parameters there, with the intervals of that
-    end.  of_file : index of the end that was reached from the start file.
+    end.  of_file : index of the end that was reached from the start file.  failed : number of drawn starts from which
+    there is no end, since they cannot be simulated.
     """
+    lost = (
+        f"{failed} of {failed + len(costs) - 1} drawn start{'s' if failed + len(costs) > 2 else ''} cannot be "
+        "simulated on these records and gave no end.",
+    ) * bool(failed)
     if len(costs) == 1:
-        return ()
+        return lost
     taken, *others = ends
     apart = [
         name
@@ -78,6 +83,7 @@ def ends_sentences(
             if apart
             else "All parameters there lie within their 95 % intervals."
         ),
+        *lost,
     )
 
 
