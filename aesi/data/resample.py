@@ -18,6 +18,7 @@ import numpy as np
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 from aesi.records import Hold, Measurement
+from aesi.records.checked import check_whole_number, is_finite_number
 from aesi.records.steps import TOLERANCE, after_gap
 
 DENSE = 0.75
@@ -109,8 +110,10 @@ def to_even(measurement: Measurement, dt_s: float, hold: Hold = "backward") -> M
     if not len(time):
         raise DataError(f"{measurement.name} has no row to resample; give one that has.")
     length = float(time[-1] - time[0])
-    if not dt_s > 0:
-        raise DataError(f"{measurement.name}: a step of {dt_s:g} s is not possible; give one above 0.")
+    if not (is_finite_number(dt_s) and dt_s > 0):
+        raise DataError(
+            f"{measurement.name}: a step of {dt_s!r} s is not possible; give a number of seconds above 0."
+        )
     if dt_s > length:
         raise DataError(
             f"{measurement.name} lasts {length:g} s, which is less than a step of {dt_s:g} s; give a longer record."
@@ -129,8 +132,10 @@ def to_even(measurement: Measurement, dt_s: float, hold: Hold = "backward") -> M
 def decimate(measurement: Measurement, max_rows: int) -> Measurement:
     """At most max_rows rows: averages over runs of consecutive rows, stamped at their ends, with a note.
 
-    Rows after the last complete run are left out, which the note states.
+    Rows after the last complete run are left out, which the note states. Raises InputError where max_rows is no whole
+    number, DataError where it leaves nothing.
     """
+    check_whole_number(f"{measurement.name}: max_rows", max_rows, 1)
     n = len(measurement)
     if max_rows < min(n, 2):
         raise DataError(f"{measurement.name}: max_rows = {max_rows} leaves nothing; give at least 2.")

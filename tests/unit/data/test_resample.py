@@ -12,7 +12,7 @@ from aesi.data.resample import (
     off_rows,
     to_even,
 )
-from aesi.errors import DataError
+from aesi.errors import DataError, InputError
 from aesi.records import Measurement
 from aesi.records.steps import after_gap
 
@@ -73,6 +73,17 @@ def test_impossible_steps_are_refused(step):
 def test_a_record_without_rows_ended_in_an_index_error():
     with pytest.raises(DataError, match="has no row to resample"):
         to_even(Measurement([], [], []), 1.0)
+
+
+def test_a_step_in_words_ended_in_a_type_error():
+    with pytest.raises(DataError, match="a step of '1' s is not possible"):
+        to_even(measurement(np.arange(10.0), np.ones(10)), "1")
+
+
+@pytest.mark.parametrize("most", [2.5, "10", True])
+def test_decimation_to_no_whole_number_of_rows_is_refused(most):
+    with pytest.raises(InputError, match=r"max_rows = .* is not a whole number"):
+        decimate(measurement(np.arange(10.0), np.ones(10)), most)
 
 
 @given(n=st.integers(3, 400), most=st.integers(2, 50))
