@@ -2,10 +2,10 @@
 
 A program that brings a record to another step writes straight lines between its rows, the row before, after or nearest,
 means over the rows of a step, or means over its time, as `aesi.data.to_even` and `decimate` do: of the voltage in
-straight lines, and of a current that is held or straight. Each is made again of one record at the times of the other, with both clocks alike, or
-both beginning at their first rows, and compared where the current moves or the voltage bends, to the coarser of the two
-files' decimals: along a smooth slide two tests of one kind are alike. So a smooth slide alone is not told, nor a part
-that was resampled and whose clock was moved as well.
+straight lines, and of a current that is held or straight. Each is made again of one record at the times of the other,
+with both clocks alike, or both beginning at their first rows, and compared where the current moves or the voltage
+bends, to the coarser of the two files' decimals: along a smooth slide two tests of one kind are alike. So a smooth
+slide alone is not told, nor a part that was resampled and whose clock was moved as well.
 """
 
 from __future__ import annotations
