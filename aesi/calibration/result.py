@@ -284,7 +284,8 @@ def undetermined(model: Model, jacobian: Array) -> tuple[Undetermined, ...]:
 
 
 def at_bounds(model: Model, x: Array) -> tuple[str, ...]:
-    """Names of the parameters that ended on a bound of their range; a resistance of zero does not count."""
+    """Names of the parameters that ended within BOUND_SHARE of their range of one of its bounds; a lower bound of zero,
+    as of a resistance, does not count."""
     width = BOUND_SHARE * (model.high - model.low)
     return tuple(
         f.name
