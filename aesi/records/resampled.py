@@ -138,10 +138,8 @@ def _means(one: Rows, step_s: float, begin_s: Array) -> Iterator[list[Array]]:
 def _means_in_time(one: Rows, begin_s: Array, step_s: float) -> tuple[list[Array], list[Array]]:
     """Current and voltage (rows,) of `one` in the mean of the time of a step, with the current held since the row
     before, and straight between rows; the voltage is straight in both."""
-    held, *straight = (
-        (area(begin_s + step_s) - area(begin_s)) / step_s
-        for area in (one.held_charge, one.straight_charge, one.straight_voltage)
-    )
+    ends = zip(one.areas_at(begin_s), one.areas_at(begin_s + step_s), strict=True)
+    held, *straight = ((end - begin) / step_s for begin, end in ends)
     return [held, straight[1]], straight
 
 

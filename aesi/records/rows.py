@@ -87,26 +87,36 @@ class Rows:
         )
         return current, voltage
 
-    def held_charge(self, at_s: Array) -> Array:
-        """(m,) A s from the first row up to these times, with the current held since the row before."""
-        charge = np.concatenate([[0.0], np.cumsum(self.current_a[1:] * np.diff(self.time_s))])
-        return np.interp(at_s, self.time_s, charge)
+    @cached_property
+    def areas(self) -> tuple[Array, Array, Array]:
+        """(n,) from the first row up to each: A s of the current held since the row before, A s of it straight between
+        rows, V s of the voltage straight between rows."""
+        steps = np.diff(self.time_s)
+        held, current, voltage = (
+            np.concatenate([[0.0], np.cumsum(heights * steps)])
+            for heights in (
+                self.current_a[1:],
+                0.5 * (self.current_a[1:] + self.current_a[:-1]),
+                0.5 * (self.voltage_v[1:] + self.voltage_v[:-1]),
+            )
+        )
+        return held, current, voltage
 
-    def straight_charge(self, at_s: Array) -> Array:
-        """(m,) A s from the first row up to these times, with the current straight between rows."""
-        return self._straight_area(self.current_a, at_s)
+    def areas_at(self, at_s: Array) -> tuple[Array, Array, Array]:
+        """(m,) each, the `areas` up to these times."""
+        held, current, voltage = self.areas
+        row = np.clip(np.searchsorted(self.time_s, at_s, side="right") - 1, 0, len(self.time_s) - 2)
+        since, step = at_s - self.time_s[row], self.time_s[row + 1] - self.time_s[row]
 
-    def straight_voltage(self, at_s: Array) -> Array:
-        """(m,) V s from the first row up to these times, with the voltage straight between rows."""
-        return self._straight_area(self.voltage_v, at_s)
+        def straight(area: Array, column: Array) -> Array:
+            slope = (column[row + 1] - column[row]) / step
+            return np.asarray(area[row] + column[row] * since + 0.5 * slope * since**2)
 
-    def _straight_area(self, column: Array, at_s: Array) -> Array:
-        step = np.diff(self.time_s)
-        area = np.concatenate([[0.0], np.cumsum(0.5 * (column[1:] + column[:-1]) * step)])
-        row = np.clip(np.searchsorted(self.time_s, at_s, side="right") - 1, 0, len(step) - 1)
-        since = at_s - self.time_s[row]
-        slope = (column[row + 1] - column[row]) / step[row]
-        return np.asarray(area[row] + column[row] * since + 0.5 * slope * since**2)
+        return (
+            np.interp(at_s, self.time_s, held),
+            straight(current, self.current_a),
+            straight(voltage, self.voltage_v),
+        )
 
 
 def written_decimals(column: Array) -> int:
