@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from aesi.constants import SECONDS_PER_HOUR
+from aesi.errors import InputError
 from aesi.numerics.typing import Array
 
 if TYPE_CHECKING:
@@ -47,7 +48,10 @@ def over_time(
     """A plotly figure: panels below one another over a common time, from the first sample.
 
     time_s : (n,) s.  panels : axis title with unit -> name -> (n,).  band : name, lower and upper (n,), in the first.
+    Raises InputError where there is no row.
     """
+    if not len(time_s):
+        raise InputError("there is no row to draw; give a record that has rows.")
     from plotly.graph_objects import Scatter
     from plotly.subplots import make_subplots
 

@@ -3,10 +3,10 @@
 Each benchmark is a module with a generator `run`, whose rows `aesi bench NAME --json` prints, one JSON object per line.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from typing import Any, TypeVar
 
-from aesi.errors import InputError
+from aesi.errors import InputError, did_you_mean
 
 CaseRow = dict[str, Any]
 """One row of a benchmark: key -> value that JSON can hold. The last part of a key is the unit (`rmse_mv`, `ours_s`)."""
@@ -41,3 +41,12 @@ def some_chosen(name: str, cases: Sequence[Chosen], names: Iterable[str]) -> Seq
             f"For only=... there are: {there}."
         )
     return cases
+
+
+def check_listed(option: str, given: Iterable[str], known: Collection[str]) -> None:
+    """Raises InputError for the first value of a benchmark's option that is none of those it knows."""
+    for name in given:
+        if name not in known:
+            raise InputError(
+                f"{option}: there is no {name!r}{did_you_mean(name, known)} There are: {', '.join(known)}."
+            )

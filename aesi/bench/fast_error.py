@@ -85,7 +85,7 @@ def fast_error(case: RealCase, cells: str = "experiments/cells") -> dict[str, An
 
 def lasts_s(time_s: Array, error: Array) -> float:
     """Integral correlation time of an error, s: 1 s plus twice the sum of its autocorrelation over lags of whole
-    seconds, up to the first lag without positive correlation and at most 120 s.
+    seconds, up to the first lag without positive correlation and at most 119 s.
 
     time_s : (n,) s, increasing.  error : (n,) V.
     """

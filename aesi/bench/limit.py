@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from types import FrameType
@@ -71,7 +71,7 @@ LOST = NoAnswer(
 )
 """Outcome of a case whose process was ended by the operating system."""
 NO_TIME: CaseRow = {"processor_s": 0.0, "ours_s": 0.0}
-"""Times of a case whose stopwatch was lost with its process."""
+"""Times of a case whose stopwatch was lost with its process; `timed` leaves it out."""
 
 
 def answer_of(look: Callable[[], T], limit_s: float | None) -> T | NoAnswer:
@@ -84,6 +84,11 @@ def answer_of(look: Callable[[], T], limit_s: float | None) -> T | NoAnswer:
         return NoAnswer(ERROR, str(error))
     except OutOfTime:
         return NoAnswer(OUT_OF_TIME, f"more than {limit_s:g} s of processor time")
+
+
+def timed(rows: Sequence[CaseRow]) -> list[CaseRow]:
+    """The rows of the cases that were timed: not those whose stopwatch was lost."""
+    return [row for row in rows if row["processor_s"] > NO_TIME["processor_s"]]
 
 
 @dataclass(frozen=True)

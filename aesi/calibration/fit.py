@@ -54,7 +54,7 @@ from aesi.calibration.start import (
 )
 from aesi.calibration.written_cell import capacities, start_soc, written_cell
 from aesi.constants import ZERO_CELSIUS_K
-from aesi.errors import DataError, FitError, InputError
+from aesi.errors import DataError, FitError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
@@ -63,7 +63,10 @@ from aesi.physics.cell.health import day_of
 from aesi.physics.depletion import ran_out
 from aesi.physics.record_checks import check_voltage, other_materials_sentence
 from aesi.records import Measurement, Spectrum, measured_on_case
+from aesi.records.checked import check_row, check_whole_number
 
+FEWEST_ROWS = 2
+"""Of a record: one row has no time in which a current flows."""
 EVALUATIONS = 100
 """Most evaluations of one descent. The fits behind the shipped files of the Panasonic NCR18650PF and the LG 18650HG2
 need fewer."""
@@ -112,12 +115,12 @@ def calibrate(
     starts : number of fits: one from the file, the others from cells drawn from the priors with `seed`. The end of the
     highest posterior density is taken, and a note says how far apart the ends are.
     Raises DataError for records that do not belong to the cell; FitError where the start cannot be simulated;
-    InputError for less than one start.
+    InputError for less than one start or evaluation.
     """
     began = time.perf_counter()
     conditions = conditions or Conditions()
-    if starts < 1:
-        raise InputError(f"starts = {starts}: give the number of fits, at least 1.")
+    check_whole_number("evaluations", evaluations, 1)
+    check_whole_number("starts", starts, 1)
     start_model, notes = prepared_model(cell, records, conditions)
     ends = _fit_ends(start_model, starts, seed, evaluations, on_step)
     model, x, found = ends[0].model, ends[0].x, ends[0].cell
@@ -144,7 +147,10 @@ def calibrate(
             *_moved_start_sentences(model, begun),
             *ends[0].heat_sentences,
             *ends_sentences(
-                [end.cost for end in ends], parameters, [end.from_file for end in ends].index(True)
+                [end.cost for end in ends],
+                parameters,
+                [end.from_file for end in ends].index(True),
+                starts - len(ends),
             ),
         ),
         seconds=time.perf_counter() - began,
@@ -331,12 +337,18 @@ def _checked_records(
 ) -> tuple[Measurement, ...]:
     """The records with names of their own.
 
-    Raises DataError where there is none, and for one that is no record of the cell or has no current.
+    Raises DataError where there is none, and for one that has too few rows, lacks a voltage or a current, or is no
+    record of the cell.
     """
     if not records:
         raise DataError("give at least one record to calibrate with.")
     named = uniquely_named(records, {"temperature": conditions.temperatures_degc, "date": conditions.dates})
     for record in named:
+        if len(record) < FEWEST_ROWS:
+            raise DataError(
+                f"{record.name} has too few rows ({len(record)}) to be fitted; a record needs at least {FEWEST_ROWS}."
+            )
+        check_row(record.voltage_v, f"{record.name}: voltage_v")
         check_voltage(cell, record)
         if not record.current_a.any():
             raise DataError(

@@ -34,9 +34,10 @@ COURSE_POINTS = 65
 class FitParameter:
     """One parameter that a fit moves.
 
-    start : value at the start, 1 for a factor on the start file's value.  sd : standard deviation of the prior about
-    it.  source : of the prior.  factor : True where `sd` is that of the natural logarithm.  low, high : bounds of the
-    value.  given : True for a user's prior.
+    start : value at the start, which is the middle of the prior, in `unit`; of a factor on the start file's value 1, or
+    what the user's prior says.  sd : standard deviation of the prior about it.  source : of the prior.  factor : True
+    where `sd` is that of the natural logarithm.  low, high : bounds of the value where it is not; elsewhere LIMIT_SD is
+    the only one.  given : True for a user's prior.
     """
 
     name: str
@@ -50,7 +51,7 @@ class FitParameter:
     given: bool = False
 
     def value(self, z: float) -> float:
-        """The value at a working coordinate, clipped to the bounds."""
+        """The value at a working coordinate, clipped to `low` and `high` where no logarithm is taken."""
         if self.factor:
             return self.start * float(np.exp(self.sd * z))
         return min(max(self.start + self.sd * z, self.low), self.high)
@@ -213,8 +214,8 @@ def _check_name(name: str, known: Collection[str]) -> None:
 
 
 def _with_prior(one: FitParameter, prior: Prior) -> FitParameter:
-    above = 0.0 < prior.value < np.inf
-    if not (above if one.factor else one.low <= prior.value <= one.high) or not 0.0 < prior.sd < np.inf:
+    inside = prior.value > 0.0 if one.factor else one.low <= prior.value <= one.high
+    if not (inside and np.isfinite(prior.value)) or not 0.0 < prior.sd < np.inf:
         most = "" if np.isinf(one.high) else f" to {one.high:.4g}"
         between = "above 0" if one.factor else f"from {one.low:.4g}{most}"
         raise InputError(

@@ -1,12 +1,13 @@
 """Posterior samples of a calibration, drawn by emcee, to check the intervals of the linearised fit.
 
 The voltage is nearly linear in the potentials' knots, the cycler's zero, and the states of charge, the active material
-and the silicon of each record. These are integrated out in closed form about each sample, so that the walkers move in
-the global parameters alone:
+and the silicon of each record. These are integrated out in closed form, linearised once, at the fit, so that the
+walkers move in the global parameters alone:
 
     log p(z) = -1/2 (r' r - b' H^-1 b) - 1/2 log det H,      H = J_l' J_l + 1,   b = J_l' r
 
-r are the weighted residuals at z with the linear parameters at their fitted values, J_l their slopes.
+r are the weighted residuals at z with the linear parameters at their fitted values, J_l their slopes at the fit,
+whatever z is, so that det H is a constant.
 Losses between dated records are not linear: they are |e|, whose slope over its coordinate is 0.07, 0.63 and 0.91 at -2,
 0 and 2 (`Ageing.slopes`). Their intervals use the slope at the fit.
 Foreman-Mackey et al., PASP 125 (2013) 306, doi:10.1086/670067.

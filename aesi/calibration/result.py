@@ -48,15 +48,20 @@ class Interval:
 
 
 def ends_sentences(
-    costs: Sequence[float], ends: Sequence[Mapping[str, Interval]], of_file: int
+    costs: Sequence[float], ends: Sequence[Mapping[str, Interval]], of_file: int, failed: int = 0
 ) -> tuple[str, ...]:
-    """A sentence on how far apart the fits from several starts end; empty for a single start.
+    """Sentences on how far apart the fits from several starts end, and on those that failed; empty for a single start.
 
     costs : of each end, nats, the end that is taken first.  ends : the parameters there, with the intervals of that
-    end.  of_file : index of the end that was reached from the start file.
+    end.  of_file : index of the end that was reached from the start file.  failed : number of drawn starts from which
+    there is no end, since they cannot be simulated.
     """
+    lost = (
+        f"{failed} of {failed + len(costs) - 1} drawn start{'s' if failed + len(costs) > 2 else ''} cannot be "
+        "simulated on these records and gave no end.",
+    ) * bool(failed)
     if len(costs) == 1:
-        return ()
+        return lost
     taken, *others = ends
     apart = [
         name
@@ -78,6 +83,7 @@ def ends_sentences(
             if apart
             else "All parameters there lie within their 95 % intervals."
         ),
+        *lost,
     )
 
 
@@ -278,7 +284,8 @@ def undetermined(model: Model, jacobian: Array) -> tuple[Undetermined, ...]:
 
 
 def at_bounds(model: Model, x: Array) -> tuple[str, ...]:
-    """Names of the parameters that ended on a bound of their range; a resistance of zero does not count."""
+    """Names of the parameters that ended within BOUND_SHARE of their range of one of its bounds; a lower bound of zero,
+    as of a resistance, does not count."""
     width = BOUND_SHARE * (model.high - model.low)
     return tuple(
         f.name

@@ -21,7 +21,7 @@ from aesi.data.channels.temperature import temperature_doubts
 from aesi.data.readers import open_table
 from aesi.data.readers.formats.format import Sign
 from aesi.data.readers.table import TableFile
-from aesi.data.reading import Duplicates, Reading, column_name, record_name
+from aesi.data.reading import Duplicates, Reading, by_quantity, column_name, record_name
 from aesi.data.resample import decimate
 from aesi.errors import InputError
 from aesi.records import Measurement
@@ -63,18 +63,17 @@ def read_measurement(
 
     Returns a Measurement with discharge-positive current; its `notes` list all that was mapped, converted, dropped
     or averaged. Raises DataError, one sentence with file, column and first row, where the content cannot be used;
-    InputError where `path` is no file.
+    InputError where `path` is no file, or max_rows no whole number.
     """
     if not isinstance(path, str | PathLike):
         raise InputError(
             f"an object of type {type(path).__name__} is no file; what is in memory already is a record as "
             "aesi.Measurement(time_s, current_a, voltage_v)."
         )
-    given = {quantity: column_name(name) for quantity, name in (columns or {}).items()}
-    given |= {} if state is None else {"state": state}
+    given = by_quantity("columns", columns) | ({} if state is None else {"state": state})
     reading = Reading(
-        given,
-        dict(units or {}),
+        {quantity: column_name(name) for quantity, name in given.items()},
+        by_quantity("units", units),
         sign,
         cycle=None if cycle is None else str(cycle),
         step=None if step is None else str(step),

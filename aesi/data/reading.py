@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import isfinite
+from numbers import Real
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 from aesi.data.readers.formats.format import Sign
 from aesi.data.state import Direction
 from aesi.errors import DataError
+from aesi.records.checked import is_finite_number
 
 Duplicates = Literal["refuse", "first", "last"]
 SUFFIXES = (
@@ -29,6 +30,8 @@ SUFFIXES = (
     ".mat",
 )
 """Suffixes of files that are not part of a record's name."""
+
+EXAMPLES = {"columns": '{"current_a": "I"}', "units": '{"current_a": "mA"}'}
 
 
 @dataclass(frozen=True)
@@ -56,14 +59,24 @@ class Reading:
     duplicates: Duplicates | None = None
 
     def __post_init__(self) -> None:
+        for quantity, column in by_quantity("columns", self.columns).items():
+            if not (column is None or isinstance(column, str)):
+                raise DataError(
+                    f"the column of {quantity} is {column!r}; give its name as text, or None to leave the quantity out."
+                )
+        for quantity, unit in by_quantity("units", self.units).items():
+            if not isinstance(unit, str):
+                raise DataError(
+                    f"the unit of {quantity} is {unit!r}; give it as text, as in {EXAMPLES['units']}."
+                )
         _check_choice("sign", self.sign, get_args(Sign))
         _check_choice("duplicates", self.duplicates, get_args(Duplicates))
         for name in ("cycle", "step"):
             bounds(name, getattr(self, name))
         for end, time in (("from", self.start_s), ("up to", self.stop_s)):
-            if time is not None and not isfinite(time):
+            if time is not None and not is_finite_number(time):
                 raise DataError(
-                    f"a record cannot be read {end} {time:g} s; give a time in seconds, or leave it out."
+                    f"a record cannot be read {end} {time!r} s; give a time in seconds, or leave it out."
                 )
 
     @property
@@ -78,7 +91,23 @@ class Reading:
 
 def column_name(given: Any) -> Any:
     """A column as it is given; a number, which states a temperature, as text."""
-    return str(given) if isinstance(given, int | float) and not isinstance(given, bool) else given
+    if isinstance(given, bool) or not isinstance(given, Real):
+        return given
+    return str(given)
+
+
+def by_quantity(name: str, given: Any) -> dict[str, Any]:
+    """An argument that has a value for each quantity, as a dict; an empty one for None.
+
+    name : of the argument, for the sentence.  Raises DataError where it is no mapping.
+    """
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        raise DataError(
+            f"{name} = {given!r} names no quantities; give a dict from each to its value, as in {EXAMPLES[name]}."
+        )
+    return dict(given)
 
 
 def bounds(name: str, text: str | None) -> tuple[float, float] | None:
@@ -101,8 +130,8 @@ def record_name(path: str | Path) -> str:
 
 
 def record_names(paths: Sequence[Path]) -> list[str]:
-    """Names of the records in several files, all different: equal names get the name of their folder in front, and of
-    the folders above as far as needed. Files of the same folder keep their suffix then."""
+    """Names of the records in several files, different for different files: equal names get the name of their folder in
+    front, and of the folders above as far as needed. Files of the same folder keep their suffix then."""
     files = [path.resolve() for path in paths]
     names = {file: record_name(file) for file in files}
     beside = Counter((file.parent, name) for file, name in names.items())

@@ -18,6 +18,7 @@ import numpy as np
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 from aesi.records import Hold, Measurement
+from aesi.records.checked import check_whole_number, is_finite_number
 from aesi.records.steps import TOLERANCE, after_gap
 
 DENSE = 0.75
@@ -109,8 +110,10 @@ def to_even(measurement: Measurement, dt_s: float, hold: Hold = "backward") -> M
     if not len(time):
         raise DataError(f"{measurement.name} has no row to resample; give one that has.")
     length = float(time[-1] - time[0])
-    if not dt_s > 0:
-        raise DataError(f"{measurement.name}: a step of {dt_s:g} s is not possible; give one above 0.")
+    if not (is_finite_number(dt_s) and dt_s > 0):
+        raise DataError(
+            f"{measurement.name}: a step of {dt_s!r} s is not possible; give a number of seconds above 0."
+        )
     if dt_s > length:
         raise DataError(
             f"{measurement.name} lasts {length:g} s, which is less than a step of {dt_s:g} s; give a longer record."
@@ -129,8 +132,10 @@ def to_even(measurement: Measurement, dt_s: float, hold: Hold = "backward") -> M
 def decimate(measurement: Measurement, max_rows: int) -> Measurement:
     """At most max_rows rows: averages over runs of consecutive rows, stamped at their ends, with a note.
 
-    Rows after the last complete run are left out, which the note states.
+    Rows after the last complete run are left out, which the note states. Raises InputError where max_rows is no whole
+    number, DataError where it leaves nothing.
     """
+    check_whole_number(f"{measurement.name}: max_rows", max_rows, 1)
     n = len(measurement)
     if max_rows < min(n, 2):
         raise DataError(f"{measurement.name}: max_rows = {max_rows} leaves nothing; give at least 2.")
@@ -145,24 +150,22 @@ def run_within(rows: int, most: int) -> int:
 def in_runs(measurement: Measurement, run: int) -> Measurement:
     """`decimate` by the number of rows in each run; unchanged where that is one.
 
-    The averages hold since the row before, whatever the rows did: a current that was declared linear between rows is
-    declared as held from then on, which keeps the charge.
+    The averages hold since the row before, whatever the rows did: the current is averaged as it is taken to run between
+    the rows, and declared as held from then on, which keeps the charge.
     """
     if run == 1:
         return measurement
     n = len(measurement)
     left = (n - 1) % run
     last = "the last row, no whole run, was" if left == 1 else f"the last {left} rows, no whole run, were"
-    straight = measurement.hold == "linear"
     note = f"Decimated from {n:,} to {{rows:,}} rows: runs of {run} rows, {{how}}"
-    note += ", over which the current is constant from here on" if straight else ""
+    note += ", over which the current is constant from here on" if measurement.hold != "backward" else ""
     note += f"; {last} left out." if left else "."
     stamps = measurement.time_s[::run]
-    few = _resampled_to(measurement, stamps, note, "backward")
-    if not straight:
+    few = _resampled_to(measurement, stamps, note, "backward").held("backward")
+    if measurement.hold_taken == "backward":
         return few
-    current = BetweenStamps(measurement.time_s, stamps).linear(measurement.current_a)
-    return replace(few, current_a=current, hold="backward")
+    return replace(few, current_a=BetweenStamps(measurement.time_s, stamps).linear(measurement.current_a))
 
 
 def _resampled_to(measurement: Measurement, stamps: Array, note: str, hold: Hold) -> Measurement:

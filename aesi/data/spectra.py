@@ -22,6 +22,9 @@ LABEL = "spectrum"
 STATES = ("soc", "discharged_ah")
 MOST_AGAIN = 1
 """Most frequencies that may occur twice in one spectrum: one of 27 measured spectra has one such frequency."""
+MOST_BACK = 0.5
+"""Most that the frequencies of one sweep may go back, in all, as a share of the decades it spans: one that starts again
+goes back over all of them, and none of the 27 measured spectra goes back at all."""
 SLOW_HZ = 10.0
 """Frequency up to which a cell is capacitive. All rows below 1,067 Hz are, in all 27 spectra of the Panasonic
 NCR18650PF. In a cell a hundred times larger, with the inductance of longer leads, that limit is some decades lower."""
@@ -123,8 +126,8 @@ def _check_capacitive(columns: dict[str, Array], table: TableFile) -> None:
 
 
 def _check_swept_once(frequency_hz: Array, pieces: Sequence[slice], table: TableFile) -> None:
-    """Raises DataError where frequencies repeat at one state: spectra of several temperatures or days would be taken
-    for one spectrum at their mean temperature."""
+    """Raises DataError where frequencies repeat at one state, or their sweep starts again: spectra of several
+    temperatures or days would be taken for one spectrum at their mean temperature."""
     for rows in pieces:
         _, first = np.unique(frequency_hz[rows], return_index=True)
         again = np.setdiff1d(np.arange(rows.stop - rows.start), first)
@@ -133,6 +136,15 @@ def _check_swept_once(frequency_hz: Array, pieces: Sequence[slice], table: Table
             raise DataError(
                 f"{table.path.name}, {table.where(row)}: {frequency_hz[row]:g} Hz is there a second time at one state "
                 f"of charge; if these are several spectra, name each in a column {LABEL}."
+            )
+        steps = np.diff(np.log10(frequency_hz[rows]))
+        back = steps * np.sign(steps[np.flatnonzero(steps)[:1]].sum()) < 0.0
+        if np.abs(steps[back]).sum() > MOST_BACK * np.ptp(np.log10(frequency_hz[rows])):
+            row = rows.start + 1 + int(np.argmax(back))
+            raise DataError(
+                f"{table.path.name}, {table.where(row)}: the frequencies turn back from {frequency_hz[row - 1]:g} to "
+                f"{frequency_hz[row]:g} Hz at one state of charge; if these are several spectra, name each in a column "
+                f"{LABEL}, else put the rows in the order of their frequencies."
             )
 
 

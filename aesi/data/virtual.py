@@ -16,7 +16,7 @@ from aesi.data.laboratory.changes import find_change
 from aesi.data.laboratory.instrument import Instrument
 from aesi.data.laboratory.simulator import Applied, LaboratoryModel, Setup, simulate_truth
 from aesi.data.profiles.profile import OTHER_LOAD, PULSE_C, Profile, paper_profiles
-from aesi.errors import DataError
+from aesi.errors import DataError, did_you_mean
 from aesi.numerics.typing import Array
 from aesi.records import Measurement
 
@@ -75,7 +75,15 @@ class Laboratory:
         return nominal_capacity_ah(self.bpx)
 
     def setup(self) -> Setup:
-        """LaboratoryModel and changes. Raises DataError for an unknown change."""
+        """LaboratoryModel and changes. Raises DataError for an unknown change, for values of one that is not made, and
+        for a magnitude at which one has no strength."""
+        for name in self.values:
+            if name not in self.effects:
+                made = ", ".join(self.effects) or "none"
+                raise DataError(
+                    f"values are given of {name!r}, which is no change that the laboratory makes"
+                    f"{did_you_mean(name, self.effects)} It makes {made}; name it in effects, or leave its values out."
+                )
         return Setup(self.bpx, self.model, tuple(self._apply(name) for name in self.effects))
 
     def measure(self, profile: Profile) -> Measurement:
@@ -105,7 +113,12 @@ class Laboratory:
             raise DataError(
                 f"The change {change.id} has no typical strength; give its values to the simulator."
             )
-        typical = STRENGTHS[name](self.magnitude, self.capacity_ah)
+        try:
+            typical = STRENGTHS[name](self.magnitude, self.capacity_ah)
+        except ZeroDivisionError:  # of a change that is none where its value is infinite
+            raise DataError(
+                f"The change {change.id} has no value at magnitude 0; give another magnitude, or leave the change out."
+            ) from None
         return Applied(name, {**typical, **self.values.get(name, {})})
 
 

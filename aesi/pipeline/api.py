@@ -37,7 +37,7 @@ from aesi.pipeline.discovery.finding import Finding
 from aesi.pipeline.distinct import check_distinct_spectra
 from aesi.pipeline.product.declared import Declared, declared_model
 from aesi.records import Hold, Measurement, Spectrum
-from aesi.records.checked import row_words
+from aesi.records.checked import check_whole_number, row_words
 from aesi.tracer.discovery import Progress
 
 FileOrRecord = str | PathLike[str] | Measurement
@@ -162,8 +162,8 @@ def calibrate(
     _check_by_name("dates", dates)
     _check_priors(priors)
     _check_days(dates or {}, as_of)
-    _check_whole("starts", starts, 1)
-    _check_whole("seed", seed, 0)
+    check_whole_number("starts", starts, 1)
+    check_whole_number("seed", seed, 0)
     if cut_offs_v is not None and not _is_row(cut_offs_v, 2):
         raise InputError(f"cut_offs_v = {cut_offs_v!r}: give (lower, upper) V, as in (2.5, 4.2).")
     given = declared_model(cell)
@@ -229,15 +229,8 @@ def _check_asked(holdout: object, max_effects: int, seed: int) -> None:
             f"holdout = {holdout!r} is not a share of the record, from 0 to {MOST_HOLDOUT:g}, to be kept back; 30 % "
             "is 0.3."
         )
-    _check_whole("max_effects", max_effects, 0, MOST_EFFECTS)
-    _check_whole("seed", seed, 0)
-
-
-def _check_whole(name: str, value: object, least: int, most: float = np.inf) -> None:
-    """Raises InputError where an argument is no whole number from `least` to `most`."""
-    if not isinstance(value, int | np.integer) or not least <= value <= most:
-        upper = f" up to {most:g}" if np.isfinite(most) else ""
-        raise InputError(f"{name} = {value!r} is not a whole number from {least}{upper}.")
+    check_whole_number("max_effects", max_effects, 0, MOST_EFFECTS)
+    check_whole_number("seed", seed, 0)
 
 
 def _check_by_name(what: str, given: object) -> None:

@@ -213,7 +213,7 @@ def check_records(measurements: Sequence[Measurement], temperatures_degc: Mappin
     temperature that no cell has."""
     check_distinct(measurements)
     for record in measurements:
-        span_s = float(record.time_s[-1] - record.time_s[0])
+        span_s = float(np.ptp(record.time_s)) if len(record) else 0.0
         if span_s < SHORTEST_S:
             raise DataError(
                 f"{record.name} lasts {stamp(span_s)} s, in which neither diffusion nor the slope of the open-circuit "

@@ -12,6 +12,7 @@ from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import InputError
 from aesi.numerics.files.whole import write_whole
 from aesi.physics import Cell
+from aesi.physics.arguments import check_choice
 from aesi.physics.cell.parts import NO_FILM, UNITY
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.folded import folded
@@ -49,8 +50,9 @@ class _Pybamm:
 def files_written(out: Path, to: Target) -> tuple[Path, ...]:
     """The files that `export` writes: `out`, and for PyBaMM the BPX file that its script reads.
 
-    Raises InputError where `out` has the wrong suffix.
+    Raises InputError for an unknown target, and where `out` has the wrong suffix.
     """
+    check_choice("to", to, Target)
     if out.suffix != SUFFIX[to]:
         raise InputError(f"{out} has to end in {SUFFIX[to]} for --to {to}.")
     return (out,) if to == "bpx" else (out, out.with_suffix(".bpx.json"))
@@ -60,8 +62,8 @@ def export(model: Path, out: Path, to: Target = "bpx") -> Exported:
     """Write a BPX file, or a Python script for PyBaMM with its BPX file beside it.
 
     model : a BPX file, or a folder of a saved model, whose effects are written as far as the target holds them.
-    Raises InputError where `out` has the wrong suffix or cannot be written, or the BPX file beside a new script would
-    replace another.
+    Raises InputError for an unknown target, where `out` has the wrong suffix or cannot be written, or the BPX file
+    beside a new script would replace another.
     """
     *script, bpx = files_written(out, to)
     declared = declared_model(model)

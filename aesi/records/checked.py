@@ -9,7 +9,7 @@ import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import DataError, InputError
-from aesi.numerics.typing import Array
+from aesi.numerics.typing import Array, ComplexArray
 from aesi.over_time import stamp
 
 LONGEST_STEP_S = 365 * 24 * SECONDS_PER_HOUR
@@ -43,6 +43,20 @@ def numbers(values: object, name: str) -> Array:
         return np.asarray(values, dtype=float)
     except (TypeError, ValueError):
         raise DataError(f"{name} holds {_first_other(values)!r}, which is not a number.") from None
+
+
+def complex_numbers(values: object, name: str) -> ComplexArray:
+    """Any sequence of numbers, real or complex, as a complex array of its shape.
+
+    name : how the sentence calls it.  Raises DataError as `numbers` does.
+    """
+    try:
+        given = np.asarray(values)
+    except ValueError:  # rows that differ in length, which `numbers` words
+        return numbers(values, name).astype(complex)
+    if given.dtype.kind == "c" and not np.ma.is_masked(values):
+        return given.astype(complex)
+    return numbers(values, name).astype(complex)
 
 
 def check_row(values: Array, name: str) -> None:
@@ -81,9 +95,22 @@ def checked_dt(dt_s: object) -> float:
     return float(dt_s)
 
 
+def check_whole_number(name: str, value: object, least: int, most: float = np.inf) -> None:
+    """Raises InputError where an argument is no whole number from `least` to `most`."""
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not whole or not least <= value <= most:  # type: ignore[operator]
+        upper = f" up to {most:g}" if np.isfinite(most) else ""
+        raise InputError(f"{name} = {value!r} is not a whole number from {least}{upper}.")
+
+
 def is_finite_number(value: object) -> TypeGuard[float]:
     """Whether a single argument is a number, and finite; a truth value is none."""
-    return not isinstance(value, bool) and isinstance(value, Real) and bool(np.isfinite(float(value)))
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return False
+    try:
+        return bool(np.isfinite(float(value)))
+    except OverflowError:  # a whole number that no float holds
+        return False
 
 
 def row_words(row: int) -> str:

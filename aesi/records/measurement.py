@@ -10,9 +10,9 @@ import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import DataError
-from aesi.numerics.typing import Array, ComplexArray, Numbers
+from aesi.numerics.typing import AnyArray, Array, ComplexArray, Numbers
 from aesi.over_time import extent, over_time
-from aesi.records.checked import check_row, check_times, numbers
+from aesi.records.checked import check_row, check_times, complex_numbers, numbers, row_words
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -68,7 +68,7 @@ def digest(*arrays: Array | None) -> str:
     return sha.hexdigest()[:16]
 
 
-def _rows(column: Array) -> str:
+def _rows(column: AnyArray) -> str:
     return f"{len(column)} rows" if column.ndim == 1 else f"the shape {column.shape}"
 
 
@@ -213,9 +213,9 @@ class Measurement:
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """One impedance spectrum of a cell at rest.
+    """One impedance spectrum of a cell at rest; lists and columns of a table are converted to arrays.
 
-    frequency_hz : (n,) Hz.  z_ohm : (n,) ohm, the imaginary part negative where capacitive.
+    frequency_hz : (n,) Hz, at least one.  z_ohm : (n,) ohm, the imaginary part negative where capacitive.
     soc or discharged_ah (Ah since full) : the state of charge.  temperature_degc, voltage_v : None where not measured.
     """
 
@@ -226,6 +226,39 @@ class Spectrum:
     discharged_ah: float | None = None
     voltage_v: float | None = None
     temperature_degc: float | None = None
+
+    if TYPE_CHECKING:  # what is given need not be arrays yet
+
+        def __init__(
+            self,
+            name: str,
+            frequency_hz: Numbers,
+            z_ohm: Numbers,
+            soc: float | None = None,
+            discharged_ah: float | None = None,
+            voltage_v: float | None = None,
+            temperature_degc: float | None = None,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        """Raises DataError for frequencies and impedances that are not finite numbers, differ in length, or are none,
+        and for a frequency or an |Z| that is not above 0."""
+        frequency = numbers(self.frequency_hz, f"{self.name}: frequency_hz")
+        z = complex_numbers(self.z_ohm, f"{self.name}: z_ohm")
+        for label, part in (("frequency_hz", frequency), ("z_ohm", z.real), ("z_ohm", z.imag)):
+            check_row(part, f"{self.name}: {label}")
+        if frequency.shape != z.shape:
+            raise DataError(f"{self.name}: z_ohm has {_rows(z)}, frequency_hz has {_rows(frequency)}.")
+        if not len(frequency):
+            raise DataError(f"{self.name} has no frequency; a spectrum needs at least one.")
+        for label, size, unit in (("frequency_hz", frequency, "Hz"), ("|Z|", np.abs(z), "ohm")):
+            if not (size > 0.0).all():
+                row = int(np.argmin(size > 0.0))
+                raise DataError(
+                    f"{self.name}: {label} is {size[row]:g} {unit} in {row_words(row)}; it has to be above 0."
+                )
+        object.__setattr__(self, "frequency_hz", frequency)
+        object.__setattr__(self, "z_ohm", z)
 
     @property
     def digest(self) -> str:

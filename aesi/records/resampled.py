@@ -1,10 +1,11 @@
 """Whether two records are one test on other times: the rows of one between those of the other.
 
 A program that brings a record to another step writes straight lines between its rows, the row before, after or nearest,
-or means over the rows of a step. Each is made again of one record at the times of the other, with both clocks alike, or
-both beginning at their first rows, and compared where the current moves or the voltage bends, to the coarser of the two
-files' decimals: along a smooth slide two tests of one kind are alike. So a smooth slide alone is not told, nor a part
-that was resampled and whose clock was moved as well.
+means over the rows of a step, or means over its time, as `aesi.data.to_even` and `decimate` do: of the voltage in
+straight lines, and of a current that is held or straight. Each is made again of one record at the times of the other,
+with both clocks alike, or both beginning at their first rows, and compared where the current moves or the voltage
+bends, to the coarser of the two files' decimals: along a smooth slide two tests of one kind are alike. So a smooth
+slide alone is not told, nor a part that was resampled and whose clock was moved as well.
 """
 
 from __future__ import annotations
@@ -99,10 +100,13 @@ def _between(one: Rows, other: Rows, time_s: Array, rows: IntArray, digits: list
     before = np.clip(np.searchsorted(one.time_s, at, side="right") - 1, 0, len(one.time_s) - 2)
     share = (at - one.time_s[before]) / (one.time_s[before + 1] - one.time_s[before])
     ends = [(column[before], column[before + 1]) for column in (one.current_a, one.voltage_v)]
-    yield _equal([low + share * (high - low) for low, high in ends], wanted, digits)
+    lines = [low + share * (high - low) for low, high in ends]
+    yield _equal(lines, wanted, digits)
     yield _equal([low for low, _ in ends], wanted, digits) | _equal(
         [high for _, high in ends], wanted, digits
     )
+    held, _ = _means_in_time(one, at - other.step_s, other.step_s)
+    yield _equal([held[0], lines[1]], wanted, digits)
 
 
 def _averaged(
@@ -114,6 +118,8 @@ def _averaged(
     at, wanted = time_s[rows], (other.current_a[rows], other.voltage_v[rows])
     for begin in (0.0, -other.step_s, -0.5 * other.step_s):
         yield np.any([_equal(mean, wanted, digits) for mean in _means(one, other.step_s, at + begin)], axis=0)
+        for mean in _means_in_time(one, at + begin, other.step_s):
+            yield _equal(mean, wanted, digits)
 
 
 def _means(one: Rows, step_s: float, begin_s: Array) -> Iterator[list[Array]]:
@@ -127,6 +133,14 @@ def _means(one: Rows, step_s: float, begin_s: Array) -> Iterator[list[Array]]:
         begin, end = edges[0][first], edges[1][last]
         count = np.where(end > begin, end - begin, np.nan)
         yield [(sums[end] - sums[begin]) / count for sums in one.sums]
+
+
+def _means_in_time(one: Rows, begin_s: Array, step_s: float) -> tuple[list[Array], list[Array]]:
+    """Current and voltage (rows,) of `one` in the mean of the time of a step, with the current held since the row
+    before, and straight between rows; the voltage is straight in both."""
+    ends = zip(one.areas_at(begin_s), one.areas_at(begin_s + step_s), strict=True)
+    held, *straight = ((end - begin) / step_s for begin, end in ends)
+    return [held, straight[1]], straight
 
 
 def _equal(made: list[Array], wanted: tuple[Array, Array], digits: list[int]) -> BoolArray:

@@ -87,6 +87,37 @@ class Rows:
         )
         return current, voltage
 
+    @cached_property
+    def areas(self) -> tuple[Array, Array, Array]:
+        """(n,) from the first row up to each: A s of the current held since the row before, A s of it straight between
+        rows, V s of the voltage straight between rows."""
+        steps = np.diff(self.time_s)
+        held, current, voltage = (
+            np.concatenate([[0.0], np.cumsum(heights * steps)])
+            for heights in (
+                self.current_a[1:],
+                0.5 * (self.current_a[1:] + self.current_a[:-1]),
+                0.5 * (self.voltage_v[1:] + self.voltage_v[:-1]),
+            )
+        )
+        return held, current, voltage
+
+    def areas_at(self, at_s: Array) -> tuple[Array, Array, Array]:
+        """(m,) each, the `areas` up to these times."""
+        held, current, voltage = self.areas
+        row = np.clip(np.searchsorted(self.time_s, at_s, side="right") - 1, 0, len(self.time_s) - 2)
+        since, step = at_s - self.time_s[row], self.time_s[row + 1] - self.time_s[row]
+
+        def straight(area: Array, column: Array) -> Array:
+            slope = (column[row + 1] - column[row]) / step
+            return np.asarray(area[row] + column[row] * since + 0.5 * slope * since**2)
+
+        return (
+            np.interp(at_s, self.time_s, held),
+            straight(current, self.current_a),
+            straight(voltage, self.voltage_v),
+        )
+
 
 def written_decimals(column: Array) -> int:
     """Number of decimals in which a column (n,) is written, at most MOST_DECIMALS."""

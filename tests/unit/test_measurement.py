@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import aesi
-from aesi.errors import DataError
-from aesi.records import Measurement
+from aesi.errors import DataError, InputError
+from aesi.records import Measurement, Spectrum
+from aesi.records.checked import checked_dt
 
 BPX = Path(__file__).resolve().parents[2] / "experiments" / "cells" / "nmc_30ah.bpx.json"
 
@@ -51,3 +52,37 @@ def test_times_in_nanoseconds_were_simulated_without_an_end():
         aesi.simulate(aesi.Cell.from_bpx(BPX), [0.0, 1e11], [0.0, 0.0], 0.5)
     with pytest.raises(DataError, match=f"drive: {told}"):
         Measurement(np.array([0.0, 1e11]), np.zeros(2), np.zeros(2), name="drive")
+
+
+@pytest.mark.parametrize(
+    ("frequency_hz", "z_ohm", "words"),
+    [
+        ([1.0, 2.0], [0.01], "z_ohm has 1 rows, frequency_hz has 2 rows"),
+        ([], [], "s has no frequency; a spectrum needs at least one"),
+        ([1.0, np.inf], [0.01, 0.02], "frequency_hz is inf in row 2"),
+        ([1.0, 2.0], [0.01, complex(0.01, np.nan)], "z_ohm is nan in row 2"),
+        ([1.0, 0.0], [0.01, 0.02], "frequency_hz is 0 Hz in row 2, .* above 0"),
+        ([1.0, 2.0], [0.01, 0.0], r"\|Z\| is 0 ohm in row 2"),
+        ([1.0], ["z"], "z_ohm holds 'z', which is not a number"),
+        ([[1.0]], [[0.01]], "has the shape"),
+    ],
+)
+def test_a_spectrum_was_taken_whatever_it_held(frequency_hz, z_ohm, words):
+    with pytest.raises(DataError, match=words):
+        Spectrum("s", frequency_hz, z_ohm)
+
+
+def test_a_spectrum_of_lists_is_one_of_arrays():
+    one = Spectrum("s", [2, 1], [0.01, 0.02 - 0.01j])
+    assert one.frequency_hz.dtype == float
+    assert one.z_ohm.tolist() == [0.01 + 0j, 0.02 - 0.01j]
+
+
+def test_a_step_that_no_float_holds_ended_in_an_overflow():
+    with pytest.raises(InputError, match="has to be a positive number of seconds"):
+        checked_dt(10**400)
+
+
+def test_a_plot_of_a_record_without_rows_ended_in_an_index_error():
+    with pytest.raises(InputError, match="there is no row to draw"):
+        Measurement([], [], []).plot()

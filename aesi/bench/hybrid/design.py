@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 from pydantic import NonNegativeInt, PositiveInt
 
+from aesi.bench import check_listed
 from aesi.bench.virtual_drives import INPUTS, virtual_splits
 from aesi.errors import FitError
 from aesi.numerics.metrics import mser
@@ -70,7 +71,9 @@ def run(
 
     cell : BPX file of the declared cell.  cells : number of virtual cells.  candidates : genomes that each search
     evaluates.  settings : names in SETTINGS.  seed : of the virtual cells.  sindy : whether SINDy-C is included.
+    Raises InputError for an unknown setting.
     """
+    check_listed("settings", settings, SETTINGS)
     splits = list(virtual_splits(Cell.from_bpx(Path(cell)), "repeats", cells, seed))
     for name in settings:
         options = replace(BASE, **SETTINGS[name])

@@ -29,6 +29,7 @@ import numpy as np
 from pydantic import NonNegativeInt, PositiveInt
 
 from aesi.constants import SECONDS_PER_HOUR
+from aesi.errors import InputError
 from aesi.numerics.typing import Array
 from aesi.records import INPUT_NAMES, ErrorSeries, Failed, Split
 from aesi.sparse import Genome, Library, Options, Problem, STRidge, evaluate
@@ -56,7 +57,13 @@ def run(
     cases : (terms, lambda1).  n : rows that are fitted.  candidates : number of candidates, which differ in their
     threshold.  resamples : bootstrap resamples of each.  peer_models : fits of PySINDy that are timed.  seed : of the
     record.  Coefficient errors are relative to the largest coefficient of a QR solution.
+    Raises InputError for more peer_models than resamples.
     """
+    if peer_models > resamples:
+        raise InputError(
+            f"peer_models = {peer_models} with resamples = {resamples}: each fit of PySINDy takes a resample of its "
+            "own; give as many resamples, or fewer fits."
+        )
     from threadpoolctl import threadpool_limits
 
     record = synthetic_record(n + 1, seed)

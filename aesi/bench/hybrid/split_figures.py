@@ -138,7 +138,8 @@ def table(rows: Sequence[CaseRow]) -> list[str]:
     for cell, title in TITLES.items():
         by_split = list(_grouped_by("split", [row for row in ran if row["cell"] == cell]))
         splits = [_over_seeds(runs) for runs in by_split if not all("error" in run for run in runs)]
-        lines += _cell_rows(title, splits, len(by_split) - len(splits))
+        lost = [runs for runs in by_split if all("error" in run for run in runs)]
+        lines += _cell_rows(title, splits, lost)
         for split in splits:
             each += _split_lines(split)
     failed = [
@@ -167,9 +168,7 @@ def _over_seeds(rows: Sequence[CaseRow]) -> dict[str, Any]:
         "seeds": len(rows),
         "one_drive": first["cell"] in ("hg2", "panasonic"),
         "home": _mean_figures([row["models"] for row in good], share),
-        "abroad": {
-            n: _mean_figures([row["abroad"][n] for row in good], share) for n in first.get("abroad", {})
-        },
+        "abroad": {n: _mean_figures([row["abroad"][n] for row in good]) for n in first.get("abroad", {})},
         "validation": float(np.mean(validation_pct)),
         "gap": float(
             np.mean(
@@ -182,9 +181,9 @@ def _over_seeds(rows: Sequence[CaseRow]) -> dict[str, Any]:
 FIGURES = ("mser_pct", "coverage_pct", "worst_drive_coverage_pct", "winkler_mv", "rows")
 
 
-def _mean_figures(models: Sequence[Mapping[str, Any]], share: float) -> dict[str, dict[str, float]]:
-    """Model -> mean figures over the runs that did not fail.  share : share of these runs among all; reductions are
-    multiplied by it, since a failed run counts as a reduction of 0."""
+def _mean_figures(models: Sequence[Mapping[str, Any]], share: float = 1.0) -> dict[str, dict[str, float]]:
+    """Model -> mean figures over the runs that did not fail.  share : share of these runs among all that count;
+    reductions are multiplied by it, since a failed run counts as a reduction of 0 at the cell's own temperature."""
     out = {
         name: {
             key: float(np.mean([m[name][key] for m in models])) for key in FIGURES if key in models[0][name]
@@ -197,12 +196,18 @@ def _mean_figures(models: Sequence[Mapping[str, Any]], share: float) -> dict[str
     return out
 
 
-def _cell_rows(title: str, splits: Sequence[Mapping[str, Any]], failed: int) -> Iterator[str]:
+def _cell_rows(
+    title: str, splits: Sequence[Mapping[str, Any]], lost: Sequence[Sequence[CaseRow]]
+) -> Iterator[str]:
     """The lines of one cell in the first table, one for each temperature that it is tested at.
 
-    failed : number of splits of which all runs failed; they count as reductions of 0.
+    lost : the runs of each split of which all failed; it counts as a reduction of 0 at the cell's own temperature.
     """
+    failed = len(lost)
     if not splits:
+        if lost:
+            cells = (title, str(failed), str(len(lost[0])), *["0.0 / 0.0"] * 3, "", "", "")
+            yield f"| {' | '.join(cells)} |"
         return
     gaps = [split["gap"] for split in splits]
     gap_words = f"{np.median(gaps):.1f} / {max(gaps):.1f}"
@@ -210,7 +215,7 @@ def _cell_rows(title: str, splits: Sequence[Mapping[str, Any]], failed: int) -> 
     for name in dict.fromkeys(name for split in splits for name in split["abroad"]):
         tested = [split for split in splits if name in split["abroad"]]
         models = [split["abroad"][name] for split in tested]
-        yield _cell_row(f"{title.split(',')[0]}, {name}", tested, models, failed, "")
+        yield _cell_row(f"{title.split(',')[0]}, {name}", tested, models, 0, "")
 
 
 def _cell_row(

@@ -23,7 +23,7 @@ from aesi.conformal.scores import interval_score
 from aesi.numerics.typing import Array, IntArray
 
 ALPHA = 0.1
-"""Nominal share of misses, and the 95 % quantile of the standard normal distribution."""
+"""Nominal share of misses: intervals for 90 %."""
 SIZE_V = 1e-3
 """Standard deviation of a residual in the range of the lowest current, V. A convention."""
 GROWTH = 4.0

@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from pydantic import NonNegativeInt, PositiveInt
 
+from aesi.bench import check_listed
 from aesi.conformal import METHODS, Calibrated
 from aesi.conformal.scores import interval_score
 from aesi.numerics.compiled import kept_njit
@@ -81,7 +82,9 @@ def run(
     n_calibration, n_test : samples.  methods : keys of METHODS.  peer_steps : steps of the published procedure that are
     timed (20 s or more each at full size), 0 for none.  mapie_steps : steps of MAPIE that are timed.  seed : of the
     series.
+    Raises InputError for an unknown method.
     """
+    check_listed("methods", methods, METHODS)
     from threadpoolctl import threadpool_limits
 
     rng = np.random.default_rng(seed)

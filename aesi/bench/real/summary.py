@@ -14,7 +14,7 @@ import numpy as np
 
 from aesi.bench import CaseRow
 from aesi.bench.detectable import SEEN_NATS
-from aesi.bench.limit import NO_ANSWER, NOT_RUN
+from aesi.bench.limit import NO_ANSWER, NOT_RUN, timed
 from aesi.bench.scoring import rate
 from aesi.tracer.decide.model_to_write import AS_GOOD
 
@@ -74,7 +74,7 @@ def _rates(rows: Sequence[CaseRow]) -> CaseRow:
         ),
         **_resistances([r for r in rows if "ohmic_off" in r]),
         **rate([{"worse": _is_worse(r)} for r in rows if _has_errors(r)], "worse").named("after_worse"),
-        "processor_s_median": _median(rows, "processor_s"),
+        "processor_s_median": _median(timed(rows), "processor_s"),
         "processor_s_total": float(sum(r["processor_s"] for r in rows)),
     }
 

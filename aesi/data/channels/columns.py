@@ -342,7 +342,7 @@ class _Finder:
             unit = known
         else:
             unit = units.SI[quantity]
-            self._refuse_other_unit(quantity, name)
+            self._refuse_other_unit(quantity, name, below)
         self.unit[quantity] = unit
 
     def _check_declared(self, quantity: str, said: str | None, known: str) -> None:
@@ -365,8 +365,12 @@ class _Finder:
             though = f", though column {name!r} of such an export is in {known}"
         self.notes.append(f"{quantity} was converted from {unit} as declared{though}.")
 
-    def _refuse_other_unit(self, quantity: str, name: str) -> None:
-        """Raises DataError for a column that is not in SI by its name, where no unit was declared."""
+    def _refuse_other_unit(self, quantity: str, name: str, below: str) -> None:
+        """Raises DataError for a column that is not in SI by its name, where no unit was declared, and for a required
+        one whose unit is not known: SI would be a guess.
+
+        below : its cell in the line of units, which holds no known unit; empty without such a line.
+        """
         said = headers.unit_of(quantity, name)
         if said is not None and said != units.SI[quantity]:
             raise DataError(
@@ -382,6 +386,13 @@ class _Finder:
             raise DataError(
                 f"{self._file}: column {name!r} is in {headers.unit_in(name)} by its name, and {quantity} is needed "
                 f"in {units.SI[quantity]}; convert the column."
+            )
+        unknown = below or headers.marked_unit(name)
+        if quantity in REQUIRED and unknown and said is None:
+            raise DataError(
+                f"{self._file}: column {name!r} has {unknown!r} in place of a unit, which is none that is known for "
+                f"{quantity} ({', '.join(units.FACTORS[quantity])}); declare the one it is in, as in "
+                f"--unit {quantity}={units.SI[quantity]}, or convert the column."
             )
 
     def _only(self, places: list[int]) -> int | None:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 
 from aesi.data import units
 from aesi.data.readers.formats.format import plain
+from aesi.data.readers.layout import COLUMN_NUMBER
 
 LIKELY = {
     "time_s": r"time|zeit|elapsed|\bt\b|^t$|duration",
@@ -32,6 +33,7 @@ RATE_OR_POWER = r"\bc[-_ ]?rate\b|\bpower\b|\bleistung\b"
 UNIT = re.compile(
     r"[\[(<]\s*([^\])>]+?)\s*[\])>]\s*$|[/#]\s*([^/#\[\](){}]+?)\s*$|[_ ]\s*([^/_ \[\](){}]+)\s*$"
 )
+NO_NAME = re.compile(rf"{COLUMN_NUMBER}\d+")
 
 
 def nearest(quantity: str, header: Sequence[str], doubtful: bool = False) -> str | None:
@@ -69,6 +71,13 @@ def unit_in(name: str) -> str:
     """The unit in a column's name, such as 'I[mA]', 'Current (mA)', 'Voltage / mV', 'time_ms'; '' without one."""
     found = UNIT.search(name)
     return next((text for text in found.groups() if text), "") if found else ""
+
+
+def marked_unit(name: str) -> str:
+    """What stands in brackets or behind a slash at the end of a column's name, where names hold their unit; '' without
+    one. A last word alone, as in 'current_cell', and a number, as in '#1', need not be a unit."""
+    found = None if NO_NAME.fullmatch(name) else UNIT.search(name)
+    return next((text for text in found.groups()[:2] if text), "") if found else ""
 
 
 def is_rate_or_power(name: str) -> bool:

@@ -3,8 +3,9 @@
     t_true = t_first + (t_logged - t_first) / (1 + skew),   V_read(t) = V_true(t - lag)
 
 Leaves out jitter of single stamps. Holds for a lag that is short compared with the record; before the first and after
-the last sample the current is taken as constant. The current keeps its rows, held or linear between them, and moves the
-same charge; the voltage is evaluated at instants between the rows.
+the last sample the current is taken as constant. The current keeps its rows, held or linear between them: under a lag
+it moves the same charge, under a skew 1 / (1 + skew) of it, since it flows for another time. The voltage is evaluated
+at instants between the rows.
 
 Source: definition; range from quartz oscillators (100 ppm) to two unsynchronised loggers.
 """

@@ -25,13 +25,17 @@ POINTS = 129
 BEYOND_LIMITS = 0.1
 """Extension of the table beyond the stoichiometry limits, as a share of their span: surfaces exceed them under load."""
 RANGE = "measured curves span some two orders of magnitude; the slope may go to e**10, so that no steep one is cut off"
+ENDS = (
+    "convention: D at the ends is e**4 times that in the middle at most, or one part in e**4 of it; no source"
+)
 SLOPE, CURVATURE = 10.0, 4.0
-"""Largest |b1|, by RANGE, and largest |b2|, a convention."""
+"""Largest |b1|, by RANGE, and largest |b2|, by ENDS."""
 
 
 def _parameter(default: float, reach: float, side: str, what: str) -> Parameter:
+    source = RANGE if what == "b1" else ENDS
     return Parameter(
-        default, "dimensionless", (-reach, reach), RANGE, neutral=0.0, description=f"{what}, {side}"
+        default, "dimensionless", (-reach, reach), source, neutral=0.0, description=f"{what}, {side}"
     )
 
 

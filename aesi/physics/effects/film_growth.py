@@ -23,7 +23,7 @@ PARAMETERS = {
         "ohm/(A*hour)",
         bounds=(0.0, 1e6),
         neutral=0.0,
-        source="zero to a doubling of a 1 kohm cell of 1 mAh within its capacity; half a doubling of 10 mohm at 3 Ah",
+        source="zero to a doubling of a 1 kohm cell of 1 mAh within its capacity; 1.5 doublings of 10 mohm over 3 Ah",
         description="growth per charge throughput, a",
         expected=0.045,
         capacity_power=-2,

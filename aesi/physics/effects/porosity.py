@@ -34,7 +34,11 @@ PARAMETERS = {
 
 
 def scale_porosities(model: EspmModel, *, negative_factor: float, positive_factor: float) -> EspmModel:
-    """The model with both porosities scaled.  Raises CellError where that leaves no volume for the solid."""
+    """The model with both porosities scaled.  Raises CellError where the pores would fill a whole electrode.
+
+    With the active material they may fill more than that, as they do in files of calibrated cells (1.03 of an
+    electrode): there its volume was fitted, as an effective one, beside a porosity that was not.
+    """
     cell = model.cell
     cell = cell.with_negative(**_more_porous(cell.negative, negative_factor, cell.name))
     return model.of(cell.with_positive(**_more_porous(cell.positive, positive_factor, cell.name)))

@@ -59,6 +59,14 @@ def test_tracking_costs_something_and_leaves_the_workspace_alone(workspace):
         ("blind", {"workers": "many"}, "workers=many: it has to be a valid integer"),
         ("splits", {"cells": "nmc"}, r"cells=nmc: it has to be a list, in \[ \]"),
         ("left_out", {"seed": 1}, "has no such option"),
+        ("spci", {"methods": ["foo"]}, r"methods: there is no 'foo'\. There are: "),
+        ("design", {"settings": ["fold 10"]}, "settings: there is no 'fold 10'; did you mean 'fold 100'"),
+        (
+            "dfn",
+            {"seconds": 10},
+            "seconds = 10: the first pulse comes after a rest, 30 s each; give at least 60",
+        ),
+        ("ensemble", {"peer_models": 5, "resamples": 2}, "peer_models = 5 with resamples = 2"),
     ],
 )
 def test_an_option_that_a_benchmark_cannot_take_is_refused_before_it_runs(name, options, said):

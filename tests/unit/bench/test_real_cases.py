@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from aesi.bench.detectable import seen_on_measured
+from aesi.bench.limit import NO_TIME
 from aesi.bench.real import chosen, judged, plan, summary, table, write_report
 from aesi.bench.real.answers import initial_state_row, scored
 from aesi.bench.real.faults import declared_with_fault, soc0_with_fault, with_fault
@@ -342,3 +343,10 @@ def test_the_spectra_of_a_witness_are_those_of_its_month(shared_data):
     _, _, truth = known("witness-10degC_hppc")
     assert len(truth.spectra) == 13
     assert {round(s.temperature_degc) for s in truth.spectra} == {10}
+
+
+def test_a_case_whose_process_was_ended_entered_the_median_as_no_time_at_all():
+    lost = control("lost") | NO_TIME
+    last = summary([control("a") | {"processor_s": 4.0}, control("b") | {"processor_s": 6.0}, lost])
+    assert last["processor_s_median"] == pytest.approx(5.0)
+    assert last["processor_s_total"] == pytest.approx(10.0)

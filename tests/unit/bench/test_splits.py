@@ -152,11 +152,19 @@ def test_a_split_that_failed_left_the_mean_to_the_others():
     assert any(
         line.startswith("| LG HG2, 25 °C | 2 | 2 | 37.5 / 0.0 | 40.0 / 0.0 | 10.0 / 0.0 |") for line in lines
     )
-    assert any(line.startswith("| LG HG2, 10degC_us06 | 2 | 2 | 37.5 / 0.0 |") for line in lines)
+    # At another temperature a failed run counts in no figure, as in the summary.
+    assert any(line.startswith("| LG HG2, 10degC_us06 | 1 | 2 | 75.0 / 75.0 |") for line in lines)
+    half = [row("hg2 without a", "hg2", 0, 80.0), failed("hg2 without a", "hg2", 1)]
+    assert any(line.startswith("| LG HG2, 10degC_us06 | 1 | 2 | 75.0 / 75.0 |") for line in table(half))
     assert any(
         line.startswith("| NMC pouch, parts of a drive | 1 | 2 | 37.5 / 37.5 | 40.0 / 40.0 |")
         for line in lines
     )
+
+
+def test_a_cell_all_of_whose_splits_failed_was_in_no_line_of_the_table():
+    lines = table([failed("hg2 without b", "hg2", seed) for seed in range(2)])
+    assert "| LG HG2, 25 °C | 1 | 2 | 0.0 / 0.0 | 0.0 / 0.0 | 0.0 / 0.0 |  |  |  |" in lines
 
 
 def test_a_split_whose_data_cannot_be_had_is_in_no_mean():

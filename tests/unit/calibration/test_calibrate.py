@@ -14,7 +14,7 @@ from aesi.calibration import calibrate
 from aesi.calibration.fit import _moved_start_sentences, prepared_model
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.model import ERROR_V, REPEATS
-from aesi.calibration.parameters import FitParameter, free_parameters
+from aesi.calibration.parameters import FitParameter, free_parameters, with_priors
 from aesi.calibration.posterior import PosteriorSamples, sample_posterior
 from aesi.calibration.records.conditions import Conditions, Prior
 from aesi.calibration.result import at_bounds, information_weights, intervals
@@ -22,7 +22,7 @@ from aesi.calibration.start import full_discharge_numbers, scaled_to_discharge, 
 from aesi.errors import DataError, InputError
 from aesi.numerics.metrics import rms
 from aesi.physics import simulate
-from aesi.pipeline.calibrate import calibration_content
+from aesi.pipeline.calibrate import calibration_content, check_records
 from aesi.records import Measurement
 
 
@@ -525,3 +525,35 @@ def test_a_record_without_a_current_is_refused_by_its_name(start, records):
     rest = replace(records[0], current_a=np.zeros(len(records[0])), name="rest")
     with pytest.raises(DataError, match="rest: no current flows in it"):
         calibrate(start, [records[0], rest])
+
+
+def test_no_evaluations_ended_in_an_error_of_the_solver(start, records):
+    with pytest.raises(InputError, match="evaluations = 0 is not a whole number from 1"):
+        calibrate(start, records[:1], evaluations=0)
+
+
+def test_a_record_of_one_row_was_calibrated_with(start, records):
+    with pytest.raises(
+        DataError, match=r"at_25 has too few rows \(1\) to be fitted; a record needs at least 2"
+    ):
+        calibrate(start, [records[0].take(slice(100, 101))])
+
+
+def test_an_unknown_voltage_was_taken_for_a_start_that_cannot_be_simulated(start, records):
+    voltage = records[0].voltage_v.copy()
+    voltage[7] = np.nan
+    with pytest.raises(DataError, match="at_25: voltage_v is nan in row 8"):
+        calibrate(start, [replace(records[0], voltage_v=voltage)])
+
+
+def test_a_record_without_rows_ended_in_an_index_error():
+    with pytest.raises(DataError, match="empty lasts 0 s, in which neither diffusion"):
+        check_records([Measurement([], [], [], name="empty")], None)
+
+
+def test_an_infinite_prior_was_taken(start):
+    free = [FitParameter("contact.resistance", 0.01, 0.01, "ohm", "", low=0.0)]
+    with pytest.raises(
+        InputError, match=r"the prior of contact\.resistance: inf with a standard deviation of 1 is not"
+    ):
+        with_priors(free, {"contact.resistance": (np.inf, 1.0)})

@@ -40,6 +40,16 @@ def test_parameters_beyond_their_intervals_at_another_end_are_named():
     assert "There 1 of 2 parameters lie outside their 95 % intervals (radius)" in differ
 
 
+def test_drawn_starts_that_fail_were_dropped_without_a_word():
+    here = {"rate": interval(1.0)}
+    assert ends_sentences([3.0], [here], 0, 2) == (
+        "2 of 2 drawn starts cannot be simulated on these records and gave no end.",
+    )
+    assert ends_sentences([3.0], [here], 0, 1)[0].startswith("1 of 1 drawn start cannot")
+    *_, lost = ends_sentences([3.0, 3.5], [here, here], 0, 1)
+    assert lost == "1 of 2 drawn starts cannot be simulated on these records and gave no end."
+
+
 @pytest.mark.parametrize("starts", [0, -1])
 def test_a_number_of_starts_below_one_is_refused(start, records, starts):
     import aesi

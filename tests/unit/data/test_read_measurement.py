@@ -13,7 +13,7 @@ from aesi.data.current import read_current
 from aesi.data.read import read
 from aesi.data.readers.text import TextTable
 from aesi.data.reading import Reading
-from aesi.errors import DataError
+from aesi.errors import DataError, InputError
 
 N = 200
 TIME = np.arange(N) * 1.0
@@ -337,6 +337,26 @@ def test_a_unit_in_the_name_is_believed(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("quantity", "name"),
+    [
+        ("time_s", "Time [m]"),
+        ("time_s", "Time (mn)"),
+        ("time_s", "Time / ks"),
+        ("current_a", "Current [mA/cm2]"),
+        ("current_a", "Current [% of C]"),
+        ("current_a", "Current [dA]"),
+        ("voltage_v", "U (cV)"),
+    ],
+)
+def test_an_unknown_unit_in_a_name_was_taken_for_si(tmp_path, quantity, name):
+    content = text(header=HEADER.replace(quantity, name))
+    message = refusal(tmp_path, content, columns={quantity: name})
+    assert f"declare the one it is in, as in --unit {quantity}=" in message
+    si = quantity.rpartition("_")[2]
+    assert len(read_measurement(tmp_path / "drive.csv", {quantity: name}, units={quantity: si})) == N
+
+
+@pytest.mark.parametrize(
     ("content", "word"),
     [
         (b"", "empty"),
@@ -474,9 +494,10 @@ def test_a_stated_temperature_that_no_cell_has_was_looked_for_in_a_column_of_the
 def test_decimation_keeps_the_charge_and_is_said(tmp_path):
     measurement = read_measurement(written(tmp_path, text()), max_rows=50)
     assert len(measurement) <= 50
-    charge = np.sum(measurement.current_a[1:] * np.diff(measurement.time_s))
-    last = np.searchsorted(TIME, measurement.time_s[-1])
-    assert charge == pytest.approx(np.sum(CURRENT[1 : last + 1]))
+    charge_ah = measurement.discharged_ah(measurement.hold_taken)[-1]
+    last = np.searchsorted(TIME, measurement.time_s[-1]) + 1
+    # Rows a second apart: the current is straight between them.
+    assert 3600.0 * charge_ah == pytest.approx(np.trapezoid(CURRENT[:last], TIME[:last]))
     assert any("Decimated from 200" in note for note in measurement.notes)
 
 
@@ -779,3 +800,34 @@ def test_a_charge_that_the_rows_do_not_tell_was_read_without_a_word(tmp_path):
     voltage = 3.9 - 1e-5 * both - 0.03 * pulse
     pd.DataFrame({"time_s": both, "current_a": pulse, "voltage_v": voltage}).to_csv(path, index=False)
     assert not any("do not tell the charge" in note for note in read_measurement(path).notes)
+
+
+@pytest.mark.parametrize("stated", [25, 25.0, np.int64(25), np.float32(25.0), "25"])
+def test_a_temperature_as_a_number_of_numpy_ended_in_a_traceback(tmp_path, stated):
+    record = read_measurement(written(tmp_path, text()), {"temperature_degc": stated})
+    np.testing.assert_array_equal(record.temperature_degc, np.full(N, 25.0))
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (
+            {"columns": {"temperature_degc": True}},
+            "the column of temperature_degc is True; give its name as text",
+        ),
+        (
+            {"columns": {"temperature_degc": [25]}},
+            "the column of temperature_degc is [25]; give its name as text",
+        ),
+        ({"columns": ["I"]}, "columns = ['I'] names no quantities; give a dict"),
+        ({"units": {"current_a": None}}, "the unit of current_a is None; give it as text"),
+        ({"units": "mA"}, "units = 'mA' names no quantities; give a dict"),
+        ({"start_s": "10"}, "from '10' s; give a time in seconds"),
+        ({"state": 5}, "has no column '5' for state"),
+        ({"max_rows": 2.5}, "max_rows = 2.5 is not a whole number"),
+    ],
+)
+def test_an_option_of_another_type_ended_in_a_traceback(tmp_path, options, words):
+    with pytest.raises(InputError) as caught:
+        read_measurement(written(tmp_path, text()), **options)
+    assert words in str(caught.value)

@@ -12,7 +12,7 @@ from aesi.data.resample import (
     off_rows,
     to_even,
 )
-from aesi.errors import DataError
+from aesi.errors import DataError, InputError
 from aesi.records import Measurement
 from aesi.records.steps import after_gap
 
@@ -75,6 +75,17 @@ def test_a_record_without_rows_ended_in_an_index_error():
         to_even(Measurement([], [], []), 1.0)
 
 
+def test_a_step_in_words_ended_in_a_type_error():
+    with pytest.raises(DataError, match="a step of '1' s is not possible"):
+        to_even(measurement(np.arange(10.0), np.ones(10)), "1")
+
+
+@pytest.mark.parametrize("most", [2.5, "10", True])
+def test_decimation_to_no_whole_number_of_rows_is_refused(most):
+    with pytest.raises(InputError, match=r"max_rows = .* is not a whole number"):
+        decimate(measurement(np.arange(10.0), np.ones(10)), most)
+
+
 @given(n=st.integers(3, 400), most=st.integers(2, 50))
 def test_decimation_is_never_longer_than_asked(n, most):
     record = measurement(np.arange(float(n)), np.sin(np.arange(n)))
@@ -118,6 +129,16 @@ def test_a_ramp_declared_straight_between_rows_lost_charge_where_it_was_thinned(
     taken_ah, given_ah = (m.discharged_ah(m.hold_taken)[-1] for m in (few, ramp))
     assert taken_ah == pytest.approx(given_ah, rel=1e-12)
     assert "constant from here on" in few.notes[0]
+
+
+@pytest.mark.parametrize("step_s", [1.0, 10.0])
+def test_a_record_without_a_declared_hold_lost_charge_where_it_was_thinned(step_s):
+    time = step_s * np.arange(101.0)
+    record = measurement(time, 1.0 + time**2)
+    few = decimate(record, 11)
+    taken_ah, given_ah = (m.discharged_ah(m.hold_taken)[-1] for m in (few, record))
+    assert taken_ah == pytest.approx(given_ah, rel=1e-12)
+    assert few.hold == "backward"
 
 
 def test_a_row_is_after_a_gap_where_none_is_a_step_before_it():

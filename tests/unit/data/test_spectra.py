@@ -59,6 +59,24 @@ def test_spectra_of_several_temperatures_were_taken_for_one_of_their_mean(tmp_pa
         read_spectra(written(tmp_path, f"{COLUMNS},soc,temperature_degc", *rows))
 
 
+@pytest.mark.parametrize(
+    "rest", [("99,0.012,-0.001", "9.9,0.013,-0.002"), ("9.9,0.013,-0.002", "99,0.012,-0.001")]
+)
+def test_spectra_of_two_temperatures_were_merged_where_their_frequencies_differ_slightly(tmp_path, rest):
+    rows = [f"{point},0.5,{degc}" for degc, points in ((25, POINTS), (10, rest)) for point in points]
+    row = 3 if rest[0].startswith("99") else 4
+    with pytest.raises(
+        DataError, match=rf"row {row} .*: the frequencies turn back .* name each in a column spectrum"
+    ):
+        read_spectra(written(tmp_path, f"{COLUMNS},soc,temperature_degc", *rows))
+
+
+def test_a_frequency_out_of_order_is_still_of_one_sweep(tmp_path):
+    rows = [f"{hz},0.010,-0.001,0.5" for hz in (100, 10, 12, 1, 0.1)]
+    (one,) = read_spectra(written(tmp_path, f"{COLUMNS},soc", *rows))
+    assert one.frequency_hz.tolist() == [100.0, 10.0, 12.0, 1.0, 0.1]
+
+
 def test_a_spectrum_in_kelvin_ended_a_calibration_after_its_fit_with_nothing_written(tmp_path):
     rows = [f"{point},0.5,{kelvin}" for point, kelvin in zip(POINTS, (25, 298.15), strict=True)]
     with pytest.raises(

@@ -82,3 +82,14 @@ def test_values_of_an_effect_stand_in_for_the_typical_ones(nmc):
     values = {applied.change: dict(applied.values) for applied in lab.setup().applied}
     assert values["self_heating"] == {"cooling_w_m2_k": 7.0}
     assert values["particle_size_distribution"]["negative_spread"] == pytest.approx(0.6)
+
+
+def test_self_heating_of_magnitude_0_ended_in_a_division_by_zero(nmc):
+    with pytest.raises(DataError, match="self_heating has no value at magnitude 0; give another magnitude"):
+        Laboratory(nmc, effects=("self_heating",), magnitude=0).setup()
+
+
+def test_values_of_a_misspelt_effect_were_ignored(nmc):
+    lab = Laboratory(nmc, effects=("self_heating",), values={"self_heatin": {"cooling_w_m2_k": 7.0}})
+    with pytest.raises(DataError, match=r"'self_heatin', .* did you mean 'self_heating'"):
+        lab.setup()

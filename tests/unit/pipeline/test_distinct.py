@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from aesi.data import decimate, to_even
 from aesi.errors import DataError
 from aesi.physics import Cell, simulate
 from aesi.pipeline.distinct import check_distinct
@@ -146,6 +147,22 @@ def test_an_export_on_other_times_was_taken_for_another_test(export):
         check_distinct([RECORD], [export])
     with pytest.raises(DataError, match=told):
         check_distinct([export, RECORD])
+
+
+@pytest.mark.parametrize("hold", ["backward", "linear"])
+@pytest.mark.parametrize("step_s", [0.4, 1.2, 2.5, 5.0, 10.0])
+def test_a_record_that_was_resampled_here_was_taken_for_another_test(step_s, hold):
+    even = replace(to_even(RECORD, step_s, hold), name="even")
+    with pytest.raises(DataError, match=r"hold (one test on other times|the same rows of one test)"):
+        check_distinct([RECORD, even])
+    check_distinct([drive("day 2", 2), even])
+
+
+@pytest.mark.parametrize("hold", ["backward", "linear"])
+def test_a_record_that_was_decimated_was_taken_for_another_test(hold):
+    few = replace(decimate(RECORD.held(hold), 400), name="few")
+    with pytest.raises(DataError, match="hold one test on other times"):
+        check_distinct([RECORD, few])
 
 
 @pytest.mark.parametrize("rounded", [(4, 5), (2, 3), (1, 2)])

@@ -762,6 +762,11 @@ def test_what_was_fitted_beside_a_finding_was_told_with_its_values_as_if_found(m
     )
 
 
+def test_an_unknown_target_of_an_export_ended_in_a_key_error(model, tmp_path):
+    with pytest.raises(InputError, match="to = 'foo' is not known; give 'bpx' or 'pybamm'"):
+        export(model.save(tmp_path / "alone"), tmp_path / "o.json", to="foo")
+
+
 def test_what_a_model_was_found_to_be_worth_was_told_by_its_report_alone(model, record, tmp_path):
     found = replace(model, finding="it does not help; use the ESPM alone.")
     for use in (predict_file, simulate_file):

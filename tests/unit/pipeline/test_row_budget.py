@@ -80,10 +80,10 @@ def test_fitted_rows_were_judged_where_they_are_the_beginning_of_a_test(
     assert (prepared.continues, prepared.lead_rows) == (0, rows)
     assert len(prepared.data) == rows + behind
     assert prepared.data.time_s[rows] >= FITTED
-    held = prepared.data.current_a[1:] * np.diff(prepared.data.time_s)
     read = read_measurement(whole)
     last = int(prepared.data.time_s[-1])
-    assert held.sum() == pytest.approx(float(read.current_a[1 : last + 1].sum()))
+    taken_ah, given_ah = (record.discharged_ah(record.hold_taken) for record in (prepared.data, read))
+    assert taken_ah[-1] == pytest.approx(given_ah[last])
 
 
 def test_a_test_that_goes_on_by_less_than_a_run_of_rows_keeps_a_row(whole, most):
