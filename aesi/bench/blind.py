@@ -18,7 +18,7 @@ import numpy as np
 
 from aesi.bench import some_chosen
 from aesi.bench.detectable import SEEN_NATS, seen_nats
-from aesi.bench.limit import LOST, NO_ANSWER, NO_TIME, NoAnswer, Stopwatch, answer_of
+from aesi.bench.limit import LOST, NO_ANSWER, NO_TIME, NoAnswer, Stopwatch, answer_of, timed
 from aesi.bench.scoring import TO_THE_NOISE, calibration, judge, rate
 from aesi.constants import MV_PER_V
 from aesi.data.blind import FULL, BlindCase, CaseSpec, cells_in, generate, label_of, plan, small_plan
@@ -209,8 +209,8 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
         ),
         **rate(covered, "covered").named("parameters_covered"),
         "calibration": calibration(answered),
-        "processor_s_median": _median([r["processor_s"] for r in rows]),
-        "processor_s_most": max((r["processor_s"] for r in rows), default=None),
+        "processor_s_median": _median([r["processor_s"] for r in timed(rows)]),
+        "processor_s_most": max((r["processor_s"] for r in timed(rows)), default=None),
         "confusion": _confusion(rows),
     }
 
