@@ -18,6 +18,7 @@ from aesi.errors import DataError, InputError
 from aesi.numerics.blocks import CountArray, Span, moving_block_weights, pieces, starts_mask
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.records import HeldOutDrive, Split
+from aesi.records.checked import check_whole_number
 from aesi.sparse.search.factors import Factors, factored
 from aesi.sparse.search.prepare import prepared_series
 from aesi.sparse.search.rows import (
@@ -75,9 +76,8 @@ class Options:
 
     def __post_init__(self) -> None:
         for name in ("resamples", "block", "horizon", "fold", "cuts"):
-            given = getattr(self, name)
-            if given is not None and not given >= 1:
-                raise InputError(f"{name} = {given}: give a whole number, at least 1.")
+            if (given := getattr(self, name)) is not None:
+                check_whole_number(name, given, 1)
         if not 0.0 < self.best <= 1.0:
             raise InputError(f"best = {self.best}: give the share of resamples, above 0 and at most 1.")
         for name, value, choices in (("regime", self.regime, Regime), ("outside", self.outside, Outside)):

@@ -391,8 +391,8 @@ def test_a_record_too_short_to_be_cut_was_told_to_lower_a_fold_that_nobody_gave(
 @pytest.mark.parametrize(
     ("asked", "sentence"),
     [
-        ({"resamples": 0}, "resamples = 0: give a whole number, at least 1"),
-        ({"block": 0}, "block = 0: give a whole number"),
+        ({"resamples": 0}, "resamples = 0 is not a whole number from 1"),
+        ({"block": 2.5}, "block = 2.5 is not a whole number from 1"),
         ({"best": 0.0}, "best = 0.0: give the share of resamples"),
         ({"regime": "both"}, "regime = 'both': choose from free_run, one_step"),
         ({"outside": "wrap"}, "outside = 'wrap': choose from"),
