@@ -31,7 +31,7 @@ NEWTON_STEPS = 60
 NEWTON_TOLERANCE_V = 1e-11
 """Tolerance of every potential: well below the 1e-9 V to which an effect vanishes at its neutral value."""
 UNSOLVED_V = 1e-6
-"""Residual of a potential, V, from which on the result of Newton's method is no solution: well below any noise."""
+"""Residual of a potential, V, beyond which the result of Newton's method is no solution: well below any noise."""
 FARTHEST_V = 20.0
 """Potentials of an electrode against the electrolyte lie within this, V, also far beyond the ends of a cell."""
 BISECTIONS = 60
@@ -100,8 +100,8 @@ def solve_units(lo, hi, side, total, at, particles, surfaces, memory):  # type: 
     """Newton's method on the currents of several units and on Phi, which is returned.
 
     Where a unit fills, its kinetic drop is a logarithm of the remaining room, and a full step passes the end of it:
-    steps are halved until they reduce the residual. Where that leads nowhere, the units of a single region are solved
-    by `solve_between`; several regions have no solution then, and Phi is NaN.
+    steps are halved until they reduce the residual. Where that leads nowhere, as beyond the ends of a cell, the units
+    of a single region are solved by `solve_between`; several regions keep what the last step left.
     """
     matrix, move, n, phi = memory.matrix, memory.move, hi - lo, 0.0
     share, nearest, ohm, away = 1.0, math.inf, 0.0, math.inf
@@ -124,11 +124,9 @@ def solve_units(lo, hi, side, total, at, particles, surfaces, memory):  # type: 
         for i in range(n):
             memory.y[lo + i] += ahead * move[i]
         phi += ahead * move[n]
-    if away < UNSOLVED_V:
-        return phi
-    if memory.ohm.shape[0] == 1:
+    if away > UNSOLVED_V and memory.ohm.shape[0] == 1:
         return solve_between(lo, hi, side, total, at, particles, surfaces, memory)
-    return math.nan
+    return phi
 
 
 @compiled

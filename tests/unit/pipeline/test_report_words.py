@@ -278,7 +278,7 @@ def test_a_written_model_that_leaves_more_of_what_it_was_fitted_to_than_a_refit_
 def test_a_contradicted_temperature_is_told_in_the_first_sentence(views):
     view = views.discovery_view(200, verdict="unknown")
     doubted = replace(view, discovery=view.discovery | {"other_temperature": ["a", "b"]})
-    assert ". The voltage of a and b contradicts its temperature." in discoveries.discovery_finding(doubted)
+    assert ". The voltage of a and b contradicts their temperature." in discoveries.discovery_finding(doubted)
 
 
 def test_the_first_sentence_buried_the_verdict_under_figures_that_the_lines_below_repeat(views, tmp_path):
