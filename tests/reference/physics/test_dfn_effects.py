@@ -35,6 +35,7 @@ def ours(peer, effect, **parameters):
     return simulate(peer.cell, peer.time, peer.current, peer.soc0, active, model="dfn")
 
 
+@pytest.mark.slow
 def test_self_heating_is_thermal_lumped_with_the_heat_of_mixing(pulsed):
     update = {"Total heat transfer coefficient [W.m-2.K-1]": COEFFICIENT_W_M2_K}
     heated = {"thermal": "lumped", "heat of mixing": "true"}
