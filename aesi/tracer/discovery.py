@@ -280,14 +280,11 @@ def _discovery_of(
     files = outcomes(records, states, tested, rng)
     inside, soc0 = evidence.after.folded_cell()
     left = _structure_of(records, states["after"])
-    # A finding that may not be written is judged on the test part all the same.
-    explained = (
-        files
-        if evidence.fault is None
-        else outcomes(
-            records, states | {"after": fitted.with_file_capacity()}, tested, np.random.default_rng(0)
-        )
-    )
+    explained = files
+    if evidence.fault is not None and verdict.word != "unknown":
+        # A finding that may not be written is judged on the test part all the same.
+        found = states | {"after": fitted.with_file_capacity()}
+        explained = outcomes(records, found, tested, np.random.default_rng(0))
     return Discovery(
         cell=inside.cell,
         verdict=verdict,

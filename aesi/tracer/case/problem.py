@@ -197,9 +197,8 @@ class InverseProblem:
         except (AesiError, FloatingPointError, ZeroDivisionError, OverflowError):
             return None
         joined = np.concatenate(out)
-        return (
-            joined if (np.abs(joined) < NO_CELLS_V).all() else None
-        )  # this way round, NaN is no voltage either
+        possible = np.abs(joined) < NO_CELLS_V  # False for NaN, too
+        return joined if possible.all() else None
 
     def _voltage_v(self, i: int, soc0: float, effects: tuple[ActiveEffect, ...], share: float = 1.0) -> Array:
         return self.run(self.fit_parts[i], soc0, effects, self.records[i].thin_hold, share=share).voltage_v
