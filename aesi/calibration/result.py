@@ -56,10 +56,12 @@ def ends_sentences(
     end.  of_file : index of the end that was reached from the start file.  failed : number of drawn starts from which
     there is no end, since they cannot be simulated.
     """
-    lost = (
-        f"{failed} of {failed + len(costs) - 1} drawn start{'s' if failed + len(costs) > 2 else ''} cannot be "
-        "simulated on these records and gave no end.",
-    ) * bool(failed)
+    lost: tuple[str, ...] = ()
+    if failed:
+        lost = (
+            f"{failed} of {failed + len(costs) - 1} drawn start{'s' if failed + len(costs) > 2 else ''} cannot be "
+            "simulated on these records and gave no end.",
+        )
     if len(costs) == 1:
         return lost
     taken, *others = ends

@@ -138,9 +138,8 @@ def solve_between(lo, hi, side, total, at, particles, surfaces, memory):  # type
     """
     first = side * memory.ohm.shape[0]
     lowest, highest = -FARTHEST_V, FARTHEST_V
-    beyond = (
-        1.0 + FARTHEST_V / BEYOND_RANGE_V
-    )  # a potential within bounds has its stoichiometry within 1 +/- this
+    # A potential within the bounds has its stoichiometry within 1 +/- beyond.
+    beyond = 1.0 + FARTHEST_V / BEYOND_RANGE_V
     for _ in range(BISECTIONS):
         potential = 0.5 * (lowest + highest)
         for u in range(lo, hi):

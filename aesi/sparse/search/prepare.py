@@ -10,7 +10,7 @@ from aesi.errors import DataError
 from aesi.numerics.typing import Array
 from aesi.records import ErrorSeries, Split
 from aesi.records.checked import row_words
-from aesi.sparse.terms.inputs import with_inputs
+from aesi.sparse.terms.inputs import same_step, with_inputs
 from aesi.sparse.terms.library import Library
 
 
@@ -54,7 +54,7 @@ def _check_record(record: ErrorSeries, dt_s: float) -> None:
     """Raises DataError for a record that is too short, sampled otherwise, or not finite."""
     if len(record) < 3:
         raise DataError(f"{record.name}: {len(record)} samples are too few; a record needs at least 3.")
-    if abs(record.dt_s / dt_s - 1.0) > 0.01:
+    if not same_step(record.dt_s, dt_s):
         raise DataError(
             f"{record.name} is sampled every {record.dt_s:g} s, the first record every {dt_s:g} s."
         )
