@@ -26,6 +26,7 @@ from aesi.tracer.decide.one_cause import with_one_effect
 from aesi.tracer.decide.verdict import (
     Thresholds,
     Verdict,
+    explained_words,
     partly_explained,
     tolerance_v,
     unexplained_v,
@@ -245,7 +246,10 @@ def plausible_or_unknown(path: Path, verdict: Verdict) -> Verdict:
 def _at_exact_trust(
     problem: InverseProblem, path: Path, verdict: Verdict, archive: Archive, thresholds: Thresholds
 ) -> tuple[Path, Verdict]:
-    """(path, verdict) of the same finding at the trust `exact`, where that scores as well on unseen data."""
+    """(path, verdict) of the same finding at the trust `exact`, where that scores as well on unseen data.
+
+    Errors and reason are those of the new fit. The margin stays that of the search, from which the confidence is read.
+    """
     exact = replace(problem, trust="exact")
     found = refitted(exact, path, archive)
     if found is None:
@@ -254,7 +258,10 @@ def _at_exact_trust(
         return path, verdict
     allowed = tolerance_v(found.problem, thresholds)
     left = unexplained_v(found.problem, found.blocks, found.chosen, allowed)
-    return (path, verdict) if left > allowed else (found, replace(verdict, structured_v=left))
+    if left > allowed:
+        return path, verdict
+    words = explained_words(found, left, allowed)
+    return found, replace(verdict, structured_v=left, tolerance_v=allowed, reason=words)
 
 
 def _with_one_cause(

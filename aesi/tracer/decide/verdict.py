@@ -168,11 +168,8 @@ def verdict_on(path: Path, thresholds: Thresholds) -> Verdict:
         )
         return Verdict("unknown", (), (), 0.0, left, allowed, reason, margin)
     if not path.chosen.hypothesis:
-        reason = (
-            f"the error on unseen data is {1e3 * left:.2f} mV beyond the noise, and a right model leaves at most "
-            f"{1e3 * allowed:.2f} mV"
-        )
-        return Verdict("none", (), (), 0.0, left, allowed, reason, -best_gain(path))
+        words = explained_words(path, left, allowed)
+        return Verdict("none", (), (), 0.0, left, allowed, words, -best_gain(path))
     conditions = [name for name in ("rate", "charge") if name in path.blocks.folds]
     tested, by = max(
         (predicted_share(path.problem, path.blocks, path.chosen, allowed, name), name) for name in conditions
@@ -185,12 +182,25 @@ def verdict_on(path: Path, thresholds: Thresholds) -> Verdict:
         )
         return Verdict("unknown", (), (), 0.0, left, allowed, reason, 0.0)
     groups, margin = look_alikes(path, thresholds, allowed)
-    before = structured_v(path, path.base)
-    reason = (
-        f"the error on unseen data is {1e3 * before:.2f} mV beyond the noise without the finding, "
-        f"{1e3 * left:.2f} mV with it"
+    words = explained_words(path, left, allowed)
+    return Verdict("found", path.chosen.hypothesis, groups, 0.0, left, allowed, words, margin)
+
+
+def explained_words(path: Path, left_v: float, allowed_v: float) -> str:
+    """The reason of a verdict where the chosen hypothesis explains the data, a clause.
+
+    left_v : `unexplained_v` of the chosen hypothesis.  allowed_v : the largest that a right one may leave, V RMS.
+    """
+    if not path.chosen.hypothesis:
+        return (
+            f"the error on unseen data is {1e3 * left_v:.2f} mV beyond the noise, and a right model leaves at most "
+            f"{1e3 * allowed_v:.2f} mV"
+        )
+    before_v = structured_v(path, path.base)
+    return (
+        f"the error on unseen data is {1e3 * before_v:.2f} mV beyond the noise without the finding, "
+        f"{1e3 * left_v:.2f} mV with it"
     )
-    return Verdict("found", path.chosen.hypothesis, groups, 0.0, left, allowed, reason, margin)
 
 
 def _tried_words(path: Path) -> str:

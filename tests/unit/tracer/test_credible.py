@@ -10,7 +10,8 @@ import pytest
 from aesi.physics.effects import CATALOGUE
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import prepare_all
-from aesi.tracer.decide.verdict import Thresholds, verdict_on
+from aesi.tracer.decide.evidence import searched_answer
+from aesi.tracer.decide.verdict import Thresholds, structured_v, tolerance_v, verdict_on
 from aesi.tracer.likelihood.credible import interval_distances
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.gaussian import BlockSums, Posterior
@@ -149,3 +150,16 @@ def test_of_effects_that_say_nothing_another_one_was_listed_first_in_each_versio
         for effect, score in (("first", 0.0), ("second", 3e-14), ("third", 5.0), ("last", -0.1))
     ]
     assert [row.effect for row in best_first(rows)] == ["third", "first", "second", "last"]
+
+
+def test_the_reason_has_the_errors_of_the_fit_that_the_verdict_is_about(cell, few, make):
+    """The symptom: a finding refitted with the file as declared was told with the errors of the search before."""
+    data = make((CATALOGUE["series_resistance"].activate(resistance_ohm=3e-4),))
+    problem = InverseProblem(cell, prepare_all(cell, [data], 0.9, 0.3), few)
+    answer = searched_answer(problem, 2, Archive(None, ""), Thresholds(), lambda *_: None)
+    path, verdict = answer.path, answer.verdict
+    assert path.problem.trust == "exact" != answer.paths["tight"].problem.trust
+    before_mv, left_mv = 1e3 * structured_v(path, path.base), 1e3 * verdict.structured_v
+    assert f" {before_mv:.2f} mV beyond the noise without the finding" in verdict.reason
+    assert verdict.reason.endswith(f" {left_mv:.2f} mV with it")
+    assert verdict.tolerance_v == tolerance_v(path.problem, Thresholds())
