@@ -24,7 +24,7 @@ import numpy as np
 
 from aesi.constants import COLDEST_DEGC, WARMEST_DEGC, ZERO_CELSIUS_K
 from aesi.errors import AesiError, NoNumberError, OwnEffectError, ParameterError
-from aesi.numerics.typing import Array, IntArray
+from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.over_time import stamp
 from aesi.parameters import Parameter, checked
 from aesi.physics.model import EspmModel
@@ -86,24 +86,29 @@ class Record:
         now = self.current_at(time, backward)
         return Record(time, now, kelvin), np.searchsorted(time, read)
 
-    def beside_voltage(self, backward: bool) -> Record:
+    def beside_voltage(self, backward: bool, mean: bool = False) -> Record:
         """The record with one row per reading of the voltage, and the current that flowed there.
 
         Where a held current changes within a row (a pulse begins after a long row), the row has the mean current that
-        moves its charge.
+        moves its charge; with `mean` all rows have, for readings that are averaged over rows. The current at the
+        instants of the readings does not change with a lag until that exceeds a row, so that no slope would tell of it.
         """
         if self.read_s is None:
             return self
         read = self._snapped()
         current = self.current_at(read, backward)
         if backward and len(read) > 1:
-            within = self._row_of(read)[1:]
-            long_s = np.diff(self.time_s, prepend=-np.inf, append=np.inf)
-            long_s = np.where(read[1:] > self.time_s[-1], np.inf, long_s[within])
-            whole = np.abs(long_s - np.diff(read)) <= SAME_LENGTH * np.diff(read)
-            current[1:] = np.where(whole, current[1:], np.diff(self._charge(read)) / np.diff(read))
+            means = np.diff(self._charge(read)) / np.diff(read)
+            current[1:] = means if mean else np.where(self._whole_rows(read), current[1:], means)
         kelvin = self.temperature_k
         return Record(read, current, None if kelvin is None else np.interp(read, self.time_s, kelvin))
+
+    def _whole_rows(self, read_s: Array) -> BoolArray:
+        """(n - 1,) True where the readings read_s (n,) s are as far apart as the rows of the current there."""
+        within = self._row_of(read_s)[1:]
+        long_s = np.diff(self.time_s, prepend=-np.inf, append=np.inf)
+        long_s = np.where(read_s[1:] > self.time_s[-1], np.inf, long_s[within])
+        return np.asarray(np.abs(long_s - np.diff(read_s)) <= SAME_LENGTH * np.diff(read_s))
 
     def _snapped(self) -> Array:
         """(n,) s, times of the readings, snapped to a row within `SAME_INSTANT_S`."""

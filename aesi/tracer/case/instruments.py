@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 
-from aesi.data.thinning import Averaged
+from aesi.data.thinning import Averaged, Window
 from aesi.physics.effect import ActiveEffect, Effect, Record, as_cell_saw
 from aesi.records import Measurement
 
@@ -34,7 +34,8 @@ def instruments_undone(
 def _seen_by_cell(data: Averaged, acting: tuple[ActiveEffect, ...]) -> Measurement:
     """The record without the instruments' faults. Cached, since few of the parameters that a fit moves are theirs."""
     written = Record(data.finer.time_s, data.finer.current_a)
-    record = as_cell_saw(written, acting).beside_voltage(data.window.hold == "backward")
+    saw = as_cell_saw(written, acting)
+    record = saw.beside_voltage(data.window.hold == "backward", mean=isinstance(data.window, Window))
     return data.with_record(record.time_s, record.current_a)
 
 

@@ -51,6 +51,26 @@ def test_a_lag_of_half_a_second_is_seen_in_rows_of_a_second(cell, rng):
     assert np.array_equal(still, bare)
 
 
+def test_a_lag_of_less_than_a_row_is_seen_where_the_current_is_held(cell, rng):
+    """The symptom: a held current at the instant of a reading does not change within a row, so that no slope told of a
+    lag, and one of 2 s in a drive at 5 Hz stayed at 0."""
+    time = np.arange(0.0, 600.0, 0.2)
+    current = np.repeat(rng.normal(0.0, 10.0, 300), 10)
+    true = simulate(cell, time, current, soc0=0.8, hold="backward").voltage_v
+    late = Measurement(time, current, np.interp(time - 2.0, time, true), hold="backward", name="late")
+    problem = inverse_problem(cell, [late], soc0=0.8)
+    assert len(problem.measured) < len(time) / 4
+
+    def predicted_v(lag_s):
+        return problem.predict({"soc0": {"0": 0.8}, "clock_skew": {"skew": 0.0, "lag_s": lag_s}})
+
+    slopes = [(predicted_v(lag_s) - predicted_v(0.0)) / lag_s for lag_s in (0.002, 0.02, 0.2)]
+    for slope in slopes[:2]:
+        np.testing.assert_allclose(slope[2:-2], slopes[2][2:-2], atol=0.1 * np.abs(slopes[2]).max())
+    left_v = [np.sqrt(np.mean((problem.measured - predicted_v(lag_s)) ** 2)) for lag_s in (0.0, 1.0, 2.0)]
+    assert left_v[2] < 0.1 * left_v[1] < 0.1 * left_v[0]
+
+
 def test_a_thinned_record_of_the_declared_cell_leaves_nothing(cell, rng):
     time = np.arange(0.0, 900.0, 0.1)
     jumps = np.repeat(rng.normal(5.0, 60.0, 180), 50)
