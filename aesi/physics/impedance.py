@@ -9,9 +9,10 @@ where there is one, is parallel to both:
     x_u = -(lump/(jw) + sum gains/(jw + rates)) y_u,      phi_u = U' x_u + R_u y_u,      i_r = sum_u y_u + jw C phi_r
 
 All regions of an electrode share one potential, as in the time domain; the porous electrode is in `dfn.linear`. Left
-out is all that has no linear response at rest: hysteresis (a small sine stays within the loop), plating, and the heat
-of losses, which is of second order. The heat of entropy is of first order, T (dU/dT)**2 / (jw C + G) for a cell that
-warms itself, and is left out too: 0.03 mohm at 0.1 mV/K and 0.1 W/K, below the thermal time constant.
+out is what has no linear response at rest: plating, and the heat of losses, which is of second order. Two of first
+order are left out, too. A hysteresis follows the charge, M k/(jw Q): 1.8 mohm at 1 mHz for 10 mV, a rate of 20 and 5
+Ah. The heat of entropy gives T (dU/dT)**2 / (jw C + G) for a cell that warms itself: 0.03 mohm at 0.1 mV/K and 0.1 W/K,
+below the thermal time constant.
 
 Source: Meddings et al., J. Power Sources 480 (2020) 228742, doi:10.1016/j.jpowsour.2020.228742, for the practice.
 """

@@ -1,4 +1,4 @@
-"""Charge throughput from samples, by direction."""
+"""Charge throughput from samples, in the order in which it flows."""
 
 import numpy as np
 
@@ -7,23 +7,23 @@ from aesi.numerics.typing import Array
 from aesi.physics.effect import Trace
 
 
-def step_throughput_ah(trace: Trace) -> tuple[Array, Array]:
-    """(discharged, charged), (n - 1,) Ah each, >= 0, in each step of the record.
+def step_charges_ah(trace: Trace) -> tuple[Array, Array]:
+    """(n - 1,) Ah each, positive on discharge: the charge of each step before its current changes sign, and after that
+    (0 where it does not).
 
-    Exact for straight lines between samples (also where the sign changes within a step) and for held rows.
+    Exact for straight lines between samples and for held rows.
     """
     dt = np.diff(trace.time_s) / SECONDS_PER_HOUR
     end = trace.current_a[1:]
     start = end if trace.backward else trace.current_a[:-1]
-    out, into = np.maximum(end, 0.0), np.maximum(start, 0.0)
     crosses = start * end < 0
     span = np.where(crosses, np.abs(end - start), 1.0)
-    discharge = np.where(crosses, 0.5 * np.maximum(start, end) ** 2 / span, 0.5 * (out + into))
-    charge = discharge - 0.5 * (start + end)
-    return discharge * dt, charge * dt
+    before = np.where(crosses, 0.5 * start * np.abs(start) / span, 0.5 * (start + end))
+    after = np.where(crosses, 0.5 * end * np.abs(end) / span, 0.0)
+    return before * dt, after * dt
 
 
 def throughput_ah(trace: Trace) -> Array:
     """(n,) Ah, integral of |I| since the first sample."""
-    discharge, charge = step_throughput_ah(trace)
-    return np.concatenate([[0.0], np.cumsum(discharge + charge)])
+    before, after = step_charges_ah(trace)
+    return np.concatenate([[0.0], np.cumsum(np.abs(before) + np.abs(after))])

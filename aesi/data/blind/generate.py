@@ -263,9 +263,7 @@ def _with_stranger(
 
 
 def _with_added_voltage(trace: TrueRun, added_v: Array) -> TrueRun:
-    return TrueRun(
-        trace.time_s, trace.current_a, trace.voltage_v + added_v, trace.temperature_degc, trace.soc
-    )
+    return replace(trace, voltage_v=trace.voltage_v + added_v)
 
 
 def label_of(spec: CaseSpec) -> str:
@@ -289,6 +287,6 @@ def _as_measured(
     spec: CaseSpec, written: Written, trace: TrueRun, rng: np.random.Generator, between: int
 ) -> Measurement:
     instrument = Instrument(spec.voltage_noise_v, spec.current_noise_a)
-    degc, soc = trace.temperature_degc[::between], trace.soc[::between]
-    shown = TrueRun(written.time_s, written.current_a, written.voltage_v, degc, soc)
+    degc = trace.temperature_degc[::between]
+    shown = TrueRun(written.time_s, written.current_a, written.voltage_v, degc)
     return instrument.write(shown, spec.name, rng, spec.warmth != "none")

@@ -75,13 +75,12 @@ class Applied:
 
 @dataclass(frozen=True, eq=False)
 class TrueRun:
-    """A simulated run without noise. voltage_v, temperature_degc, soc : (n,)."""
+    """A simulated run without noise. voltage_v, temperature_degc : (n,)."""
 
     time_s: Array
     current_a: Array
     voltage_v: Array
     temperature_degc: Array
-    soc: Array
 
 
 @dataclass(frozen=True)
@@ -136,7 +135,7 @@ def simulate_truth(setup: Setup, profile: Profile, between: int = 1) -> TrueRun:
     time = finer(profile.time_s, between)
     kept = cached("laboratory", key, lambda: _simulate(setup, profile, time, values))
     current = np.interp(time, profile.time_s, profile.current_a)
-    return TrueRun(time, current, kept["voltage_v"], kept["temperature_degc"], kept["soc"])
+    return TrueRun(time, current, kept["voltage_v"], kept["temperature_degc"])
 
 
 def finer(time_s: Array, between: int) -> Array:
@@ -227,16 +226,11 @@ def _simulate(setup: Setup, profile: Profile, time: Array, values: Any) -> dict[
             "a pulse was stepped over."
         )
     current = np.interp(time, profile.time_s, current)
-    charge = np.concatenate([[0.0], np.cumsum(0.5 * (current[1:] + current[:-1]) * np.diff(time))])
     for change, chosen in changes:
         voltage = change.terminal_voltage(time, current, voltage, chosen)
     if not np.all(np.isfinite(voltage)):
         raise SimulationError(f"{profile.name}: the model gave no finite voltage.")
-    return {
-        "voltage_v": voltage,
-        "temperature_degc": temperature,
-        "soc": profile.soc0 - charge / SECONDS_PER_HOUR / capacity,
-    }
+    return {"voltage_v": voltage, "temperature_degc": temperature}
 
 
 def _many_sizes(setup: Setup) -> bool:

@@ -16,7 +16,7 @@ Storage 48 (2022) 103985, doi:10.1016/j.est.2022.103985.
 
 from aesi.parameters import Parameter
 from aesi.physics.effect import Contribution, Effect, Trace
-from aesi.physics.throughput import step_throughput_ah
+from aesi.physics.throughput import step_charges_ah
 
 PARAMETERS = {
     "magnitude_v": Parameter(
@@ -58,8 +58,8 @@ def hysteresis(
     """M(z) h (n,) V, and h (n,) as the state `hysteresis`."""
     from aesi.physics.relaxation import relax
 
-    discharge, charge = step_throughput_ah(trace)
-    state = relax(discharge, charge, rate / trace.model.cell.nominal_capacity_ah, start)
+    before, after = step_charges_ah(trace)
+    state = relax(before, after, rate / trace.model.cell.nominal_capacity_ah, start)
     magnitude = magnitude_v * (1.0 + low_soc_excess * (1.0 - 2.0 * trace.series["soc"]))
     return Contribution(magnitude * state, {"hysteresis": state})
 

@@ -226,7 +226,7 @@ def test_strangers_are_structured_and_start_at_nothing_they_could_not_know(name,
     time = np.arange(1200.0)
     current = np.where((time // 60) % 3 == 1, 30.0, np.where((time // 60) % 3 == 2, -10.0, 0.0))
     voltage = 3.7 - 2e-3 * current - 1e-4 * time
-    trace = TrueRun(time, current, voltage, np.full(1200, 25.0), np.full(1200, 0.5))
+    trace = TrueRun(time, current, voltage, np.full(1200, 25.0))
     shift = STRANGERS[name].shift(trace, 30.0, rng)
     assert shift.shape == time.shape
     assert 0.5e-3 < np.sqrt(np.mean(shift**2)) < 0.1

@@ -47,14 +47,12 @@ def test_a_short_pulse_after_a_long_rest_is_not_stepped_over(nmc):
     pieces = [BUILDER.rest(3000), BUILDER.pulse(2.0, 5), BUILDER.rest(1000)]
     trace = simulate_truth(Setup(nmc, "SPMe"), BUILDER.profile("late", pieces, 0.6))
     assert trace.voltage_v[2000] - trace.voltage_v[3002] > 0.05
-    assert trace.soc[-1] == pytest.approx(0.6 - 2.0 * 5 / 3600, abs=1e-9)
 
 
 def test_rows_between_those_of_a_profile_are_simulated_and_no_straight_lines(nmc):
     coarse, fine = (simulate_truth(Setup(nmc, "SPMe"), short(), between) for between in (1, 4))
     np.testing.assert_allclose(fine.time_s[::4], coarse.time_s)
     np.testing.assert_allclose(fine.voltage_v[::4], coarse.voltage_v, atol=2e-5)
-    np.testing.assert_allclose(fine.soc[::4], coarse.soc, atol=1e-9)
     lines = np.interp(fine.time_s, coarse.time_s, coarse.voltage_v)
     assert np.max(np.abs(fine.voltage_v - lines)) > 1e-3
 
@@ -200,7 +198,7 @@ def test_unknown_changes_and_values_are_refused(nmc, tmp_path):
 
 def test_the_instrument_writes_noise_and_steps(rng):
     n = 20_000
-    trace = TrueRun(np.arange(n) * 1.0, np.zeros(n), np.full(n, 3.7), np.full(n, 25.0), np.full(n, 0.5))
+    trace = TrueRun(np.arange(n) * 1.0, np.zeros(n), np.full(n, 3.7), np.full(n, 25.0))
     record = Instrument(voltage_step_v=1e-3).write(trace, "x", rng, temperature=True)
     # The standard error of a deviation from 20,000 samples is 0.5 %; the steps add (1 mV)^2 / 12.
     assert np.std(record.voltage_v) == pytest.approx(1e-3 * np.sqrt(1 + 1 / 12), rel=0.03)

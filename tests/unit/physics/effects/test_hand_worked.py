@@ -57,6 +57,15 @@ def test_hysteresis_settles_on_the_discharge_branch_and_stays_there_at_rest():
     assert added[199:] == pytest.approx(-0.02, abs=1e-5)  # exp(-500 * 0.11) is nothing
 
 
+@pytest.mark.parametrize("first", [1.0, -1.0], ids=["discharge", "charge"])
+def test_hysteresis_ends_on_the_branch_of_what_flows_last_within_a_row(first):
+    # A straight line from +30 to -30 A or back in a minute moves 0.125 Ah either way.
+    time, current = np.array([0.0, 60.0]), np.array([30.0, -30.0]) * first
+    state = run("ocv_hysteresis", current, time, magnitude_v=0.02, rate=500.0).series["hysteresis"]
+    decay = np.exp(-500.0 * 0.125 / CELL.nominal_capacity_ah)
+    assert state[-1] == pytest.approx(first * (1.0 - (1.0 + (1.0 - decay)) * decay))
+
+
 def test_hysteresis_forgets_its_start_by_a_factor_e_in_a_capacity_over_the_rate():
     current = np.full(len(TIME), 30.0)
     added = shift("ocv_hysteresis", current, magnitude_v=0.02, rate=20.0, start=1.0)
