@@ -25,7 +25,8 @@ class RunTaken(AesiError):
 class RunRecord:
     """One flow run. status : running, killed, failed or finished; started_s : seconds since the epoch.
 
-    config_digest : what another run has to share to go on with it.
+    config_digest : what another run has to share to go on with it.  anew : whether it takes no result that another run
+    has stored (`--no-cache`), which holds for whoever goes on with it.
     """
 
     run_id: str
@@ -34,6 +35,7 @@ class RunRecord:
     uri: str
     started_s: float
     status: str = "running"
+    anew: bool = False
 
     def write(self) -> None:
         """Keep it on disk."""

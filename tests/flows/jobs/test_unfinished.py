@@ -54,6 +54,17 @@ def test_of_two_runs_the_newer_one_is_gone_on_with(store, unfinished, held, befo
     assert _unfinished(config, store, Console(), held) == (other if before_s > 0.0 else record)
 
 
+@pytest.mark.parametrize(("begun_anew", "cache"), [(True, True), (True, False), (False, False)])
+def test_a_run_without_cache_was_gone_on_with_from_the_cache(store, unfinished, workspace, begun_anew, cache):
+    _, before = unfinished
+    replace(before, anew=begun_anew).write()
+    request = RunRequest(str(workspace / "small.yaml"), resume=True, use_cache=cache)
+    with working_on(request, store, Console()) as (tracker, record):
+        assert record.anew
+        same = tracker.run_id == before.run_id
+        assert same == begun_anew  # what the other one has tracked may have come from the cache
+
+
 @pytest.mark.parametrize("gone", ["deleted", "never there"])
 def test_a_run_that_the_store_has_no_more_was_gone_on_with_and_ended_in_a_traceback(
     store, unfinished, held, capsys, gone
@@ -119,7 +130,7 @@ def test_a_run_was_tracked_and_noted_before_it_was_this_processs_alone(
     monkeypatch.setattr(RunRecord, "write", watched)
     path = str(workspace / "small.yaml")
     for resume in (True, False):
-        with working_on(RunRequest(path, resume=resume), store, Console()) as tracker:
+        with working_on(RunRequest(path, resume=resume), store, Console()) as (tracker, _):
             assert taken(tracker.run_id)
         assert not taken(tracker.run_id)
     with tracked_job(Subject("job", 0, "key", "batch"), "title", Console()) as tracker:
