@@ -79,7 +79,7 @@ def tracked_job(subject: Subject, title: str, console: Console) -> Iterator[Trac
         console.say(f"not tracked: {error}")
         yield None
         return
-    record = RunRecord(tracker.run_id, subject.name, subject.digest, store.uri, time.time())
+    record = RunRecord(tracker.run_id, subject.name, subject.digest, time.time())
     with RunLock(tracker.run_id):
         record.write()
         with _ended_as_it_ends(record, tracker, console):
@@ -111,7 +111,7 @@ def _ended_as_it_ends(record: RunRecord, tracker: Tracker, console: Console) -> 
     if left:
         from flows.base.store_address import without_login
 
-        place = without_login(record.uri)
+        place = without_login(tracker.store.uri)
         console.say(f"tracking: {left} items could not be delivered to {place}; the next run delivers them.")
 
 
@@ -132,7 +132,7 @@ def _begin(
         record = replace(old, status="running")
     else:
         key = resume_key(config)
-        record = RunRecord(tracker.run_id, config.name, key, store.uri, time.time(), anew=anew)
+        record = RunRecord(tracker.run_id, config.name, key, time.time(), anew=anew)
         held.enter_context(RunLock(tracker.run_id))  # before anybody could find its record without
     record.write()
     return tracker, record
@@ -197,7 +197,7 @@ def _unfinished(
 
     anew : whether it has to be one that was begun anew too: what another has tracked may have come from the cache.
     """
-    there = [one for one in records(config.name) if one.status in UNFINISHED and one.uri == store.uri]
+    there = [one for one in records(config.name) if one.status in UNFINISHED]
     key = resume_key(config) if there else ""
     for record in there:
         if record.config_digest != key or record.anew < anew or not store.holds(record.run_id):
@@ -217,7 +217,7 @@ def _unfinished(
 def _close_killed(experiment: str, store: Store, console: Console) -> None:
     """A run that was killed stays RUNNING in MLflow for ever; whoever comes next closes it."""
     for record in records(experiment):
-        if record.status != "running" or record.uri != store.uri:
+        if record.status != "running" or not store.holds(record.run_id):
             continue
         with suppress(RunTaken), RunLock(record.run_id) as lock:
             if lock.held and record.again() == record:
