@@ -30,7 +30,8 @@ class Evaluation:
     """The candidates of one study. Called with a generation, yields (position, outcome) as they come.
 
     study : content key of the problem, so that the same genome on other data is another candidate.
-    reuse : whether outcomes that an earlier run has stored are taken; what this run stores is shared in any case.
+    only_of : id of the run whose outcomes alone are taken of those that are stored: it marks what it puts there, and
+    finds it when it is gone on with. None takes those of all. What a run stores is shared in any case.
     lost_again : whether candidates that an earlier run lost to its machine (time, memory, a killed process) are
     evaluated again, instead of failing every run from then on.
     """
@@ -42,14 +43,14 @@ class Evaluation:
         study: str,
         say: Callable[[str], None],
         tally: Tally,
-        reuse: bool = True,
+        only_of: str | None = None,
         lost_again: bool = False,
     ) -> None:
         self._pool = pool
         self._outcomes = outcomes
         self._study = study
         self._say = say
-        self._reuse = reuse
+        self._only_of = only_of
         self._lost_again = lost_again
         self._fresh: set[str] = set()
         self._store_lost = False
@@ -99,7 +100,7 @@ class Evaluation:
         return outcome
 
     def _stored(self, key: str) -> Any:
-        if not self._reuse and key not in self._fresh:
+        if self._only_of is not None and not self._is_own(key, self._only_of):
             return None
         data = self._from_store(self._outcomes.get, key, None)
         if data is None:
@@ -113,10 +114,16 @@ class Evaluation:
         lost = isinstance(outcome, Failed) and outcome.of_machine
         return None if lost and self._lost_again and key not in self._fresh else outcome
 
+    def _is_own(self, key: str, run: str) -> bool:
+        """Whether the run has put the outcome there, in this process or in one before that worked on it."""
+        return key in self._fresh or self._from_store(self._outcomes.get, _mark(key, run), None) is not None
+
     def _store(self, key: str, outcome: Any) -> None:
         try:
             self._outcomes.put(key, codec.dumps(outcome))
             self._fresh.add(key)
+            if self._only_of is not None:
+                self._outcomes.put(_mark(key, self._only_of), b"")
         except OSError as error:
             self._say_store_lost(error)
         self._from_store(self._outcomes.release, key, None)
@@ -138,3 +145,8 @@ class Evaluation:
                 f"cache: candidates cannot be stored or looked up ({error.strerror or error}); the search goes on "
                 "without, and a resumed or another one evaluates them again."
             )
+
+
+def _mark(key: str, run: str) -> str:
+    """The key under which a run that takes its own outcomes alone notes that it has stored one."""
+    return fingerprint.key(run, key)

@@ -31,11 +31,11 @@ def run_experiment(request: RunRequest, run: Stages, console: Console) -> Path:
     config = request.config
     console.say(f"{config.name}: {config.note}" if config.note else config.name)
     store = Store(config.tracking.uri)
-    with working_on(request, store, console) as tracker:
+    with working_on(request, store, console) as (tracker, record):
         # Seconds, which the first line of a run is not kept for.
         from flows.jobs.experiment_stages import ExperimentJob
 
-        folder = ExperimentJob(request, tracker, run, console, started).results()
+        folder = ExperimentJob(config, tracker, record.anew, run, console, started).results()
     console.say(f"Finished in {duration(time.monotonic() - started)}.")
     console.say(f"Report: {_shown(folder / REPORT)}")
     where = _uri_option(config.tracking.uri)

@@ -27,7 +27,6 @@ from aesi.sparse import Problem
 from flows.base import environment
 from flows.base.console import Console
 from flows.base.stage_cache import Cache
-from flows.jobs.run_request import RunRequest
 from flows.jobs.stages import Stages
 from flows.search.study import StudyResult, run_study
 from flows.tracking.experiment_log import UNFITTED, CandidateTracker, result_line, track_result, track_start
@@ -38,11 +37,12 @@ from flows.tracking.tracker import Tracker
 class ExperimentJob:
     """One run of an experiment: what was asked, where it is tracked, who runs its stages and says what comes of them.
 
-    started : `time.monotonic()` then.
+    anew : whether it takes nothing that another run has stored.  started : `time.monotonic()` then.
     """
 
-    request: RunRequest
+    config: ExperimentConfig
     tracker: Tracker
+    anew: bool
     run: Stages
     console: Console
     started: float
@@ -63,7 +63,7 @@ class ExperimentJob:
         return folder
 
     def _load(self) -> Loaded:
-        loaded = self.run("data and physics", lambda: load(self.request.config), retries=2)
+        loaded = self.run("data and physics", lambda: load(self.config), retries=2)
         for note in together(loaded.notes):
             self.console.say(f"  {note}")
         return loaded
@@ -84,7 +84,7 @@ class ExperimentJob:
                 problem,
                 config,
                 self.console,
-                self.request.use_cache,
+                self.tracker.run_id if self.anew else None,
                 follow,
                 publish_as=name,
                 on_generation=lambda done, total: self.run.progress("search", done, total),
@@ -98,7 +98,7 @@ class ExperimentJob:
         return found
 
     def _fit(self, found: StudyResult, config: ExperimentConfig, problem: Problem) -> FinalModels:
-        cache = Cache(self.console.say, self.request.use_cache)
+        cache = Cache(self.console.say, not self.anew)
         key = (config.digest, found.key)
         models = self.run(
             "final models",

@@ -45,11 +45,11 @@ class RunRequest:
 
     @property
     def resuming(self) -> str:
-        """The command line that goes on with what this one began. It has no `--no-cache`, since it goes on from the
-        cache."""
+        """The command line that goes on with what this one began."""
         words = ["aesi", "run", self.path]
         words += [word for text in self.overrides for word in ("--set", text)]
         words += ["--runner", self.runner] if self.runner else []
         words += ["--address", self.address] if self.address else []
+        words += [] if self.use_cache else ["--no-cache"]
         words += [] if self.use_prefect else ["--no-prefect"]
         return shlex.join([*words, "--resume"])

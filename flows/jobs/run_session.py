@@ -36,8 +36,8 @@ class DiskFull(AesiError):
 
 
 @contextmanager
-def working_on(request: RunRequest, store: Store, console: Console) -> Iterator[Tracker]:
-    """The tracked run to work on, new or resumed, closed as what it becomes.
+def working_on(request: RunRequest, store: Store, console: Console) -> Iterator[tuple[Tracker, RunRecord]]:
+    """The tracked run to work on, new or resumed, and its record; closed as what it becomes.
 
     Raises DiskFull, with what to do, where there is no room for what the run has to keep, and RunTaken where another
     process works on the run that is to be gone on with.
@@ -47,7 +47,7 @@ def working_on(request: RunRequest, store: Store, console: Console) -> Iterator[
         tracker, record = _begin(request, config, store, console, held)
         kept = f"Everything so far is kept; go on with: {request.resuming}"
         with kept_on_interrupt(kept), _ended_as_it_ends(record, tracker, console):
-            yield tracker
+            yield tracker, record
 
 
 @contextmanager
@@ -79,7 +79,7 @@ def tracked_job(subject: Subject, title: str, console: Console) -> Iterator[Trac
         console.say(f"not tracked: {error}")
         yield None
         return
-    record = RunRecord(tracker.run_id, subject.name, subject.digest, store.uri, time.time())
+    record = RunRecord(tracker.run_id, subject.name, subject.digest, time.time())
     with RunLock(tracker.run_id):
         record.write()
         with _ended_as_it_ends(record, tracker, console):
@@ -111,7 +111,7 @@ def _ended_as_it_ends(record: RunRecord, tracker: Tracker, console: Console) -> 
     if left:
         from flows.base.store_address import without_login
 
-        place = without_login(record.uri)
+        place = without_login(tracker.store.uri)
         console.say(f"tracking: {left} items could not be delivered to {place}; the next run delivers them.")
 
 
@@ -125,12 +125,14 @@ def _begin(
 
     _close_killed(config.name, store, console)
     deliver_leftovers(store, console.say)
-    old = _unfinished(config, store, console, held) if request.resume else None
+    anew = not request.use_cache
+    old = _unfinished(config, store, console, held, anew) if request.resume else None
     tracker = Tracker(store, config, console.say, old.run_id if old else None)
     if old:
         record = replace(old, status="running")
     else:
-        record = RunRecord(tracker.run_id, config.name, resume_key(config), store.uri, time.time())
+        key = resume_key(config)
+        record = RunRecord(tracker.run_id, config.name, key, time.time(), anew=anew)
         held.enter_context(RunLock(tracker.run_id))  # before anybody could find its record without
     record.write()
     return tracker, record
@@ -188,22 +190,26 @@ def resume_key(config: ExperimentConfig) -> str:
 
 
 def _unfinished(
-    config: ExperimentConfig, store: Store, console: Console, held: ExitStack
+    config: ExperimentConfig, store: Store, console: Console, held: ExitStack, anew: bool = False
 ) -> RunRecord | None:
     """The newest unfinished run of the same experiment, settings, files and program that is still in the store, with
-    its lock in `held`.  Raises RunTaken where another process works on it."""
-    there = [one for one in records(config.name) if one.status in UNFINISHED and one.uri == store.uri]
+    its lock in `held`.  Raises RunTaken where another process works on it.
+
+    anew : whether it has to be one that was begun anew too: what another has tracked may have come from the cache.
+    """
+    there = [one for one in records(config.name) if one.status in UNFINISHED]
     key = resume_key(config) if there else ""
     for record in there:
-        if record.config_digest != key or not store.holds(record.run_id):
+        if record.config_digest != key or record.anew < anew or not store.holds(record.run_id):
             continue
         held.enter_context(RunLock(record.run_id))
         now = record.again()
         if now is not None and now.status in UNFINISHED:
             return now
         held.close()  # it has ended since its record was read
+    begun = " that was begun with --no-cache" if anew else ""
     console.say(
-        "There is no unfinished run of these settings and files by this version; a new one is started."
+        f"There is no unfinished run of these settings and files by this version{begun}; a new one is started."
     )
     return None
 
@@ -211,7 +217,7 @@ def _unfinished(
 def _close_killed(experiment: str, store: Store, console: Console) -> None:
     """A run that was killed stays RUNNING in MLflow for ever; whoever comes next closes it."""
     for record in records(experiment):
-        if record.status != "running" or record.uri != store.uri:
+        if record.status != "running" or not store.holds(record.run_id):
             continue
         with suppress(RunTaken), RunLock(record.run_id) as lock:
             if lock.held and record.again() == record:

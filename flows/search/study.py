@@ -72,7 +72,7 @@ def run_study(
     problem: Problem,
     config: ExperimentConfig,
     console: Console,
-    reuse: bool = True,
+    only_of: str | None = None,
     on_scored: OnScored | None = None,
     tally: Tally | None = None,
     publish_as: str | None = None,
@@ -81,8 +81,8 @@ def run_study(
 ) -> StudyResult:
     """Search until all candidates of the experiment are known, and pick one.
 
-    reuse, lost_again : see `Evaluation`; a resumed run leaves out the latter, since its candidates are tracked as they
-    were.
+    only_of, lost_again : see `Evaluation`; a resumed run leaves out the latter, since its candidates are tracked as
+    they were.
     on_scored, on_generation : told of what is done.  tally : counts where the outcomes came from.
     publish_as : name of the study in Optuna's storage; None publishes nothing.
 
@@ -92,7 +92,7 @@ def run_study(
     study = study_key(problem, config)
     pool = open_pool(problem, config, study)
     tally = tally or Tally()
-    evaluation = Evaluation(pool, outcomes, study, console.say, tally, reuse, lost_again)
+    evaluation = Evaluation(pool, outcomes, study, console.say, tally, only_of, lost_again)
     settings = settings_of(problem, config)
     listeners = [] if on_scored is None else [on_scored]
     if publish_as:

@@ -7,6 +7,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
+from flows.base import environment
 from flows.tracking.outbox import Item
 from flows.tracking.store import NUMBER, PARENT
 from flows.tracking.view import of_both_kinds
@@ -98,7 +99,7 @@ def _send_datasets(store: Store, item: Item) -> None:
 
 def _send_files(store: Store, item: Item) -> None:
     """A file or a folder as artifacts."""
-    source = Path(item["path"])
+    source = environment.workspace() / item["path"]
     if source.is_dir():
         store.client.log_artifacts(item["run_id"], str(source), item["to"])
     elif source.is_file():
@@ -114,7 +115,8 @@ def _send_json(store: Store, item: Item) -> None:
 def _send_model(store: Store, item: Item) -> None:
     from flows.tracking.serving.logged_model import log_hybrid
 
-    log_hybrid(store.uri, item["run_id"], Path(item["path"]), item["registered_as"])
+    folder = environment.workspace() / item["path"]
+    log_hybrid(store.uri, item["run_id"], folder, item["registered_as"])
 
 
 def _send_end(store: Store, item: Item) -> None:

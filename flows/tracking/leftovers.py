@@ -18,7 +18,7 @@ def deliver_leftovers(store: Store, say: Callable[[str], None], wait_s: float = 
     for note in store.notes:
         say(note)
     for folder in sorted((environment.state() / "outbox").glob("*")):
-        if not any(folder.glob("[0-9]*.json")) or not _belongs(store, folder.name):
+        if not any(folder.glob("[0-9]*.json")) or not store.holds(folder.name):
             continue
         with suppress(RunTaken), RunLock(folder.name) as lock:
             if not lock.held:
@@ -28,13 +28,3 @@ def deliver_leftovers(store: Store, say: Callable[[str], None], wait_s: float = 
             outbox.close()
             if not left:
                 say(f"tracking: what run {folder.name[:8]} had left over is delivered.")
-
-
-def _belongs(store: Store, run_id: str) -> bool:
-    from mlflow.exceptions import MlflowException
-
-    try:
-        store.client.get_run(run_id)
-    except MlflowException:
-        return False
-    return True

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import TracebackType
 
 from aesi.errors import AesiError
-from aesi.numerics.files.whole import READ_BY_OWNER, write_whole
+from aesi.numerics.files.whole import write_whole
 from flows.base import environment
 from flows.base.locks import ProcessLock
 
@@ -25,20 +25,20 @@ class RunTaken(AesiError):
 class RunRecord:
     """One flow run. status : running, killed, failed or finished; started_s : seconds since the epoch.
 
-    config_digest : what another run has to share to go on with it.
+    config_digest : what another run has to share to go on with it.  anew : whether it takes no result that another run
+    has stored (`--no-cache`), which holds for whoever goes on with it.
     """
 
     run_id: str
     experiment: str
     config_digest: str
-    uri: str
     started_s: float
     status: str = "running"
+    anew: bool = False
 
     def write(self) -> None:
         """Keep it on disk."""
-        # The address of a store may hold a password.
-        write_whole(_folder() / f"{self.run_id}.json", json.dumps(asdict(self)), READ_BY_OWNER)
+        write_whole(_folder() / f"{self.run_id}.json", json.dumps(asdict(self)))
 
     def again(self) -> RunRecord | None:
         """As it is on disk now: who waited for the run's lock knows the record of before. None where it is gone."""

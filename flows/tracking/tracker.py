@@ -211,7 +211,7 @@ class Tracker:
 
     def files(self, path: Path, to: str | None = None) -> None:
         """A file or a folder as artifacts of the parent run; they may be delivered from another folder later."""
-        self._outbox.put({"kind": "files", "run_id": self.run_id, "path": str(path.resolve()), "to": to})
+        self._outbox.put({"kind": "files", "run_id": self.run_id, "path": _lasting(path), "to": to})
 
     def json(self, name: str, content: Any) -> None:
         """A JSON artifact of the parent run."""
@@ -226,7 +226,7 @@ class Tracker:
             {
                 "kind": "model",
                 "run_id": self.run_id,
-                "path": str(folder.resolve()),
+                "path": _lasting(folder),
                 "registered_as": name,
             }
         )
@@ -317,6 +317,12 @@ def _is_name(text: str) -> bool:
     """Whether MLflow takes a text for the name of a parameter, which it may make a path of."""
     fits = len(text) <= NAME_LIMIT and NAME.fullmatch(text) is not None
     return fits and posixpath.normpath(text) == text
+
+
+def _lasting(path: Path) -> str:
+    """A path that is found from any folder; within the workspace also where that is moved: from the workspace."""
+    path, home = path.resolve(), environment.workspace()
+    return str(path.relative_to(home) if path.is_relative_to(home) else path)
 
 
 def _short(name: str) -> str:

@@ -26,7 +26,6 @@ ROOT = Path(__file__).resolve().parents[2]
 SERVICES = yaml.safe_load((ROOT / "docker-compose.yml").read_text())["services"]
 LOGIN = "${POSTGRES_USER:-aesi}:${POSTGRES_PASSWORD:?set POSTGRES_PASSWORD in .env}@postgres:5432"
 PROGRAMS = str(Path(sys.executable).parent)
-AWS = ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY")
 
 
 def free_port():
@@ -95,7 +94,8 @@ def here(text, changes):
 def of_compose(service, changes):
     """Command line and environment that the compose file gives a service, for this machine."""
     given = SERVICES[service]
-    settings = {name: here(value, changes) for name, value in given.get("environment", {}).items()}
+    told = {name: value for name, value in given.get("environment", {}).items() if value is not None}
+    settings = {name: here(value, changes) for name, value in told.items()}
     paths = {"PATH": f"{PROGRAMS}:{os.environ['PATH']}", "PYTHONPATH": str(ROOT)}
     return [here(word, changes) for word in given["command"]], os.environ | settings | paths
 
@@ -149,8 +149,7 @@ def stack(workspace):
         mlflow, prefect = free_port(), free_port()
         everywhere = {LOGIN: database, "0.0.0.0": "127.0.0.1", "/srv/cache": str(workspace / "cache")}
         artifacts = {"${AESI_ARTIFACTS:-/artifacts}": str(workspace / "artifacts")}
-        unset = {f"${{{name}:-}}": "" for name in ("MLFLOW_S3_ENDPOINT_URL", *AWS)}
-        command, env = of_compose("mlflow", everywhere | artifacts | unset | {"port=5000": f"port={mlflow}"})
+        command, env = of_compose("mlflow", everywhere | artifacts | {"port=5000": f"port={mlflow}"})
         running.enter_context(process(command, answers(f"http://127.0.0.1:{mlflow}/health"), env=env))
         command, env = of_compose("prefect-server", everywhere | {"4200": str(prefect)})
         env["PREFECT_HOME"] = str(workspace / "prefect-server")

@@ -6,12 +6,12 @@ import os
 from pathlib import Path
 from uuid import uuid4
 
-READ_BY_ALL, READ_BY_OWNER = 0o666, 0o600
+READ_BY_ALL = 0o666
 """Less what the process's umask takes off."""
 NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL
 
 
-def write_whole(path: Path, content: bytes | str, mode: int = READ_BY_ALL) -> None:
+def write_whole(path: Path, content: bytes | str) -> None:
     """Write beside the target, then rename: whoever reads sees the old file or the whole new one.
 
     content : text is written as UTF-8.  The folder is made where it is missing; a link keeps pointing where it does.
@@ -26,7 +26,7 @@ def write_whole(path: Path, content: bytes | str, mode: int = READ_BY_ALL) -> No
     target = path.resolve()
     draft = _draft(target.parent)
     try:
-        with os.fdopen(os.open(draft, NEW, mode), "wb") as stream:
+        with os.fdopen(os.open(draft, NEW, READ_BY_ALL), "wb") as stream:
             stream.write(data)
             stream.flush()
             os.fsync(stream.fileno())

@@ -120,7 +120,7 @@ def test_the_timed_drive_of_the_porous_electrode_could_not_be_left_out():
 def test_a_benchmark_that_was_killed_was_tracked_as_running_for_ever(tracked):
     store = Store()
     killed = store.create_run(store.experiment("small"), "small, seed 0", {KIND: "run"})
-    RunRecord(killed, "small", "0", store.uri, time.time()).write()
+    RunRecord(killed, "small", "0", time.time()).write()
     cases = Cases(
         "small", 0, ["a", "b"], lambda spec: {"case": spec, "ours_s": 0.0}, lambda rows: {}, dict, ()
     )

@@ -44,9 +44,11 @@ def impatient(monkeypatch):
 
 @pytest.fixture
 def made(tmp_path, said):
-    def make(calls, study="s", reuse=True, work=lambda genome: genome * 2, lost_again=False):
+    def make(calls, study="s", only_of=None, work=lambda genome: genome * 2, lost_again=False):
         pool = Inline(calls, work)
-        return Evaluation(pool, FileOutcomes(tmp_path / "o"), study, said.append, Tally(), reuse, lost_again)
+        return Evaluation(
+            pool, FileOutcomes(tmp_path / "o"), study, said.append, Tally(), only_of, lost_again
+        )
 
     return make
 
@@ -77,8 +79,17 @@ def test_another_study_shares_nothing(made):
 def test_without_reuse_everything_is_evaluated_again(made):
     calls = []
     dict(made([])([1, 2]))
-    dict(made(calls, reuse=False)([1, 2]))
+    dict(made(calls, only_of="run")([1, 2]))
     assert calls == [1, 2]
+
+
+def test_a_run_without_reuse_that_was_gone_on_with_took_what_others_had_stored(made):
+    dict(made([])([1, 2, 3, 4]))
+    begun, resumed, other = [], [], []
+    dict(made(begun, only_of="run")([1, 2]))
+    dict(made(resumed, only_of="run")([1, 2, 3]))
+    dict(made(other, only_of="another run")([1, 2]))
+    assert (begun, resumed, other) == ([1, 2], [3], [1, 2])
 
 
 def test_failures_are_stored_too(made):

@@ -48,9 +48,16 @@ def test_images_are_pinned_and_built_ones_stand_on_a_pinned_one(compose):
 
 def test_no_secret_is_in_the_file(compose):
     text = COMPOSE.read_text()
-    for match in re.finditer(r"(?i)(password|secret|key)\w*:\s*(.+)", text):
+    for match in re.finditer(r"(?i)(password|secret|key)\w*:[ ]*(.+)", text):
         assert match.group(2).startswith("${") or "set POSTGRES_PASSWORD" in match.group(2), match.group(0)
     assert re.search(r"^\.env$", (ROOT / ".gitignore").read_text(), re.MULTILINE)
+
+
+def test_a_store_on_amazon_was_refused_for_the_empty_address_of_another(compose):
+    for name, service in compose["services"].items():
+        given = service.get("environment", {})
+        assert not [key for key, value in given.items() if value == "" or str(value).endswith(":-}")], name
+    assert "MLFLOW_S3_ENDPOINT_URL" in compose["services"]["mlflow"]["environment"]
 
 
 def test_what_is_referred_to_is_there(compose):

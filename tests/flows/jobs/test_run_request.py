@@ -96,6 +96,10 @@ def test_a_run_without_prefect_was_told_to_go_on_with_it(path):
     assert RunRequest(path).resuming == f"aesi run {path} --resume"
 
 
+def test_a_run_without_cache_was_told_to_go_on_from_it(path):
+    assert RunRequest(path, use_cache=False).resuming == f"aesi run {path} --no-cache --resume"
+
+
 @pytest.mark.parametrize(
     "way", ["plain", pytest.param("as a flow", marks=pytest.mark.slow), "without the decorator"]
 )

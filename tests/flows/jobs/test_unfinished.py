@@ -1,5 +1,7 @@
 """Which run is gone on with: one that the tracking store has no more is none."""
 
+import json
+import shutil
 import time
 from contextlib import ExitStack
 from dataclasses import replace
@@ -35,7 +37,7 @@ def unfinished(store, workspace):
     path.write_text("name: small\ndata: {kind: virtual}\n")
     config = RunRequest(str(path)).config
     run_id = store.create_run(store.experiment("small"), "small, seed 0", {})
-    record = RunRecord(run_id, "small", resume_key(config), store.uri, time.time(), "failed")
+    record = RunRecord(run_id, "small", resume_key(config), time.time(), "failed")
     record.write()
     return config, record
 
@@ -54,6 +56,17 @@ def test_of_two_runs_the_newer_one_is_gone_on_with(store, unfinished, held, befo
     assert _unfinished(config, store, Console(), held) == (other if before_s > 0.0 else record)
 
 
+@pytest.mark.parametrize(("begun_anew", "cache"), [(True, True), (True, False), (False, False)])
+def test_a_run_without_cache_was_gone_on_with_from_the_cache(store, unfinished, workspace, begun_anew, cache):
+    _, before = unfinished
+    replace(before, anew=begun_anew).write()
+    request = RunRequest(str(workspace / "small.yaml"), resume=True, use_cache=cache)
+    with working_on(request, store, Console()) as (tracker, record):
+        assert record.anew
+        same = tracker.run_id == before.run_id
+        assert same == begun_anew  # what the other one has tracked may have come from the cache
+
+
 @pytest.mark.parametrize("gone", ["deleted", "never there"])
 def test_a_run_that_the_store_has_no_more_was_gone_on_with_and_ended_in_a_traceback(
     store, unfinished, held, capsys, gone
@@ -63,7 +76,7 @@ def test_a_run_that_the_store_has_no_more_was_gone_on_with_and_ended_in_a_traceb
         store.client.delete_run(record.run_id)
     else:
         record.forget()
-        RunRecord("0" * 32, "small", record.config_digest, store.uri, time.time(), "failed").write()
+        RunRecord("0" * 32, "small", record.config_digest, time.time(), "failed").write()
     assert _unfinished(config, store, Console(), held) is None
     assert "There is no unfinished run" in capsys.readouterr().err
 
@@ -119,7 +132,7 @@ def test_a_run_was_tracked_and_noted_before_it_was_this_processs_alone(
     monkeypatch.setattr(RunRecord, "write", watched)
     path = str(workspace / "small.yaml")
     for resume in (True, False):
-        with working_on(RunRequest(path, resume=resume), store, Console()) as tracker:
+        with working_on(RunRequest(path, resume=resume), store, Console()) as (tracker, _):
             assert taken(tracker.run_id)
         assert not taken(tracker.run_id)
     with tracked_job(Subject("job", 0, "key", "batch"), "title", Console()) as tracker:
@@ -161,6 +174,45 @@ def test_a_file_that_a_job_left_over_was_sought_from_the_folder_of_the_next(
         pass
     assert f"what run {tracker.run_id[:8]} had left over is delivered" in capsys.readouterr().err
     assert [one.path for one in store.client.list_artifacts(tracker.run_id)] == ["report.html"]
+
+
+def test_a_run_was_left_behind_by_its_workspace_when_that_was_moved(
+    unfinished, workspace, monkeypatch, held, capsys, tmp_path_factory
+):
+    config, record = unfinished
+    report = workspace / "runs" / "report.html"
+    report.parent.mkdir()
+    report.write_text("found")
+    with monkeypatch.context() as away:
+        away.setattr("flows.tracking.tracker.deliver", _away)
+        tracker = Tracker(Store(), config, print, record.run_id)
+        tracker.files(report)
+        tracker.end("FAILED", wait_s=0.0)
+    replace(record, status="running").write()
+    moved = tmp_path_factory.mktemp("elsewhere") / "workspace"
+    shutil.copytree(workspace, moved)
+    shutil.rmtree(report.parent)
+    monkeypatch.setenv("AESI_HOME", str(moved))
+    store = Store()
+    _close_killed("small", store, Console())
+    deliver_leftovers(store, print)
+    assert f"run {record.run_id} had been killed" in capsys.readouterr().err
+    assert [one.path for one in store.client.list_artifacts(record.run_id)] == ["report.html"]
+    assert _unfinished(config, store, Console(), held) == replace(record, status="killed")
+
+
+def test_what_waits_for_a_run_that_was_deleted_was_refused_item_by_item(store, workspace, said):
+    run_id = store.create_run(store.experiment("small"), "small, seed 0", {})
+    box = workspace / ".aesi" / "outbox" / run_id
+    box.mkdir(parents=True)
+    item = {"kind": "json", "run_id": run_id, "name": "a.json", "content": {}}
+    (box / "00000001.json").write_text(json.dumps(item))
+    store.client.delete_run(run_id)
+    deliver_leftovers(store, said.append)
+    assert said == []
+    store.client.restore_run(run_id)
+    deliver_leftovers(store, said.append)
+    assert said == [f"tracking: what run {run_id[:8]} had left over is delivered."]
 
 
 def _away(store, item, again):
