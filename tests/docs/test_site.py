@@ -381,3 +381,6 @@ def test_the_site_builds_without_a_warning(tmp_path):
     assert done.returncode == 0, done.stderr[-4000:]
     html = (tmp_path / "site" / "index.html").read_text(encoding="utf-8")
     assert "fonts.googleapis" not in html
+    assert re.findall(r'<(?:script|link)[^>]*(?:src|href)="https?:[^"]*"', html) == []
+    # Read from the disk, a link to a folder opened a list of its files.
+    assert re.findall(r'href="(?!https?:)[^"#]*/(?:#[^"]*)?"', html) == []
