@@ -4,7 +4,7 @@
 
 The measured voltage, its residual as declared, recalibrated and with what was found, the name and size of that, and
 what was measured beside it: RECORD, one whose temperature the loop was not given, or TEXT in your own words. Errors
-are of the part that was kept back, shaded here. All curves are those that the folder's report carries.
+are of the part that was held out, shaded here. All curves are those that the folder's report carries.
 """
 
 from __future__ import annotations
@@ -35,6 +35,8 @@ VOLTAGE, RESIDUAL = (116, 246), (282, 444)
 PARTS = ("residual_fit", "residual_test")
 AXES = {"voltage": "y", "residual": "y3"}
 GREY = "#57606a"
+AXIS_LINE = 13
+"""From one line beside an axis to the next."""
 LETTERS = 105
 """Of a line of the finding."""
 
@@ -144,7 +146,7 @@ def _shade(start: float, end: float) -> str:
     right, top, bottom = WIDTH - RIGHT, VOLTAGE[0], RESIDUAL[1]
     return (
         f'<rect x="{x:.1f}" y="{top}" width="{right - x:.1f}" height="{bottom - top}" fill="#f3f5f8"/>'
-        + _text(x + 6, top + 16, "kept back", colour=GREY)
+        + _text(x + 6, top + 16, "held out", colour=GREY)
     )
 
 
@@ -163,18 +165,23 @@ def _panel(
         low = -high
     step = nice((high - low) / 3)
     panel = Panel(*place, step * np.floor(low / step), step * np.ceil(high / step), end)
-    if np.nanmin(every) < panel.low or np.nanmax(every) > panel.high:
-        title += (
-            f" (axis from {panel.low:g})" if np.nanmin(every) < panel.low else f" (axis to {panel.high:g})"
-        )
     out = [_level(panel, v) for v in np.arange(panel.low, panel.high + step / 2, step)]
-    middle = (panel.top + panel.bottom) / 2
-    out.append(
-        f'<text transform="translate(18 {middle}) rotate(-90)" text-anchor="middle" fill="{GREY}">{title}</text>'
-    )
+    words = [title]
+    if np.nanmin(every) < panel.low:
+        words.append(f"(axis from {panel.low:g})")
+    elif np.nanmax(every) > panel.high:
+        words.append(f"(axis to {panel.high:g})")
+    # A line each: one after the other they are longer than a panel is high, and run into those of the other.
+    out += [_upright(line, AXIS_LINE * (k + 1), panel) for k, line in enumerate(words)]
     for part, series in parts.items():
         out += [_line(one, panel, starts[part]) for one in series]
     return out
+
+
+def _upright(words: str, x: float, panel: Panel) -> str:
+    middle = (panel.top + panel.bottom) / 2
+    turned = f'transform="translate({x:g} {middle}) rotate(-90)"'
+    return f'<text {turned} text-anchor="middle" fill="{GREY}">{words}</text>'
 
 
 def _level(panel: Panel, value: float) -> str:

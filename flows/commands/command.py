@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from typing import Any
+from typing import Any, get_args
 
 import typer
 from typer.core import TyperCommand
@@ -17,7 +17,15 @@ MEANT = {"--model": "a saved model is given with --cell"}
 
 class Command(TyperCommand):
     """A command that raises InputError, naming the option or its environment variable, for an invalid value and for an
-    option that is given twice but takes one value. Of two values the last would count without a message."""
+    option that is given twice but takes one value. Of two values the last would count without a message. Its help names
+    what an option takes each time, not a list of it: several values are given by several options."""
+
+    def __init__(self, *args: Any, **how: Any) -> None:
+        super().__init__(*args, **how)
+        for parameter in self.params:
+            each = get_args(parameter.type_descriptor.annotation)
+            if parameter.multiple and parameter.metavar is None and each:
+                parameter.metavar = f"<{each[0].__name__.lower()}>"
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """The arguments that the options have not taken, as in click.  Raises InputError (see the class)."""

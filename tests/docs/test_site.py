@@ -207,7 +207,8 @@ def test_the_newest_of_labelled_runs_comes_first_and_all_of_them_stand_side_by_s
     monkeypatch.setattr(generate, "ROOT", tmp_path)
     assert "No run has been recorded" in generate.recorded("blind")
     line = {"bench": "blind", "strict": True, "summary": True, "cases": 15, "seed": 3}
-    rate = {"effect_exact_pct": 50.0, "effect_exact_95_pct": [18.7, 81.3], "effect_exact_cases": 10}
+    rate = {"effect_exact_pct": 60.5, "effect_exact_95_pct": [43.4, 76.0], "effect_exact_cases": 38}
+    rate |= {"parameter_error_median": 0.008191836}
     entry = {"machine": "a machine", "date": "2026-01-01", "load": 0.5}
     entries = [
         {**entry, "commit": "0123456789", "lines": [{**line, **rate, "label": "before"}]},
@@ -215,11 +216,13 @@ def test_the_newest_of_labelled_runs_comes_first_and_all_of_them_stand_side_by_s
     ]
     (tmp_path / "docs" / "benchmarks.json").write_text(json.dumps({"entries": entries}))
     page = generate.recorded("blind")
-    newest, every = page.split("???")
+    _, newest, every = page.split("???")
     assert "| | seed 3, commit `abcdef0`, 2026-01-01 |" in newest
     assert "| effects named exactly | – |" in newest
     assert "| | before, seed 3, commit `0123456` | after, seed 3, commit `abcdef0` |" in every
-    assert "| effects named exactly | 50 % [19, 81] of 10 | – |" in every
+    # 23 of 38 are 60.53 %, which a line holds as 60.5 and which stood here as 60 % beside the 61 % of the prose.
+    assert "| effects named exactly | 23 of 38: 61 % [43, 76] | – |" in every
+    assert "| largest relative error of a parameter, median | 0.82 % | – |" in every
 
 
 def test_arguments_of_a_docstring_become_a_list():
@@ -378,3 +381,6 @@ def test_the_site_builds_without_a_warning(tmp_path):
     assert done.returncode == 0, done.stderr[-4000:]
     html = (tmp_path / "site" / "index.html").read_text(encoding="utf-8")
     assert "fonts.googleapis" not in html
+    assert re.findall(r'<(?:script|link)[^>]*(?:src|href)="https?:[^"]*"', html) == []
+    # Read from the disk, a link to a folder opened a list of its files.
+    assert re.findall(r'href="(?!https?:)[^"#]*/(?:#[^"]*)?"', html) == []

@@ -217,27 +217,27 @@ def _verdict_counts(runs: Sequence[ComparedRun]) -> str:
 
 
 def _settings(runs: Sequence[ComparedRun]) -> PageTable | None:
-    """The settings that differ, a run a row; None for a single run."""
+    """The settings that differ, with a row for each run or, where there are more of them, for each setting: a page is
+    longer than it is wide. None for a single run."""
     if len(runs) < 2:
         return None
     keys = differing_settings(runs)
     shared = len({key for run in runs for key in run.settings}) - len(keys)
-    return PageTable(
-        "settings",
-        "What was different",
+    told = (
         f"Only the settings that differ; {shared} are the same in all."
         if keys
-        else "All settings are the same.",
-        ("run", "started", *keys),
-        tuple(
-            (
-                ComparedCell(run.label),
-                ComparedCell(run.started),
-                *(ComparedCell(run.settings.get(key, ABSENT)) for key in keys),
-            )
-            for run in runs
-        ),
+        else "All settings are the same."
     )
+    rows = [
+        ("run", *(run.label for run in runs)),
+        ("started", *(run.started for run in runs)),
+        *((key, *(run.settings.get(key, ABSENT) for run in runs)) for key in keys),
+    ]
+    if len(runs) >= len(keys):
+        rows = list(zip(*rows, strict=True))
+    head, *body = rows
+    cells = tuple(tuple(ComparedCell(text) for text in row) for row in body)
+    return PageTable("settings", "What was different", told, head, cells)
 
 
 def _metrics(runs: Sequence[ComparedRun]) -> PageTable | None:

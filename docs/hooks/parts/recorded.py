@@ -90,7 +90,10 @@ def _is_shown(line: Line) -> bool:
 
 
 def _side_by_side(bench: str, entries: Sequence[Entry]) -> str:
-    """The newest labelled run, and folded away all of them, oldest first: what a change of method brought is seen."""
+    """The newest labelled run, and all of them, oldest first: what a change of method brought is seen.
+
+    Both are folded away, since the words above them say the same of the newest.
+    """
     runs = [
         (entry, line)
         for entry in entries
@@ -100,11 +103,11 @@ def _side_by_side(bench: str, entries: Sequence[Entry]) -> str:
     if not runs:
         return _nothing(bench)
     newest, line = runs[-1]
-    shown = [(f"seed {line['seed']}, commit `{newest.commit[:7]}`, {newest.date}", line)]
+    name = f"seed {line['seed']}, commit `{newest.commit[:7]}`, {newest.date}"
     every = [
         (f"{line['label']}, seed {line['seed']}, commit `{entry.commit[:7]}`", line) for entry, line in runs
     ]
-    parts = [*_columns(bench, shown), ""]
+    parts = [_folded("The newest recorded run in figures", _columns(bench, [(name, line)]))]
     if len(every) > 1:
         parts.append(
             _folded(f"All {len(every)} recorded runs, each by the code of its day", _columns(bench, every))
@@ -122,13 +125,18 @@ def _columns(bench: str, runs: Sequence[tuple[str, Line]]) -> list[str]:
 
 
 def _figure(line: Line, key: str) -> str:
-    """A rate with its interval and its cases, or a plain figure."""
+    """A rate with its interval and its cases, a share in per cent, or a plain figure."""
     if f"{key}_pct" not in line:
-        return _cell(line.get(key))
+        value = line.get(key)
+        return f"{100 * value:.2g} %" if key in SHARES and value is not None else _cell(value)
     if line[f"{key}_pct"] is None or not line.get(f"{key}_95_pct"):
         return "–"
     low, high = line[f"{key}_95_pct"]
-    return f"{line[f'{key}_pct']:.0f} % [{low:.0f}, {high:.0f}] of {line[f'{key}_cases']}"
+    cases = line[f"{key}_cases"]
+    hits = round(
+        line[f"{key}_pct"] * cases / 100
+    )  # rounded to a tenth in the line; rounded again, 60.5 would be 60
+    return f"{hits} of {cases}: {100 * hits / cases:.0f} % [{low:.0f}, {high:.0f}]"
 
 
 def _tables(lines: Iterable[Line]) -> list[str]:
@@ -188,7 +196,7 @@ def _cell(value: Any) -> str:
 IN_COLUMNS = {
     "blind": (
         ("cases", "cases"),
-        ("not_made", "beside them, that the laboratory could not make"),
+        ("not_made", "further cases that the simulator could not make"),
         ("no_answer", "without an answer (out of time, or refused)"),
         ("effect_exact", "effects named exactly"),
         ("seen_exact", "the same, of those that say enough of unseen data to be named at all"),
@@ -211,7 +219,10 @@ IN_COLUMNS = {
         ("no_answer", "without an answer (out of time, or refused)"),
         ("withheld_named", "temperatures named"),
         ("withheld_within_2k", "temperatures within 2 K"),
-        ("withheld_course_rms_k_median", "course of the temperatures named, RMS, K, median"),
+        (
+            "withheld_course_rms_k_median",
+            "named temperatures: written model minus thermocouple, RMS, K, median",
+        ),
         ("withheld_error_halved", "error on unseen data at least halved, of those named"),
         ("warming_named", "records that warm up: heat or temperature named"),
         ("fault_named", "faults named"),
@@ -225,11 +236,21 @@ IN_COLUMNS = {
         ("ageing_named", "ageing named, or rightly not"),
         ("ageing_within_2pp", "capacity within 2 percentage points of the measured one"),
         ("witness_within_15pct", "resistances within 15 % of the spectra's"),
-        ("witness_ohmic_off_median", "ohmic resistance off the spectrum's, share, median"),
-        ("witness_transfer_off_median", "charge transfer off the spectrum's, share, median"),
+        ("witness_ohmic_off_median", "ohmic resistance off the spectrum's, median"),
+        ("witness_transfer_off_median", "charge transfer off the spectrum's, median"),
         ("after_worse", "worse on unseen data than the better of declared and recalibrated"),
         ("processor_s_median", "processor seconds a case, median"),
         ("processor_s_total", "processor seconds of all"),
     ),
 }
 """Benchmarks whose runs stand side by side: key of a figure and what it is."""
+SHARES = frozenset(
+    {
+        "parameter_error_median",
+        "wrong_soc0_error_median",
+        "size_error_median",
+        "witness_ohmic_off_median",
+        "witness_transfer_off_median",
+    }
+)
+"""Figures of these that a line holds as a share of one."""

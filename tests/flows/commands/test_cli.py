@@ -741,6 +741,13 @@ def test_every_command_is_told_in_one_whole_line(call):
     assert "..." not in out.split("Commands:")[1]
 
 
+def test_an_option_that_may_be_repeated_seemed_to_take_a_list(call):
+    _, out, _ = call("calibrate", "--help")
+    assert "--data <path>" in out
+    assert "--prior <str>" in out
+    assert "list[" not in out
+
+
 @pytest.mark.parametrize(
     ("command", "takes"), [("simulate", True), ("predict", True), ("discover", False), ("calibrate", False)]
 )

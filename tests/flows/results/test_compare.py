@@ -51,6 +51,13 @@ def test_only_settings_that_differ_are_shown(tmp_path):
     assert "T1(I)" not in html  # all runs hold it
 
 
+def test_many_settings_that_differ_ran_out_of_the_page(tmp_path):
+    many = {f"data.key_{k}": "given" for k in range(9)}
+    html = write_comparison(tmp_path / "page.html", [run_of(1), run_of(2, **many)]).read_text()
+    assert '<th scope="col">data.key_8</th>' not in html
+    assert "data.key_8</t" in html
+
+
 def heading_of(tmp_path, *runs):
     html = write_comparison(tmp_path / "page.html", runs).read_text()
     assert html.index("What came of it") < html.index("What was different")

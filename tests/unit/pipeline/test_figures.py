@@ -354,3 +354,12 @@ def test_a_part_of_a_record_is_placed_in_it(views):
     ):
         placed, unit = timeline.end_to_end([replace(trace, time_s=trace.time_s - trace.time_s[0] + first)])
         assert timeline.time_title(placed, unit) == title
+
+
+@pytest.mark.parametrize(("largest_mv", "told"), [(5.0, False), (200.0, True)])
+def test_bins_beyond_the_colours_of_a_map_were_drawn_as_if_they_ended_there(largest_mv, told):
+    current_a, soc = (a.ravel() for a in np.meshgrid(np.linspace(-5.0, 5.0, 240), np.linspace(0.1, 0.9, 240)))
+    error_v = np.full(current_a.size, 5e-3)
+    error_v[(current_a > 4.5) & (soc > 0.87)] = largest_mv / 1e3
+    figure = maps.map_figure(current_a, soc, error_v, "errors", absolute=True)
+    assert ("lie beyond the colours" in figure.layout.meta["caption"]) == told

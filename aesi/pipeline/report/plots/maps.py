@@ -32,6 +32,8 @@ def map_figure(
     caption = (
         f"{word.capitalize()} in bins over current and state of charge; bins with few samples are blank."
     )
+    if np.nanmax(np.abs(binned.mean), initial=0.0) > limit:
+        caption += " A few lie beyond the colours and have the last one; the cursor tells their values."
     fig = style.figure(title, caption, 360)
     fig.add_heatmap(
         x=binned.current_a,
