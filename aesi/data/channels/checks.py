@@ -80,8 +80,21 @@ def check_finite(columns: Columns, context: Context) -> None:
     also = " or leave the column out (--column temperature_degc=)" if quantity == "temperature_degc" else ""
     count = int(np.sum(~np.isfinite(columns[quantity])))
     raise DataError(
-        f"{context.at(quantity, row)} {what} (cells like it: {count}): remove or correct these rows{also}."
+        f"{context.at(quantity, row)} {what} (cells like it: {count}): remove or correct these rows"
+        f"{_beside_one_hole(columns, quantity, row)}{also}."
     )
+
+
+def _beside_one_hole(columns: Columns, quantity: str, row: int) -> str:
+    """How to read one side of several cells in succession that are the only ones without a number: removed, they may
+    leave a gap."""
+    bad, time = ~np.isfinite(columns[quantity]), columns["time_s"]
+    end = row + int(np.sum(bad))
+    if end == row + 1 or not np.all(bad[row:end]) or not np.all(np.isfinite(time)):
+        return ""
+    sides = [f"--to-s {time[row - 1]:.10g}"] if row > 0 else []
+    sides += [f"--from-s {time[end]:.10g}"] if end < len(time) else []
+    return f", or read one side of them: {' or '.join(sides)}" if sides else ""
 
 
 def check_time(time_s: Array, context: Context) -> None:

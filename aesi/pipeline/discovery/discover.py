@@ -206,7 +206,7 @@ def found_model(found: Discovery) -> HybridModel:
         model=found.choice.model,
         held=tuple(map(repr, held)),
         beside=tuple(one.id for one in (*left, *held) if one.id not in found.written),
-        finding=" ".join(found.warnings),
+        finding=" ".join(f"{warning[0].upper()}{warning[1:]}" for warning in found.warnings),
     )
 
 

@@ -260,3 +260,23 @@ def test_a_current_with_noise_beside_a_quiet_voltage_was_a_voltage_that_stands_s
     read_measurement(written(tmp_path, TIME, drive + noise, volts))
     stuck = np.where(TIME < 3600.0, volts, volts[899])
     assert "the voltage stands still" in refusal(tmp_path, TIME, DRIVE + noise, stuck)
+
+
+def test_an_interpolated_record_was_a_voltage_that_stands_still(tmp_path):
+    """A voltage in steps of 1 mV beside a current that now and then toggles by 1 mA, which moves it by 0.02 mV."""
+    toggles = 0.2 + 0.001 * (np.random.default_rng(4).random(len(TIME)) < 0.2)
+    current = np.where(TIME < 3600.0, np.round(DRIVE, 3), toggles)
+    volts = np.round(voltage(current), 3)
+    dense = np.linspace(0.0, TIME[-1], 2 * len(TIME) + 77)
+    read_measurement(written(tmp_path, TIME, current, volts))
+    read_measurement(written(tmp_path, dense, np.interp(dense, TIME, current), np.interp(dense, TIME, volts)))
+
+
+def test_a_voltage_that_stands_still_twice_hides_neither(tmp_path):
+    """Two such stretches alone say nothing of the resolution of a voltage with noise."""
+    volts = voltage(DRIVE) + 1e-4 * np.random.default_rng(5).standard_normal(len(TIME))
+    for begin in (300, 1200):
+        volts[begin : begin + 100] = volts[begin]
+    assert "row 301 (line 302), column voltage_v: the voltage stands still" in refusal(
+        tmp_path, TIME, DRIVE, volts
+    )

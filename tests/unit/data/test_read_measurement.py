@@ -831,3 +831,14 @@ def test_an_option_of_another_type_ended_in_a_traceback(tmp_path, options, words
     with pytest.raises(InputError) as caught:
         read_measurement(written(tmp_path, text()), **options)
     assert words in str(caught.value)
+
+
+def test_the_advice_to_remove_a_stretch_of_empty_cells_led_to_the_refusal_of_a_gap(tmp_path):
+    voltage = np.where((TIME >= 30) & (TIME < 80), np.nan, VOLTAGE)
+    message = refusal(tmp_path, text(voltage=voltage))
+    assert "or read one side of them: --to-s 29 or --from-s 80" in message
+    path = written(tmp_path, text(voltage=voltage))
+    assert len(read_measurement(path, stop_s=29.0).time_s) == 30
+    assert read_measurement(path, start_s=80.0).time_s[0] == 80.0
+    scattered = np.where(TIME % 40 == 7, np.nan, VOLTAGE)
+    assert "read one side" not in refusal(tmp_path, text(voltage=scattered))

@@ -42,6 +42,12 @@ def test_a_cell_as_declared_lacks_nothing(cell, few, make):
     assert found.after.yardstick.explained_v < 0.5e-3
 
 
+def test_the_second_warning_that_a_model_repeats_began_with_a_small_letter(cell, few, make):
+    found = discover(cell, [make()], soc0=0.9, effects=few)
+    warned = replace(found, warnings=("the one is worse.", "the other too."))
+    assert found_model(warned).finding == "The one is worse. The other too."
+
+
 def test_where_nothing_is_named_own_parameters_that_hid_an_effect_are_taken_as_declared(cell, few, make):
     """The declared parameters, which are right here, are the more plausible anyway; that was no search with them."""
     asked = []
