@@ -150,8 +150,10 @@ class ExperimentConfig(Section):
     def _is_a_folder_name(cls, value: str) -> str:
         if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,99}", value):
             raise ValueError(
-                f"{value!r} has to be letters, digits, `_` and `-`: it becomes a folder below runs/"
+                f"{value!r} has to be at most 100 letters, digits, `_` and `-`: it becomes a folder below runs/"
             )
+        if value == "Default":
+            raise ValueError("'Default' is the name of MLflow's own experiment; give another")
         return value
 
     def on_fallback(self) -> ExperimentConfig:

@@ -88,6 +88,8 @@ FILES = {"kind": "files", "train": ["a.csv"], "test": ["b.csv"]}
             },
             "repeat 1 is in train twice",
         ),
+        ({"name": "Default"}, "'Default' is the name of MLflow's own experiment; give another"),
+        ({"name": "a" * 101}, "has to be at most 100 letters, digits, `_` and `-`"),
         ({"models": []}, "models = [] is not admissible: it has to have at least 1 item."),
         ({"models": ["ESPM", "ESPM"]}, "models: ESPM is named twice"),
         (
