@@ -233,28 +233,6 @@ def test_seeds_become_mean_and_spread(run, finished, tracked):
     assert two["mlflow_run_id"] in text
 
 
-def test_killed_in_the_search_and_resumed_ends_as_an_uninterrupted_run(aesi, arguments, tracked, finished):
-    process = aesi(*arguments())
-    wait_for(lambda: len(list((tracked / ".aesi/cache/candidates").glob("??/*.bin"))) >= 2, process)
-    process.kill()
-    process.wait()
-    known = set((tracked / ".aesi/cache/candidates").glob("??/*.bin"))
-    stamps = {path: path.stat().st_mtime_ns for path in known}
-    done = aesi(*arguments(), "--resume")
-    _, said = done.communicate(timeout=120)
-    assert done.returncode == 0, said
-    assert "resumed" in said
-    assert f"{len(known)} known from before" in said
-    assert {path: path.stat().st_mtime_ns for path in known} == stamps  # none was evaluated twice
-    _, parent, children = tracked_runs()
-    assert parent.info.status == "FINISHED"
-    assert len(candidates(children)) == 6
-    assert fingerprint(children) == fingerprint(tracked_runs(workspace=finished)[2])
-    (resumed,) = (tracked / "runs/smoke").glob("*/tables.md")
-    (whole,) = (finished / "runs/smoke").glob("*/tables.md")
-    assert without_times(resumed.read_text()) == without_times(whole.read_text())
-
-
 @pytest.mark.slow
 def test_interrupted_twice_says_how_to_go_on_and_resumes(aesi, arguments, tracked):
     process = aesi(*arguments("search.candidates=12"))
@@ -335,8 +313,3 @@ def wait_for(condition, process, timeout_s=90):
             raise AssertionError(f"ended early: {process.communicate()[1]}")
         assert time.monotonic() < deadline
         time.sleep(0.02)
-
-
-def without_times(table):
-    """Tables without their last column of seconds."""
-    return re.sub(r"\| [\d.]+ \|$", "|", table, flags=re.MULTILINE)
