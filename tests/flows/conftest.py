@@ -20,6 +20,7 @@ SMALL = (
     "search.candidates=6",
     "search.population=3",
     "search.resamples=5",
+    "search.timeout_s=600",  # on a busy machine a candidate took longer than the 60 s of the file
     'models=["ESPM", "AESI I", "ridge"]',
 )
 ASIDE = ("tracking.system_metrics=false", "tracking.log_model=false")

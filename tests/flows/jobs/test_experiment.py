@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import time
 from pathlib import Path
 
@@ -218,39 +219,18 @@ def test_predict_in_both_regimes(call, finished, current, tmp_path):
     assert (pd.read_csv(tmp_path / "q.csv")["upper_v"][5:] > free["voltage_v"][5:] - 1.0).all()
 
 
-def test_seeds_become_mean_and_spread(run):
+def test_seeds_become_mean_and_spread(run, finished, tracked):
     from flows.results.tables import tables_of
 
-    one = json.loads((run("seed=0", "search.candidates=3") / "summary.json").read_text())
-    two = json.loads((run("seed=1", "search.candidates=3") / "summary.json").read_text())
-    run("search.lambda1=[1e-6, 1.0]", "search.candidates=3", "name=other")
+    shutil.copytree(finished, tracked, dirs_exist_ok=True)
+    summaries = [next((tracked / "runs" / "smoke").iterdir()), run("seed=1")]
+    one, two = (json.loads((folder / "summary.json").read_text()) for folder in summaries)
     text = tables_of("smoke")
     figures = [rows["models"][1]["free_run"]["test_mser_pct"] for rows in (one, two)]
+    assert figures[0] != figures[1]
     assert f"{sum(figures) / 2:.2f} [{min(figures):.2f}, {max(figures):.2f}]" in text
     assert one["mlflow_run_id"] in text
     assert two["mlflow_run_id"] in text
-
-
-def test_killed_in_the_search_and_resumed_ends_as_an_uninterrupted_run(aesi, arguments, tracked, finished):
-    process = aesi(*arguments())
-    wait_for(lambda: len(list((tracked / ".aesi/cache/candidates").glob("??/*.bin"))) >= 2, process)
-    process.kill()
-    process.wait()
-    known = set((tracked / ".aesi/cache/candidates").glob("??/*.bin"))
-    stamps = {path: path.stat().st_mtime_ns for path in known}
-    done = aesi(*arguments(), "--resume")
-    _, said = done.communicate(timeout=120)
-    assert done.returncode == 0, said
-    assert "resumed" in said
-    assert f"{len(known)} known from before" in said
-    assert {path: path.stat().st_mtime_ns for path in known} == stamps  # none was evaluated twice
-    _, parent, children = tracked_runs()
-    assert parent.info.status == "FINISHED"
-    assert len(candidates(children)) == 6
-    assert fingerprint(children) == fingerprint(tracked_runs(workspace=finished)[2])
-    (resumed,) = (tracked / "runs/smoke").glob("*/tables.md")
-    (whole,) = (finished / "runs/smoke").glob("*/tables.md")
-    assert without_times(resumed.read_text()) == without_times(whole.read_text())
 
 
 @pytest.mark.slow
@@ -333,8 +313,3 @@ def wait_for(condition, process, timeout_s=90):
             raise AssertionError(f"ended early: {process.communicate()[1]}")
         assert time.monotonic() < deadline
         time.sleep(0.02)
-
-
-def without_times(table):
-    """Tables without their last column of seconds."""
-    return re.sub(r"\| [\d.]+ \|$", "|", table, flags=re.MULTILINE)

@@ -66,54 +66,61 @@ def assert_as_uninterrupted(workspace, finished):
     assert resumed == whole
 
 
-def resume(aesi, arguments):
-    process = aesi(*arguments, "--resume")
-    _, said = process.communicate(timeout=240)
-    assert process.returncode == 0, said
-    assert "resumed" in said
-    return said
+@pytest.fixture
+def resume(run, capsys):
+    """Goes on with the killed run, in this process: only what was left on disk is there; what it said."""
+
+    def go(*more):
+        capsys.readouterr()
+        run(*more, resume=True)
+        said = capsys.readouterr().err
+        assert "resumed" in said
+        return said
+
+    return go
 
 
-def test_killed_in_the_calibration_of_the_intervals(killed, aesi, arguments, tracked, finished):
+def test_killed_in_the_calibration_of_the_intervals(killed, resume, arguments, tracked, finished):
     said = killed("aesi.conformal", "FreeRunBands.fit", 2, arguments())
     assert "final models: done" in said
     assert "intervals: done" not in said
     before = candidates_on_disk(tracked)
     assert len(before) == 6
-    said = resume(aesi, arguments())
+    said = resume()
     assert "0 candidates evaluated, 6 known from before" in said
     assert candidates_on_disk(tracked) == before
     assert_as_uninterrupted(tracked, finished)
 
 
-@pytest.mark.slow
-def test_killed_in_the_delivery_of_a_candidate(killed, aesi, arguments, tracked, finished):
+def test_killed_in_the_delivery_of_a_candidate(killed, resume, arguments, tracked, finished):
     killed("flows.tracking.delivery", "_write_files", 3, arguments())  # the third candidate is there in part
     waiting = list((tracked / ".aesi/outbox").glob("*/[0-9]*.json"))
     assert waiting
     before = candidates_on_disk(tracked)
-    resume(aesi, arguments())
-    assert {path: stamp for path, stamp in candidates_on_disk(tracked).items() if path in before} == before
+    assert 3 <= len(before) < 6
+    said = resume()
+    assert f"{6 - len(before)} candidates evaluated, {len(before)} known from before" in said
+    after = candidates_on_disk(tracked)
+    assert {path: stamp for path, stamp in after.items() if path in before} == before
+    assert len(after) == 6
     assert not list((tracked / ".aesi/outbox").glob("*/[0-9]*.json"))
     assert_as_uninterrupted(tracked, finished)
 
 
-@pytest.mark.slow
-def test_killed_when_the_last_item_is_delivered(killed, aesi, arguments, tracked, finished):
+def test_killed_when_the_last_item_is_delivered(killed, resume, arguments, tracked, finished):
     # Nested runs are written as ones that have ended: the run itself is the only one that is ended by a call.
     said = killed("mlflow", "MlflowClient.set_terminated", 1, arguments())
     assert "report: done" in said
     before = candidates_on_disk(tracked)
-    resume(aesi, arguments())
+    resume()
     assert candidates_on_disk(tracked) == before
     assert_as_uninterrupted(tracked, finished)
 
 
-@pytest.mark.slow
-def test_killed_after_the_model_was_registered(killed, aesi, arguments, tracked):
-    with_model = [word.replace("log_model=false", "log_model=true") for word in arguments()]
-    killed("flows.tracking.serving.logged_model", "_register", 1, with_model)
-    resume(aesi, with_model)
+def test_killed_after_the_model_was_registered(killed, resume, arguments, tracked):
+    with_model = "tracking.log_model=true"
+    killed("flows.tracking.serving.logged_model", "_register", 1, arguments(with_model))
+    resume(with_model)
     client = Store(f"sqlite:///{tracked}/mlflow.db").client
     assert [version.version for version in client.search_model_versions("name = 'smoke'")] == [1]
     assert len(client.search_logged_models([client.get_experiment_by_name("smoke").experiment_id])) == 1

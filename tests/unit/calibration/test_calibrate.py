@@ -293,9 +293,8 @@ def test_a_record_that_the_declared_cell_runs_empty_on_was_told_with_an_error_of
     time = np.arange(0.0, 5200.0, 2.0)
     current = np.where(time < 60, 0.0, 0.75 * start.nominal_capacity_ah)
     voltage = simulate(start.with_soh(1.12), time, current, 1.0, (), None, "backward").voltage_v
-    found = calibrate(
-        start, [Measurement(time, current, voltage, name="longer", hold="backward")], Conditions(soc0=1.0)
-    )
+    longer = Measurement(time, current, voltage, name="longer", hold="backward")
+    found = calibrate(start, [longer], Conditions(soc0=1.0), evaluations=1)
     (note,) = (n for n in found.notes if "runs empty" in n)
     assert note.startswith("longer: ")
     assert "in the declared cell at" in note

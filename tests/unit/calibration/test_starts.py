@@ -13,13 +13,13 @@ def interval(value):
 
 def test_the_best_of_several_ends_is_taken_and_the_others_are_told(start, records):
     once = calibrate(start, records[:1], evaluations=3)
-    several = calibrate(start, records[:1], evaluations=3, starts=3, seed=1)
-    again = calibrate(start, records[:1], evaluations=3, starts=3, seed=1)
+    several = calibrate(start, records[:1], evaluations=3, starts=2, seed=1)
+    again = calibrate(start, records[:1], evaluations=3, starts=2, seed=1)
     cost = [float(np.sum(found.model.residual(found.x) ** 2)) for found in (once, several)]
     assert cost[1] <= cost[0]
     assert np.array_equal(several.x, again.x)
     assert not [note for note in once.notes if "drawn start" in note]
-    assert len([note for note in several.notes if "repeated from 2 drawn starts" in note]) == 1
+    assert len([note for note in several.notes if "repeated from 1 drawn start:" in note]) == 1
 
 
 def test_parameters_beyond_their_intervals_at_another_end_are_named():
