@@ -10,6 +10,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -95,4 +96,4 @@ def _without_long_series(fig: Figure) -> str:
 
 def _rounded(values: AnyArray) -> list[float | None]:
     """Seven significant digits, null where not finite: what JSON and a screen can hold."""
-    return [float(f"{v:.7g}") if np.isfinite(v) else None for v in values]
+    return [float(f"{v:.7g}") if math.isfinite(v) else None for v in values.tolist()]
