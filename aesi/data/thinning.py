@@ -12,6 +12,7 @@ from typing import Protocol, cast
 
 import numpy as np
 
+from aesi.data.resample import mostly_even
 from aesi.numerics.blocks import block_means
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.records import Hold, Measurement
@@ -20,8 +21,6 @@ STEP_C_RATE = 0.01
 """A change of the current between rows by more than this C-rate is a step."""
 STEADY_SHARE = 0.01
 """Share of rows with a step of the current below which a record is one of constant currents."""
-UNEVEN_SHARE = 0.01
-"""Share of uneven intervals above which a record is not averaged over equal numbers of rows."""
 
 
 @dataclass(frozen=True)
@@ -40,10 +39,7 @@ def current_steps(data: Measurement, capacity_ah: float) -> BoolArray:
 
 def _steady(data: Measurement, steps: BoolArray) -> bool:
     """True for a record of constant currents or of uneven times; False for a drive."""
-    gaps = np.diff(data.time_s)
-    typical = float(np.median(gaps))
-    uneven = float(np.mean(np.abs(gaps - typical) > 0.5 * typical)) > UNEVEN_SHARE
-    return uneven or float(np.mean(steps)) < STEADY_SHARE
+    return not mostly_even(data.time_s) or float(np.mean(steps)) < STEADY_SHARE
 
 
 class Averages(Protocol):

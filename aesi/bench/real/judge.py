@@ -22,6 +22,7 @@ from aesi.data.spectra import read_spectra
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 from aesi.physics import Cell
+from aesi.pipeline.discovery.budget import MOST_ROWS
 from aesi.pipeline.discovery.discover import discovery_content
 from aesi.records import Measurement, Spectrum
 from aesi.tracer import Discovery, discover
@@ -30,8 +31,6 @@ LIMIT_S = 600.0
 """Limit of the processor time of one case, s. A case that takes longer counts as not answered. A convention."""
 HELD_OUT = 0.3
 """Last share of a record that is held out, the default of `aesi discover`."""
-MOST_ROWS = 20_000
-"""Most rows of a record; more are averaged to this number, as `aesi discover` does."""
 DRAWN = 160
 """Number of points of a residual in the report."""
 
@@ -166,7 +165,10 @@ def _scored_row(
 
 
 def record(take: Take) -> Measurement:
-    """The record as the tracer is given it, with at most MOST_ROWS rows.  Raises DataError if it is not available."""
+    """The record as the tracer is given it, with at most as many rows as `aesi discover` takes.
+
+    Raises DataError if it is not available.
+    """
     columns: dict[str, str | None] | None = None if take.temperature else {"temperature_degc": None}
     path = locate(take.set, take.file)
     if take.set in (NMC, M50T):
