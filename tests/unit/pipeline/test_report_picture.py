@@ -71,6 +71,6 @@ def test_a_finding_is_drawn_with_its_name_its_witness_and_the_errors_on_what_cho
     tested = [t for t in view.traces if t.part == "test"]
     errors = np.concatenate([t.measured_v - t.after_v for t in tested])
     assert f"with the finding added: {1e3 * np.sqrt(np.mean(errors**2)):.1f} mV RMSE" in text
-    assert "kept back" in text
+    assert "held out" in text
     assert "black: measured" in text
     assert "nan" not in text
