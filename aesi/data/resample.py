@@ -175,9 +175,8 @@ def in_runs(measurement: Measurement, run: int) -> Measurement:
     straight = measurement.hold_taken == "linear"
     held = not (straight and mostly_even(measurement.time_s))
     note = f"Decimated from {n:,} to {{rows:,}} rows: runs of {run} rows, {{how}}"
-    note += (
-        ", over which the current is constant from here on" if held and measurement.hold != "backward" else ""
-    )
+    if held and measurement.hold != "backward":
+        note += ", over which the current is constant from here on"
     note += f"; {last} left out." if left else "."
     stamps = measurement.time_s[::run]
     few = _resampled_to(measurement, stamps, note, "backward")

@@ -24,6 +24,7 @@ from aesi.pipeline.notes import soh_day_sentences, temperature_range_sentences, 
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.report.views import DiscoveryTrace, DiscoveryView, EffectView
+from aesi.pipeline.report.words.sizes import capitalised
 from aesi.pipeline.written import ARCHIVE, FINDING, MODEL, REPORT
 from aesi.records import Measurement
 from aesi.tracer import Discovery, discover
@@ -206,7 +207,7 @@ def found_model(found: Discovery) -> HybridModel:
         model=found.choice.model,
         held=tuple(map(repr, held)),
         beside=tuple(one.id for one in (*left, *held) if one.id not in found.written),
-        finding=" ".join(f"{warning[0].upper()}{warning[1:]}" for warning in found.warnings),
+        finding=" ".join(map(capitalised, found.warnings)),
     )
 
 

@@ -133,9 +133,8 @@ def _figure(line: Line, key: str) -> str:
         return "–"
     low, high = line[f"{key}_95_pct"]
     cases = line[f"{key}_cases"]
-    hits = round(
-        line[f"{key}_pct"] * cases / 100
-    )  # rounded to a tenth in the line; rounded again, 60.5 would be 60
+    # The line has the rate to a tenth of a per cent; rounded again, 60.5 would be 60.
+    hits = round(line[f"{key}_pct"] * cases / 100)
     return f"{hits} of {cases}: {100 * hits / cases:.0f} % [{low:.0f}, {high:.0f}]"
 
 

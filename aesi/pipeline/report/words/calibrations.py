@@ -10,6 +10,7 @@ import numpy as np
 from aesi.calibration.health import HEALTH_WORDS
 from aesi.physics.simulation import MODEL_WORDS
 from aesi.pipeline.digits import resolving
+from aesi.pipeline.report.words.sizes import capitalised
 
 NAMED_OPEN = 3
 """Parameters that the sentence on what is left open names: it is a line on a console, and the report has all."""
@@ -67,7 +68,7 @@ def _files(content: Mapping[str, Any]) -> list[str]:
 def _health(content: Mapping[str, Any]) -> list[str]:
     rows = [f"| {HEALTH_WORDS[name]} | {_with_interval(p)} |" for name, p in content["health"].items()]
     assumed = content["size_assumed"]
-    said = ["", f"{assumed[0].upper()}{assumed[1:]}"] if assumed else []
+    said = ["", capitalised(assumed)] if assumed else []
     return ["| state of health | value | 95 % interval |", "|---|---|---|", *rows, *said]
 
 

@@ -12,6 +12,7 @@ from aesi.numerics.typing import Array
 from aesi.pipeline.digits import decimals
 from aesi.pipeline.report.views import DiscoveryView, Row
 from aesi.pipeline.report.words.sizes import (
+    capitalised,
     explain_part,
     finding_line,
     listed,
@@ -280,11 +281,6 @@ def _named(view: DiscoveryView, effects: Sequence[str]) -> str:
     if "instrument" in groups:
         parts.append(f"the data, not the cell, show {listed(groups['instrument'])}")
     return capitalised("; ".join(parts))
-
-
-def capitalised(text: str) -> str:
-    """With a capital letter, as a sentence begins."""
-    return text[:1].upper() + text[1:]
 
 
 def _decapitalised(text: str) -> str:

@@ -6,10 +6,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from aesi.pipeline.report.views import Row
-from aesi.pipeline.report.words.discoveries import WITH_FINDING, capitalised, states_of
+from aesi.pipeline.report.words.discoveries import WITH_FINDING, states_of
 from aesi.pipeline.report.words.sizes import (
     PERCENT,
     TELLING,
+    capitalised,
     listed,
     name_words,
     resized,
