@@ -82,9 +82,8 @@ def test_fitted_rows_were_judged_where_they_are_the_beginning_of_a_test(
     assert prepared.data.time_s[rows] >= FITTED
     read = read_measurement(whole)
     last = int(prepared.data.time_s[-1])
-    taken_ah = prepared.data.discharged_ah(
-        "backward" if rows < FITTED else "linear"
-    )  # of averages since a row before
+    # A thinned row is the average since the row before.
+    taken_ah = prepared.data.discharged_ah("backward" if rows < FITTED else "linear")
     assert taken_ah[-1] == pytest.approx(read.discharged_ah("linear")[last])
 
 
