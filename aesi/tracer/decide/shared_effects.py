@@ -2,7 +2,9 @@
 
 An effect on the other records alone takes up half of what all records share: a contact resistance that the file lacks
 looks like one that has increased. A found effect is therefore compared with the same effect in all records. Where that
-is believed, the effect is opened in all records like a declared parameter, and the search for differences is repeated.
+says more of unseen data than can be a tie, the good records have shown the effect, and it is opened in all records like
+a declared parameter; then the search for differences is repeated. Good records that cannot show it (a lag, under
+constant current) are taken to be what they were declared to be.
 """
 
 from __future__ import annotations
@@ -16,14 +18,14 @@ from aesi.tracer.search.archive import Archive, context_of
 from aesi.tracer.search.forward import forward_search
 from aesi.tracer.search.hypothesis_fits import base_of
 from aesi.tracer.search.path import Path, Report
-from aesi.tracer.search.plausible import most_plausible
+from aesi.tracer.search.plausible import alike
 
 
 @dataclass(frozen=True, eq=False)
 class Unshared:
     """A search for effects on the other records alone, with shared effects opened in all records.
 
-    archive : of that search.  shared : sentences on the effects that were opened in all records.
+    archive : of that search.  shared : sentences on the effects that all records may share.
     """
 
     path: Path
@@ -32,7 +34,7 @@ class Unshared:
 
 
 def searched_unshared(problem: InverseProblem, most: int, archive: Archive, report: Report) -> Unshared:
-    """The search, repeated with the found effect open in all records for as long as that is believed instead.
+    """The search, repeated with the found effect open in all records for as long as the good ones show it, too.
 
     most : effects that may be named, 0 or 1.  Raises DataError where the model cannot be simulated on the records.
     """
@@ -40,28 +42,31 @@ def searched_unshared(problem: InverseProblem, most: int, archive: Archive, repo
     while found.path.chosen.hypothesis and not opened.issuperset(found.path.chosen.hypothesis):
         (name,) = found.path.chosen.hypothesis
         opened.add(name)
-        again = _with_shared(found, name, most, report)
-        if again is None:
-            break
-        found = again
+        found = _with_shared(found, name, most, report)
     return found
 
 
-def _with_shared(found: Unshared, name: str, most: int, report: Report) -> Unshared | None:
-    """The search with an effect open in all records; None where the effect on the other records alone is believed."""
+def _with_shared(found: Unshared, name: str, most: int, report: Report) -> Unshared:
+    """The search with an effect open in all records; the one that found it where the good records do not show it."""
     alone, problem = found.path.chosen, in_all_records(found.path.problem, name)
     archive = Archive(found.archive.path, context_of(problem))
     base = base_of(problem, found.path.blocks, archive)
     if base is None:
-        return None
+        return found
     report(problem, base, base.score.total - alone.score.total)
-    if most_plausible([alone, base], len(problem.competing())) is alone:
-        return None
     shared, named = base.score.total - found.path.base.score.total, found.path.gain(alone)
     told = (
         f"{name} gains {shared:.1f} nats on unseen data if it acts in all records, and {named:.1f} if only in those "
-        "that are compared with the good ones: it is taken as common to all, and the verdict is on what these have "
-        "beyond it; leave out --good to ask what the file lacks."
+        "that are compared with the good ones: "
+    )
+    if alike(base, alone):
+        if not alike(alone, base):
+            return found
+        told += "the good ones do not tell whether they have it, too, and are taken to be good."
+        return replace(found, shared=(*found.shared, told))
+    told += (
+        "it is taken as common to all, and the verdict is on what these have beyond it; leave out --good to ask what "
+        "the file lacks."
     )
     path = forward_search(problem, most, archive, report)
     return Unshared(path, archive, (*found.shared, told))

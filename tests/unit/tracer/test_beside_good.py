@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from aesi.errors import DataError
+from aesi.physics import simulate
 from aesi.physics.effects import CATALOGUE
+from aesi.records import Measurement
 from aesi.tracer import discover
 from aesi.tracer.case.free_parameter import acting_on, shared_owner
 from aesi.tracer.case.problem import BESIDE_TIMES
@@ -74,6 +76,19 @@ def test_a_contact_that_good_records_have_too_was_found_as_a_difference(cell, tr
     assert (found.verdict.word, found.verdict.effects) == ("none", ())
     (note,) = (note for note in found.notes if "taken as common to all" in note)
     assert note.startswith("series_resistance gains ")
+
+
+def test_a_lag_that_constant_current_cannot_show_was_taken_as_common_to_all(cell, make):
+    """A discharge at constant current says nothing of a lag."""
+    tried = {name: CATALOGUE[name] for name in ("series_resistance", "voltage_sensor_offset", "clock_skew")}
+    other = make([CATALOGUE["clock_skew"].activate(skew=0.0, lag_s=3.0)], n=3600)
+    time, current = np.arange(3600.0), np.r_[0.0, np.full(3599, 9.0)]
+    noise = 1e-3 * np.random.default_rng(5).normal(size=3600)
+    good = Measurement(time, current, simulate(cell, time, current, 0.9).voltage_v + noise, name="steady")
+    found = discover(cell, [other], soc0=0.9, effects=tried, good=[good])
+    assert found.verdict.effects == ("clock_skew",)
+    (note,) = (note for note in found.notes if "do not tell whether" in note)
+    assert note.startswith("clock_skew gains ")
 
 
 def test_a_contact_beyond_that_of_the_good_records_has_the_size_of_the_difference(cell, tried, erring):
