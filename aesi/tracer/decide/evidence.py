@@ -172,7 +172,7 @@ def _unexplained(problem: InverseProblem, path: Path, verdict: Verdict, searches
     measured, blocks = searches.at(problem, "measured"), path.blocks
     lasting = _at_lasting_trust(problem, measured, archive)
     options = [*recalibrations, Option.of(lasting.problem, blocks, lasting.base)]
-    if path.beyond_reach_v is not None and len(problem.records) > 1:
+    if len(problem.records) > 1:
         options += _with_stand_ins(searches.at(problem, "loose"), blocks)
     named: list[Option] = []
     if path.beyond_reach_v is not None:

@@ -130,6 +130,17 @@ class HypothesisFitter:
         column[rows] = -slope
         return column, simulations
 
+    def closest(self, starts: Sequence[Array], size: Size) -> Array:
+        """The one of these coordinates from which a descent at this size of the model error has least to go; the first
+        of equal ones."""
+        objective = _Whitened(self, size, np.ones(len(self.problem.measured), dtype=bool))
+
+        def cost(x: Array) -> float:
+            residual = objective.residual(np.clip(x, self.low, self.high))
+            return np.inf if residual is None else float(residual @ residual)
+
+        return min(starts, key=cost)
+
     def descend(
         self,
         x: Array,

@@ -196,9 +196,13 @@ class _ForwardSearch:
         return Step(tuple(parents), tuple(ranked), tuple(fitted), admitted, least_nats), refused
 
     def _finalists_fitted(self, ranked: Sequence[Grown], best: FittedHypothesis) -> list[FittedHypothesis]:
-        """The best growths, fitted with the whole model; best first."""
-        fitted = []
-        for one in _finalists(ranked, best):
+        """The best growths, fitted with the whole model; best first. There are more than `FINALISTS` where none of the
+        fits reaches what the next growth promises, so that the growths have not shown which is best."""
+        fitted: list[FittedHypothesis] = []
+        for number, one in enumerate(_finalists(ranked, best)):
+            reached = max((fit.score.total for fit in fitted), default=-np.inf)
+            if number >= FINALISTS and reached >= one.score.total:
+                break
             fit = self._fitted(one.hypothesis, one)
             if fit is not None:
                 self.report(self.problem, fit, fit.score.total - best.score.total)
@@ -281,9 +285,9 @@ def _ranked(grown: Sequence[Grown]) -> list[Grown]:
 
 def _finalists(ranked: Sequence[Grown], best: FittedHypothesis) -> list[Grown]:
     """The growths that are worth a fit with the whole model."""
-    gains = [one.score.total - best.score.total for one in ranked[:FINALISTS]]
+    gains = [one.score.total - best.score.total for one in ranked]
     least = max(FINALIST_SHARE * max(gains, default=0.0), 0.0)
-    return [one for one, gain in zip(ranked, gains, strict=False) if gain > least]
+    return [one for one, gain in zip(ranked, gains, strict=True) if gain > least]
 
 
 def admissible(

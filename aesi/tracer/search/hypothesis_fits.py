@@ -13,7 +13,7 @@ from aesi.tracer.case.free_parameter import FreeParameter, coordinates_of, value
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.fit import FittedHypothesis, HypothesisFitter
 from aesi.tracer.likelihood.growth import Explanation
-from aesi.tracer.likelihood.model_error import PRIORS, SizePrior, replace_fast
+from aesi.tracer.likelihood.model_error import PRIORS, Size, SizePrior, replace_fast
 from aesi.tracer.search.archive import Archive, fit_name
 
 FIT_ROUNDS = 8
@@ -53,8 +53,7 @@ def fitted_hypothesis(
         if near is None:
             x = _from_the_middle(fitter, prior)
         else:
-            x0, size = coordinates_of(fitter.free, near.values_by_key), prior.nearest(near.score.size)
-            x = fitter.descend(x0, size, FIT_ROUNDS, _slopes_v(near, fitter.free))
+            x = _from_near(fitter, near, prior.nearest(near.score.size))
         archive.put(name, x)
     found = fitter.finished(x)
     if found is not None:
@@ -88,6 +87,21 @@ def _from_the_middle(fitter: HypothesisFitter, prior: SizePrior) -> Array:
     if there is None or there.score.size.fast_v <= prior.median.fast_v:
         return x
     return fitter.descend(x, replace_fast(prior.median, there.score.size), FIT_ROUNDS)
+
+
+def _from_near(fitter: HypothesisFitter, near: Explanation, size: Size) -> Array:
+    """Coordinates after a descent from a similar hypothesis.
+
+    It starts from the values there with their change to first order, and with the sensitivities there. It starts
+    without that change, or from the middle of the own parameters' priors, where that is closer to the data: at the knee
+    of a discharge a change to first order may be off by volts, from which no descent returns.
+    """
+    moved = coordinates_of(fitter.free, near.values_by_key)
+    before = {f.key: f.value(float(x)) for f, x in zip(near.free, near.point.x, strict=True)}
+    unmoved = coordinates_of(fitter.free, {**near.values_by_key, **before})
+    middle = np.where([f.own for f in fitter.free], 0.0, unmoved)
+    x = fitter.closest((moved, unmoved, middle), size)
+    return fitter.descend(x, size, FIT_ROUNDS, _slopes_v(near, fitter.free) if x is moved else None)
 
 
 def values_without(

@@ -6,15 +6,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from aesi.numerics.metrics import rms
 from aesi.physics.effects import CATALOGUE
 from aesi.tracer.case.blocks import blocks_of
-from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, effect_parameters
+from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, coordinates_of, effect_parameters
 from aesi.tracer.discovery import inverse_problem
+from aesi.tracer.likelihood.fit import HypothesisFitter
 from aesi.tracer.likelihood.growth import EffectGrowth, Parent
 from aesi.tracer.likelihood.model_error import PRIORS, Size
 from aesi.tracer.search import growths, reach
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.forward import FINALISTS, admissible, forward_search, needed
+from aesi.tracer.search.forward import FINALISTS, _ForwardSearch, admissible, forward_search, needed
 from aesi.tracer.search.growths import PROMISING, growths_on, most_promising, promising_first
 from aesi.tracer.search.hypothesis_fits import MOVED_SDS, base_of, fitted_hypothesis, linearised_as_declared
 from aesi.tracer.search.plausible import ALIKE_NATS, most_plausible
@@ -251,3 +253,32 @@ def test_with_the_other_model_what_says_most_with_either_is_grown(monkeypatch):
     assert set(slopes) == set(names[PROMISING - 2 : -2])
     alone, none = promising_first(offered, SimpleNamespace(near=lambda name, size: None))
     assert (alone, none) == (offered, {})
+
+
+def test_a_fit_had_to_start_where_a_change_to_first_order_leaves_volts(monkeypatch, resisting, make):
+    problem = resisting(make)
+    blocks, archive = blocks_of(problem), Archive(None, "")
+    base = base_of(problem, blocks, archive)
+    grown = EffectGrowth(Parent(problem, blocks, base), "series_resistance", SIZE).grow()
+    first = [f.owner == STATE_OF_CHARGE for f in grown.free]
+    far = replace(grown, score=replace(grown.score, shift=np.where(first, 4.0, grown.score.shift)))
+    begun = []
+    monkeypatch.setattr(HypothesisFitter, "descend", lambda self, x, *_: begun.append(x) or x)
+    fitted_hypothesis(problem, blocks, ("series_resistance",), far, Archive(None, ""))
+    fitter = HypothesisFitter(problem, blocks, ("series_resistance",))
+    left, left_far = (
+        rms(fitter.residual(x)) for x in (*begun, coordinates_of(fitter.free, far.values_by_key))
+    )
+    assert left < 0.6 * left_far
+
+
+@pytest.mark.parametrize(("reached", "fitted"), [(20.0, FINALISTS), (4.5, FINALISTS + 1), (-900.0, 12)])
+def test_growths_beyond_the_finalists_are_fitted_where_no_fit_does_what_they_promise(reached, fitted):
+    """Twelve growths promise 11.5, 10.5 .. 0.5 nats; every fit reaches as much."""
+    promised = [
+        SimpleNamespace(hypothesis=(str(k),), score=SimpleNamespace(total=11.5 - k)) for k in range(12)
+    ]
+    best = SimpleNamespace(score=SimpleNamespace(total=-100.0))
+    fit = SimpleNamespace(score=SimpleNamespace(total=reached), at_bounds=())
+    search = SimpleNamespace(_fitted=lambda *_: fit, report=lambda *_: None, problem=None)
+    assert len(_ForwardSearch._finalists_fitted(search, promised, best)) == fitted
