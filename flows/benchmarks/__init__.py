@@ -47,10 +47,10 @@ AS_WRITTEN = ConfigDict(coerce_numbers_to_str=True)
 
 
 def run(name: str, **options: Any) -> Iterator[dict[str, Any]]:
-    """Lines of one benchmark, as they come.
+    """Lines of one benchmark, as they come; nothing is run before the first is asked for.
 
-    Raises InputError for an option that it does not have, a value that the option cannot have, and a place that cannot
-    be written to.
+    Raises InputError at once, so that of several benchmarks none has run in vain, for an option that this one does not
+    have, a value that the option cannot have, and a place that cannot be written to.
     """
     module = import_module(BENCHMARKS[name])
     known = get_type_hints(module.run, include_extras=True)
@@ -67,7 +67,7 @@ def run(name: str, **options: Any) -> Iterator[dict[str, Any]]:
     if options.get("write") is not None:
         marks = module.ARCHIVE_MARKS if options.get("archive") else (module.BEGIN, module.END)
         check_page(str(options["write"]), *marks)
-    yield from module.run(**options)
+    return iter(module.run(**options))
 
 
 def _check_places(places: dict[str, str]) -> None:

@@ -4,6 +4,7 @@ import json
 import os
 import signal
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -101,16 +102,26 @@ def test_options_that_leave_no_case_gave_a_summary_of_none(options, name, worksp
     assert not list(workspace.iterdir())  # nothing was tracked, either
 
 
-def test_the_options_of_every_benchmark_are_checked():
+def test_the_options_of_every_benchmark_are_checked_and_each_has_a_name():
     for name in benchmarks.BENCHMARKS:
-        with pytest.raises(InputError, match="has no such option"):
-            next(benchmarks.run(name, no_such_option=1))
+        with pytest.raises(
+            InputError, match=rf"`aesi bench {name}` has no such option; it has: [a-z]\w*(, [a-z]\w*)*\.$"
+        ):
+            benchmarks.run(name, no_such_option=1)
 
 
-def test_a_benchmark_offered_an_option_without_a_name():
-    for name in benchmarks.BENCHMARKS:
-        with pytest.raises(InputError, match=r"it has: [a-z]\w*(, [a-z]\w*)*\.$"):
-            next(benchmarks.run(name, no_such_option=1))
+def test_an_option_that_one_of_all_benchmarks_lacks_was_refused_after_hours_of_others(call, monkeypatch):
+    """`aesi bench --set seed=1`: nine have a seed and were run before the first without one was met."""
+
+    def started(seed: int = 0) -> Iterator[dict]:
+        yield pytest.fail(f"it was started with {seed}")
+
+    monkeypatch.setattr("aesi.bench.physics.espm.run", started)
+    monkeypatch.setattr("flows.commands.bench._chosen", lambda name: ["espm", "scale"])
+    code, out, err = call("bench", "--set", "seed=1")
+    assert code == 2
+    assert out == ""
+    assert "--set seed: `aesi bench scale` has no such option; it has: experiment, candidates" in err
 
 
 def test_the_timed_drive_of_the_porous_electrode_could_not_be_left_out():
@@ -481,6 +492,19 @@ def test_a_table_of_kept_splits_mixed_settings(tmp_path, monkeypatch, capsys):
         "of other settings, and left out of the table: hg2 without 25degC_us06, seed 1."
         in capsys.readouterr().err
     )
+
+
+@pytest.mark.parametrize("asked", [{"models": ["ESPM", "AESI I"]}, {"overrides": ['models=["ESPM"]']}])
+def test_a_table_of_splits_without_one_of_its_models_ended_in_a_traceback_after_all_splits(
+    tmp_path, monkeypatch, asked
+):
+    page = tmp_path / "page.md"
+    page.write_text(f"{splits.BEGIN}\n{splits.END}\n")
+    with pytest.raises(InputError, match=r"its table has columns of ESPM recalibrated.*add them to models"):
+        asked_splits(monkeypatch, cells=["hg2"], a_cell=1, write=str(page), **asked)
+    assert asked_splits(
+        monkeypatch, cells=["hg2"], a_cell=1, **asked
+    )  # without a table there is nothing to miss
 
 
 @pytest.mark.parametrize(
