@@ -1,6 +1,8 @@
-"""Registry of the benchmarks that compare this package with other programs or with measurements.
+"""Registry of the benchmarks that compare this package with other programs or with what a virtual cell is known to be.
 
 Each benchmark is a module with a generator `run`, whose rows `aesi bench NAME --json` prints, one JSON object per line.
+Those whose cases are tracked, spread over processes or written into a page of the docs have their `run` in
+`flows.benchmarks`.
 """
 
 from collections.abc import Collection, Iterable, Sequence
@@ -21,7 +23,6 @@ BENCHMARKS = {
     "spci": "aesi.bench.intervals.spci",
     "bands": "aesi.bench.intervals.bands",
     "drift": "aesi.bench.intervals.drift",
-    "cells": "aesi.bench.physics.cells",
 }
 """Name of a benchmark -> module with a generator `run(**options)` of rows (`CaseRow`)."""
 

@@ -1,4 +1,4 @@
-"""Every benchmark by name: those of the package, and those that need the tracker or the scheduler.
+"""Every benchmark by name: those of the package, and those that need the tracker, the scheduler or a page of the docs.
 
 Each module has `run(**options)`, which yields one JSON-ready dict a line.
 """

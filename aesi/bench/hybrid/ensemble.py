@@ -37,6 +37,8 @@ from aesi.sparse.terms.inputs import low_pass, with_inputs
 
 CASES = ((60, 1e-3), (200, 1e-12), (626, 1e-3), (626, 1e-12))
 """(number of terms in the library, ridge lambda1) of each case."""
+SYNTHETIC_INPUTS = (*INPUT_NAMES, "soc")
+"""Inputs of the terms."""
 
 _DT_S = 0.1
 """Time step, s, that of the paper's records."""
@@ -100,6 +102,12 @@ def synthetic_record(n: int, seed: int) -> ErrorSeries:
     )
 
 
+def lowest_terms(terms: int) -> Library:
+    """The library of that many terms of lowest degree over SYNTHETIC_INPUTS."""
+    every = Library.build(SYNTHETIC_INPUTS)
+    return every.take(np.argsort(every.degrees, kind="stable")[:terms])
+
+
 def _case(
     record: ErrorSeries, terms: int, lambda1: float, candidates: int, resamples: int, peer_models: int
 ) -> dict[str, Any]:
@@ -110,7 +118,6 @@ def _case(
     peer_s, peer_error, error = _peer(problem, genomes, peer_models)
     peer_total_s = peer_s * candidates * resamples
     return {
-        "bench": "ensemble",
         "terms": terms,
         "lambda1": lambda1,
         "rows": len(problem.target),
@@ -134,10 +141,8 @@ def _case(
 def _ours(
     record: ErrorSeries, terms: int, lambda1: float, candidates: int, resamples: int
 ) -> tuple[Problem, list[Genome], int]:
-    names = (*INPUT_NAMES, "soc")
-    every = Library.build(names)
-    library = every.take(np.argsort(every.degrees, kind="stable")[:terms])
-    split = Split((with_inputs(record, names),), (), ())
+    library = lowest_terms(terms)
+    split = Split((with_inputs(record, SYNTHETIC_INPUTS),), (), ())
     problem = Problem.build(split, Options(resamples=resamples), library)
     thresholds = np.geomspace(1e-2, 1.0, candidates)
     genomes = [Genome.whole(library, lambda1, float(t), 0.41) for t in thresholds]

@@ -25,6 +25,7 @@ from pydantic import NonNegativeInt, PositiveInt
 from aesi.bench import check_listed
 from aesi.conformal import METHODS, Calibrated
 from aesi.conformal.scores import interval_score
+from aesi.constants import MILLI
 from aesi.numerics.compiled import kept_njit
 from aesi.numerics.typing import Array
 
@@ -132,7 +133,7 @@ def _stream_ms(calibrated: Calibrated, residuals: Array) -> float:
     for error in residuals.tolist():
         stream.interval()
         stream.update(error)
-    return 1e3 * (process_time() - started) / len(residuals)
+    return MILLI * (process_time() - started) / len(residuals)
 
 
 def _peer(method: str, peer_steps: int, mapie_steps: int) -> tuple[str, int]:

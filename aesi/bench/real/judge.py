@@ -17,20 +17,18 @@ from aesi.bench.real.faults import declared_with_fault, soc0_with_fault, with_fa
 from aesi.bench.real.references import capacity_row, resistance_row, temperature_row
 from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.data import read_measurement
-from aesi.data.catalogue import M50T, NMC, locate
+from aesi.data.catalogue import locate
 from aesi.data.spectra import read_spectra
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 from aesi.physics import Cell
 from aesi.pipeline.discovery.budget import MOST_ROWS
-from aesi.pipeline.discovery.discover import discovery_content
+from aesi.pipeline.discovery.discover import HOLDOUT, discovery_content
 from aesi.records import Measurement, Spectrum
 from aesi.tracer import Discovery, discover
 
 LIMIT_S = 600.0
 """Limit of the processor time of one case, s. A case that takes longer counts as not answered. A convention."""
-HELD_OUT = 0.3
-"""Last share of a record that is held out, the default of `aesi discover`."""
 DRAWN = 160
 """Number of points of a residual in the report."""
 
@@ -55,7 +53,7 @@ def judged(case: RealCase, cells: str, limit_s: float | None = LIMIT_S) -> dict[
         data = with_fault(data, case.fault.kind, case.fault.size)
         declared = declared_with_fault(declared, case.fault.kind, case.fault.size)
         soc0 = soc0_with_fault(soc0, case.fault.kind, case.fault.size)
-    held = 0.0 if good else HELD_OUT  # beside known-good records the whole record is compared with them
+    held = 0.0 if good else HOLDOUT  # beside known-good records the whole record is compared with them
     found = answer_of(lambda: discover(declared, [data], soc0=soc0, holdout=held, good=good), limit_s)
     if isinstance(found, NoAnswer):
         answer = found.row | MISSED
@@ -170,10 +168,7 @@ def record(take: Take) -> Measurement:
     Raises DataError if it is not available.
     """
     columns: dict[str, str | None] | None = None if take.temperature else {"temperature_degc": None}
-    path = locate(take.set, take.file)
-    if take.set in (NMC, M50T):
-        columns = None  # these data sets have no temperature column to leave out
-    return read_measurement(path, columns, max_rows=MOST_ROWS, stop_s=take.stop_s)
+    return read_measurement(locate(take.set, take.file), columns, max_rows=MOST_ROWS, stop_s=take.stop_s)
 
 
 def _residual(found: Discovery) -> dict[str, list[float]]:

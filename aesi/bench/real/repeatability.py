@@ -70,28 +70,32 @@ def scatter(cell: str, good: str, other: str, cells: str = "experiments/cells") 
     base = base_of(problem, blocks, archive)
     if base is None:
         return {"cell": cell, "good": good, "other": other, "failed": True}
-    grown = grow_all(growths_on([Parent(problem, blocks, base)], {}, archive), archive)
-    ratios = [ratio(one) for one in grown if one is not None]
     return {
         "cell": cell,
         "good": good,
         "other": other,
         "model_error_mv": MV_PER_V * base.score.delta_v,
         "soc0_off": [round(base.values["soc0"][str(k)] - r.soc0, 4) for k, r in enumerate(problem.records)],
-        "sds": {name: round(sds, 2) for name, sds in ratios},
+        "sds": sizes_in_sds(Parent(problem, blocks, base), archive),
     }
 
 
-def ratio(one: Grown) -> tuple[str, float]:
-    """(effect, size over standard deviation) of the last effect of a hypothesis: of its amplitudes the one that is the
-    most standard deviations from zero; 0 if all are zero."""
+def sizes_in_sds(parent: Parent, archive: Archive) -> dict[str, float]:
+    """Effect -> its size over its standard deviation, fitted to first order beside a fitted hypothesis, to 0.01."""
+    grown = grow_all(growths_on([parent], {}, archive), archive)
+    return {one.hypothesis[-1]: round(_size_in_sds(one), 2) for one in grown if one is not None}
+
+
+def _size_in_sds(one: Grown) -> float:
+    """Size over standard deviation of the last effect of a hypothesis: of its amplitudes the one that is the most
+    standard deviations from zero; 0 if all are zero."""
     effect = one.hypothesis[-1]
     sds = np.sqrt(np.diagonal(one.score.covariance))
     x = one.point.x + one.score.shift
     found = [
         x[j] / sds[j] for j, f in enumerate(one.free) if f.owner == effect and f.amplitude and sds[j] > 0
     ]
-    return effect, float(max(found, key=abs, default=0.0))
+    return float(max(found, key=abs, default=0.0))
 
 
 def main() -> None:

@@ -243,7 +243,7 @@ def test_a_case_without_an_answer_left_the_rates_and_the_table(shared_data, monk
 def test_what_the_tracer_refuses_says_nothing():
     cell = Cell.from_bpx(f"{CELLS}/lg_m50_chen2020.bpx.json")
     short = Measurement(np.arange(20.0), np.zeros(20), np.full(20, 3.7), name="short")
-    assert seen_on_measured(cell, short, 0.5, ("series_resistance",)) is None
+    assert seen_on_measured(cell, short, 0.5, ("series_resistance",), (), 0.3) is None
 
 
 @pytest.fixture
