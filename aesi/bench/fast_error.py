@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from aesi.bench.real.case import RealCase
-from aesi.bench.real.judge import declared_cell, record
+from aesi.bench.real.judge import declared_cell, taken
 from aesi.bench.real.plan import chosen
 from aesi.bench.real.repeatability import sizes_in_sds
 from aesi.constants import MV_PER_V
@@ -45,7 +45,7 @@ THERE = "clock_skew"
 """Effect that is really present in some records: the voltage channel of one cycler lags by 0.12 s on three of them."""
 
 
-def records() -> Iterator[RealCase]:
+def fast_controls() -> Iterator[RealCase]:
     """The development controls at the temperature of their cell file whose current changes."""
     for case in chosen(only="control-", development=True):
         if case.good or any(word in case.take.file for word in CONSTANT):
@@ -63,7 +63,7 @@ def fast_error(case: RealCase, cells: str = "experiments/cells") -> dict[str, An
     each effect over its standard deviation.  `failed` stands in their place if the model cannot be fitted.
     Raises DataError if the record or the cell file is not available.
     """
-    problem = inverse_problem(declared_cell(case.cell, cells), [record(case.take)], case.soc0, HOLDOUT)
+    problem = inverse_problem(declared_cell(case.cell, cells), [taken(case.take)], case.soc0, HOLDOUT)
     problem = replace(problem, trust="measured")
     blocks, archive = blocks_of(problem), Archive(None, "")
     base, windows = base_of(problem, blocks, archive), blocks.windows
@@ -98,7 +98,7 @@ def lasts_s(time_s: Array, error: Array) -> float:
 def main() -> None:
     """Print one line per record and the summary."""
     rows = []
-    for case in records():
+    for case in fast_controls():
         rows.append(fast_error(case))
         print(json.dumps(rows[-1]), flush=True)
     print(json.dumps(_summary([row for row in rows if "sds" in row])))

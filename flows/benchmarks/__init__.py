@@ -14,7 +14,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from aesi.bench import BENCHMARKS as OF_THE_PACKAGE
 from aesi.errors import InputError, wanted
 from aesi.numerics.files.whole import check_writable
-from flows.benchmarks.page import check_page
+from flows.benchmarks.page import check_marks
 
 BENCHMARKS = OF_THE_PACKAGE | {
     "blind": "flows.benchmarks.blind",
@@ -66,7 +66,7 @@ def run(name: str, **options: Any) -> Iterator[dict[str, Any]]:
     _check_places({option: str(options[option]) for option in PLACES if options.get(option) is not None})
     if options.get("write") is not None:
         marks = module.ARCHIVE_MARKS if options.get("archive") else (module.BEGIN, module.END)
-        check_page(str(options["write"]), *marks)
+        check_marks(str(options["write"]), *marks)
     return iter(module.run(**options))
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from aesi.errors import InputError
 
 
-def check_page(page: str, begin: str, end: str) -> None:
+def check_marks(page: str, begin: str, end: str) -> None:
     """Raises InputError where `write_between` has no page with both marks to write to."""
     try:
         text = Path(page).read_text(encoding="utf-8")

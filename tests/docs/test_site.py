@@ -5,7 +5,6 @@ import re
 import shutil
 import subprocess
 import sys
-import tomllib
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import get_args
@@ -221,7 +220,7 @@ def test_every_command_that_writes_a_table_names_the_page_that_has_its_marks(mon
     from importlib import import_module
 
     from flows.benchmarks import BENCHMARKS
-    from flows.benchmarks.page import check_page
+    from flows.benchmarks.page import check_marks
 
     monkeypatch.chdir(ROOT)
     told = [
@@ -236,7 +235,7 @@ def test_every_command_that_writes_a_table_names_the_page_that_has_its_marks(mon
         written = re.search(r"--set write=(\S+)", options)[1]
         module = import_module(BENCHMARKS[name])
         archive = "archive=true" in options
-        check_page(written, *(module.ARCHIVE_MARKS if archive else (module.BEGIN, module.END)))
+        check_marks(written, *(module.ARCHIVE_MARKS if archive else (module.BEGIN, module.END)))
         assert str(page) == written  # it stands beside its table
 
 
@@ -390,19 +389,6 @@ def test_every_formula_of_the_documentation_is_understood():
         html = re.sub(r'aria-label="[^"]*"', "", change(page.read_text(encoding="utf-8")))
         for math in re.findall(r"<math.*?</math>", html, re.DOTALL):
             assert "\\" not in math, f"{page.name}: {math}"
-
-
-def test_the_picture_of_the_architecture_shows_the_layers_that_are_checked():
-    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    layers = settings["tool"]["importlinter"]["contracts"][0]["layers"]
-    checked = [sorted(part.strip() for part in layer.split("|")) for layer in layers]
-    picture = (ROOT / "docs" / "images" / "architecture.svg").read_text(encoding="utf-8")
-    drawn: dict[int, list[str]] = {}
-    for height, names in re.findall(
-        r'<text x="\d+" y="(\d+)"[^>]*>(?:<tspan[^>]*>)?((?:aesi\.|flows)[^<]*)', picture
-    ):
-        drawn.setdefault(int(height), []).extend(name.strip() for name in names.split(","))
-    assert [sorted(drawn[height]) for height in sorted(drawn)] == checked
 
 
 def test_pages_refer_to_files_that_exist():

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from aesi.bench.real.case import Take
-from aesi.bench.real.judge import declared_cell, record
+from aesi.bench.real.judge import declared_cell, taken
 from aesi.bench.real.plan import CELLS, WINDOW_S
 from aesi.constants import MV_PER_V
 from aesi.data.catalogue import HG2, NMC, PANASONIC
@@ -51,7 +51,7 @@ def pairs() -> Iterator[tuple[str, str, str]]:
             yield cell, good, other
 
 
-def scatter(cell: str, good: str, other: str, cells: str = "experiments/cells") -> dict[str, Any]:
+def pair_row(cell: str, good: str, other: str, cells: str = "experiments/cells") -> dict[str, Any]:
     """The row of one pair of records.
 
     cells : folder of the cell files.  `sds` is the fitted size of each effect over its standard deviation,
@@ -60,10 +60,10 @@ def scatter(cell: str, good: str, other: str, cells: str = "experiments/cells") 
     """
     problem = inverse_problem(
         declared_cell(CELLS[cell], cells),
-        [record(Take(cell, other, WINDOW_S))],
+        [taken(Take(cell, other, WINDOW_S))],
         1.0,
         0.0,
-        good=[record(Take(cell, good))],
+        good=[taken(Take(cell, good))],
     )
     problem = replace(problem, trust="beside")
     blocks, archive = blocks_of(problem), Archive(None, "")
@@ -102,7 +102,7 @@ def main() -> None:
     """Print one line per pair and the summary."""
     rows = []
     for cell, good, other in pairs():
-        rows.append(scatter(cell, good, other))
+        rows.append(pair_row(cell, good, other))
         print(json.dumps(rows[-1]), flush=True)
     ran = [row for row in rows if "sds" in row]
     by_effect: dict[str, list[float]] = {}
