@@ -7,6 +7,7 @@ from statistics import median
 import pytest
 
 from aesi.bench.real.plan import WARM
+from aesi.bench.real.report import FIGURES
 from aesi.bench.real.summary import NEAR_SHARE
 from flows.benchmarks.history import read_history
 
@@ -141,6 +142,29 @@ def test_how_often_an_artificial_sensor_fault_is_named():
     )
     told = f"{sum(alone)} of {len(alone)}; with a known-good record {sum(beside)} of {len(beside)}"
     assert told in text_of("docs/index.md")
+
+
+ASKED = {
+    "a withheld temperature is named": "withheld_named_pct",
+    "and within 2 K of the thermocouple's mean": "withheld_within_2k_pct",
+    "a fault of a sensor is named": "fault_named_pct",
+    "a fault of a sensor that the data can tell is named": "fault_seen_named_pct",
+    "nothing is wrong, and nothing is named": "control_silent_pct",
+    "a resistance is within 15 % of the impedance spectrum's": "witness_within_15pct_pct",
+    "the same, than the better of the declared and the recalibrated one": "after_worse_pct",
+}
+"""Row of the first table on measured cells -> key of the figure in the report."""
+
+
+def test_what_is_asked_for_on_measured_cells_stood_in_the_report_alone():
+    lines = (ROOT / MEASURED).read_text(encoding="utf-8").split("\n\n")
+    (table,) = [part for part in lines if part.startswith("| what was asked |")]
+    rows = [[cell.strip() for cell in line[1:-1].split("|")] for line in table.splitlines()[2:]]
+    aims = {key: FIGURES[key][1] for key in ASKED.values()}
+    words = {"0": "none", "100": "all"}
+    assert {row[0]: row[-1] for row in rows if row[-1]} == {
+        name: words.get(aims[key], aims[key].replace(" or more", " % or more")) for name, key in ASKED.items()
+    }
 
 
 @pytest.mark.parametrize("page", [*FIRST[1:], LEFT_OUT])
