@@ -6,7 +6,9 @@ Those whose cases are tracked, spread over processes or written into a page of t
 """
 
 from collections.abc import Collection, Iterable, Sequence
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
+
+from pydantic import Field
 
 from aesi.errors import InputError, did_you_mean
 
@@ -27,6 +29,10 @@ BENCHMARKS = {
 """Name of a benchmark -> module with a generator `run(**options)` of rows (`CaseRow`)."""
 
 Chosen = TypeVar("Chosen")
+AtLeastOne = Annotated[Sequence[Chosen], Field(min_length=1)]
+"""Values of a benchmark's option, of which none would leave nothing to print."""
+AtLeastTwo = Annotated[int, Field(ge=2)]
+"""Value of a benchmark's option of which one is too few to compute anything."""
 
 
 def some_chosen(name: str, cases: Sequence[Chosen], names: Iterable[str]) -> Sequence[Chosen]:

@@ -20,6 +20,7 @@ import optuna
 from optuna.storages import BaseStorage, InMemoryStorage
 from pydantic import NonNegativeInt, PositiveInt
 
+from aesi.bench import AtLeastTwo
 from aesi.constants import MILLI
 from aesi.sparse import Candidate, Genome, Problem
 from aesi.sparse.search.genome_space import GenomeSpace
@@ -33,7 +34,7 @@ SHARED = "SQLite"
 def run(
     terms: PositiveInt = 626,
     candidates: PositiveInt = 60,
-    population: PositiveInt = 20,
+    population: AtLeastTwo = 20,
     seed: NonNegativeInt = 0,
 ) -> Iterator[dict[str, Any]]:
     """One line a storage."""

@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 from pydantic import NonNegativeInt, PositiveInt
 
+from aesi.bench import AtLeastOne
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import InputError
 from aesi.numerics.typing import Array
@@ -47,7 +48,7 @@ _CAPACITY_AS = 30.0 * SECONDS_PER_HOUR
 
 
 def run(
-    cases: Sequence[tuple[int, float]] = CASES,
+    cases: AtLeastOne[tuple[int, float]] = CASES,
     n: PositiveInt = 88_200,
     candidates: PositiveInt = 20,
     resamples: PositiveInt = 100,
@@ -59,7 +60,7 @@ def run(
     cases : (terms, lambda1).  n : rows that are fitted.  candidates : number of candidates, which differ in their
     threshold.  resamples : bootstrap resamples of each.  peer_models : fits of PySINDy that are timed.  seed : of the
     record.  Coefficient errors are relative to the largest coefficient of a QR solution.
-    Raises InputError for more peer_models than resamples.
+    Raises InputError for more peer_models than resamples, and for a library of no terms or of more than there are.
     """
     if peer_models > resamples:
         raise InputError(
@@ -68,6 +69,8 @@ def run(
         )
     from threadpoolctl import threadpool_limits
 
+    for terms, _ in cases:
+        lowest_terms(terms)  # refused before anything is timed
     record = synthetic_record(n + 1, seed)
     with threadpool_limits(1):
         # A small case first, so that loading compiled code and warming up the solvers is not timed.
@@ -103,8 +106,10 @@ def synthetic_record(n: int, seed: int) -> ErrorSeries:
 
 
 def lowest_terms(terms: int) -> Library:
-    """The library of that many terms of lowest degree over SYNTHETIC_INPUTS."""
+    """The library of that many terms of lowest degree over SYNTHETIC_INPUTS.  Raises InputError if there are fewer."""
     every = Library.build(SYNTHETIC_INPUTS)
+    if not 1 <= terms <= len(every):
+        raise InputError(f"a library of {terms} terms: there are 1 to {len(every)} over these inputs.")
     return every.take(np.argsort(every.degrees, kind="stable")[:terms])
 
 

@@ -88,8 +88,10 @@ def run(
     key of LARGEST_RATE, or a BPX file; empty takes all of LARGEST_RATE.  seed : of the drives.  seconds : duration of
     the drives that are compared, s, in which there are as many whole steps of PULSE_S of the pulses as fit.  curves :
     false leaves out the comparison over numbers of points.  records : false leaves out the published records.
-    Raises InputError where `seconds` leaves no room for a pulse.
+    Raises InputError where `seconds` leaves no room for a pulse, and for a drive of one sample.
     """
+    if samples == 1:
+        raise InputError("samples = 1: a drive has two at least; give more, or 0 to leave it out.")
     if curves and seconds < 2 * PULSE_S:
         raise InputError(
             f"seconds = {seconds}: the first pulse comes after a rest, {PULSE_S:g} s each; give at least "

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from pydantic import NonNegativeInt, PositiveInt
 
+from aesi.bench import AtLeastTwo
 from aesi.constants import MV_PER_V
 from aesi.errors import InputError
 from aesi.numerics.metrics import rms
@@ -33,7 +34,7 @@ discharges the cell."""
 
 
 def run(
-    samples: PositiveInt = 88_200,
+    samples: AtLeastTwo = 88_200,
     repeats: PositiveInt = 5,
     cell: str | Path = DEFAULT_CELL,
     seed: NonNegativeInt = 0,
