@@ -1,6 +1,7 @@
 """The documentation as a site: it builds without a warning, and its generated parts follow the code."""
 
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -261,6 +262,42 @@ def test_the_newest_of_labelled_runs_comes_first_and_all_of_them_stand_side_by_s
     # 23 of 38 are 60.53 %, which a line holds as 60.5 and which stood here as 60 % beside the 61 % of the prose.
     assert "| effects named exactly | 23 of 38: 61 % [43, 76] | – |" in every
     assert "| largest relative error of a parameter, median | 0.82 % | – |" in every
+
+
+SCRIPTS = ("record", "picture", "finding", "ship", "notebooks", "constant")
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_a_script_that_was_asked_for_help_worked_instead(name, tmp_path):
+    """That of the benchmarks added an empty entry to the history."""
+    before = (ROOT / "docs" / "benchmarks.json").read_bytes()
+    command = [sys.executable, str(ROOT / "docs" / "hooks" / f"{name}.py"), "--help"]
+    done = subprocess.run(
+        command, cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert "usage:" in done.stdout.lower()
+    assert (ROOT / "docs" / "benchmarks.json").read_bytes() == before
+
+
+@pytest.mark.parametrize(("name", "arguments"), [("record", ["--lines", "none.jsonl"]), ("ship", [])])
+def test_a_script_without_anything_to_keep_leaves_what_is_there(name, arguments, tmp_path, monkeypatch):
+    """Without an experiment the records of the package were removed, and none came in their place."""
+    from aesi.data.laboratory import cache
+
+    (tmp_path / "none.jsonl").write_text("Reading ...\n")
+    kept = tmp_path / "kept"
+    kept.mkdir()
+    (kept / "benchmarks.json").write_text('{"entries": []}\n')
+    script = hook(name)
+    monkeypatch.setattr(cache, "SHIPPED", kept)
+    monkeypatch.setattr(script, "TARGET", kept / "benchmarks.json", raising=False)
+    monkeypatch.setattr(sys, "argv", [name, *arguments])
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as ended:
+        script.main(*([arguments] if name == "record" else []))
+    assert ended.value.code == 2
+    assert (kept / "benchmarks.json").read_text() == '{"entries": []}\n'
 
 
 def test_arguments_of_a_docstring_become_a_list():
