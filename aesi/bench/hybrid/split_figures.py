@@ -167,7 +167,7 @@ def _over_seeds(rows: Sequence[CaseRow]) -> dict[str, Any]:
     """
     good = [row for row in rows if "error" not in row]
     first, share = good[0], len(good) / len(rows)
-    validation_pct = [row["validation_mser_pct"].get(BEST) for row in good]
+    validation_pct = [row["validation_mser_pct"][BEST] for row in good]
     return {
         "split": first["split"],
         "seeds": len(rows),
