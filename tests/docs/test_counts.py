@@ -6,14 +6,17 @@ from statistics import median
 
 import pytest
 
+from aesi.bench.detectable import SEEN_NATS
 from aesi.bench.real.plan import WARM
 from aesi.bench.real.report import FIGURES
 from aesi.bench.real.summary import NEAR_SHARE
+from aesi.tracer.decide.model_to_write import AS_GOOD
 from flows.benchmarks.history import read_history
 
 ROOT = Path(__file__).resolve().parents[2]
 MEASURED, LEFT_OUT = "docs/benchmarks/measured-cells.md", "docs/benchmarks/left-out-records.md"
 FIRST = ("README.md", "docs/index.md", "docs/limits.md")
+STATES = ("declared, mV", "recalibrated, mV", "as written, mV")
 FAULTS = (["current", "offset"], ["current", "gain"], ["voltage", "offset"], ["voltage", "lag"])
 BENCHMARKS = "".join(
     page.read_text(encoding="utf-8") for page in sorted((ROOT / "docs" / "benchmarks").glob("*.md"))
@@ -39,9 +42,7 @@ def withheld():
 
 
 def errors(rows):
-    return [
-        [float(row[name]) for row in rows] for name in ("declared, mV", "recalibrated, mV", "as written, mV")
-    ]
+    return [[float(row[name]) for row in rows] for name in STATES]
 
 
 @pytest.mark.parametrize("page", [*FIRST, MEASURED])
@@ -144,6 +145,140 @@ def test_how_often_an_artificial_sensor_fault_is_named():
     assert told in text_of("docs/index.md")
 
 
+def table_below(page, head):
+    """Rows, by column, of the table of a page that begins with `head`."""
+    (table,) = [
+        part for part in (ROOT / page).read_text(encoding="utf-8").split("\n\n") if part.startswith(head)
+    ]
+    names, _, *rows = [[cell.strip() for cell in line[1:-1].split("|")] for line in table.splitlines()]
+    return [dict(zip(names, row, strict=True)) for row in rows]
+
+
+def rows_below(page, head):
+    """The same, the cells of each row by its first."""
+    return {first: rest for first, *rest in (row.values() for row in table_below(page, head))}
+
+
+def test_the_counts_on_measured_cells_are_those_of_their_tables():
+    told = rows_below(MEASURED, "| what was asked |")
+    here, archive = cases("aesi bench real"), cases("aesi bench real, archive")
+
+    def count(rows, *kinds, beside=False, seen=False):
+        ours = [
+            row["right"] == "yes"
+            for row in rows
+            if row["case"].startswith(kinds)
+            and "warming" not in row["case"]
+            and bool(row["declared, mV"]) != beside
+            and (not seen or (row["nats"] and float(row["nats"]) > SEEN_NATS))
+        ]
+        return f"{sum(ours)} of {len(ours)}"
+
+    faults = tuple(" ".join(words) for words in FAULTS)
+    withheld, contact = "temperature withheld", "contact resistance"
+    assert told["a withheld temperature is named"][0].startswith(count(here, withheld))
+    assert told["a withheld temperature is named"][0].endswith(count(archive, withheld))
+    named = told["a fault of a sensor is named"]
+    assert named[:2] == [count(here, *faults), count(here, *faults, beside=True)]
+    detectable = told["a fault of a sensor that the data can tell is named"]
+    assert detectable[:2] == [
+        count(here, *faults, seen=True),
+        count(here, *faults, beside=True, seen=True),
+    ]
+    resistance = told["a contact resistance is named"]
+    for cell, beside in zip(resistance, (False, True), strict=False):
+        assert cell.startswith(count(here, contact, beside=beside))
+        assert cell.endswith(count(here, contact, beside=beside, seen=True))
+    silent = told["nothing is wrong, and nothing is named"]
+    assert silent[0].startswith(count(here, "control"))
+    assert silent[0].endswith(count(archive, "control"))
+    assert silent[1] == count(here, "control", beside=True)
+    assert told["ageing is named correctly"][0] == count(here, "ageing")
+    alone = [[float(row[key]) for key in STATES] for row in here if row["declared, mV"]]
+    worse = sum(after > 1.05 * declared for declared, _, after in alone)
+    than_better = sum(after > 1.05 * min(declared, refitted) for declared, refitted, after in alone)
+    assert told["the written model is more than 5 % worse than the declared one on the last part"][0] == (
+        f"{worse} of {len(alone)}"
+    )
+    both = told["the same, than the better of the declared and the recalibrated one"][0]
+    assert both == f"{than_better} of {len(alone)}"
+    assert f"In {than_better} of {len(alone)} cases" in text_of("docs/benchmarks/index.md")
+
+
+def test_what_is_said_of_left_out_records_is_what_their_table_says():
+    rows = cases("aesi bench left_out")
+    times = {
+        (row["cell"], row["left-out record"]): float(row["as written / better"].strip("*")) for row in rows
+    }
+    holds = [each <= AS_GOOD for each in times.values()]
+    *others, worst = sorted(each for each in times.values() if each > AS_GOOD)
+    better = [each for each in times.values() if each <= 0.98]
+    said = text_of(LEFT_OUT)
+    assert f"On {sum(holds)} of {len(holds)} records" in said
+    assert f"On {len(others)} others it is {others[0]:.2f} to {others[-1]:.2f} times as far off" in said
+    assert re.search(rf"on the .* {worst:.1f} times\. On", said)
+    assert (
+        f"On {len(better)} records it is {100 * (1 - max(better)):.0f} to {100 * (1 - min(better)):.0f} % better"
+        in said
+    )
+    by_cell = [cell for cell, _ in times]
+    told = list(rows_below(LEFT_OUT, "| cell | holds on |").values())
+    counted = [
+        f"{sum(t <= AS_GOOD for (c, _), t in times.items() if c == cell)} of {by_cell.count(cell)}"
+        for cell in (
+            "about_energy_nmc",
+            "lg_m50t_w8",
+            "lg_18650hg2",
+            "panasonic_ncr18650pf",
+            "about_energy_lfp",
+        )
+    ]
+    assert [cell for (cell,) in told] == counted
+
+
+def test_what_is_said_of_splits_is_what_their_table_says():
+    page = (ROOT / "docs" / "benchmarks" / "splits.md").read_text(encoding="utf-8")
+    table = page.split("<!-- table of aesi bench splits -->\n")[1].split("\n\n")[0].splitlines()
+    head, _, *rows = [[cell.strip() for cell in line[1:-1].split("|")] for line in table]
+    rows = [dict(zip(head, row, strict=True)) for row in rows]
+    home = [row for row in rows if row["validation minus test, points"]]
+    abroad = [row for row in rows if not row["validation minus test, points"]]
+
+    def pairs(of, column):
+        return [[float(value) for value in row[column].split(" / ")] for row in of]
+
+    gains = pairs(home, "AESI I against recalibrated, %")
+    away = [abs(mean) for mean, _ in pairs(abroad, "AESI I against recalibrated, %")]
+    said, first = text_of("docs/benchmarks/splits.md"), text_of("docs/benchmarks/index.md")
+    assert f"it takes {min(gains)[0]:.1f} to {max(gains)[0]:.1f} % of the squared error off" in said
+    assert f"On the worst split it adds {-min(worst for _, worst in gains):.1f} %" in said
+    assert f"({min(away):.1f} to {max(away):.1f} %)" in said
+    assert f"{min(away):.1f} to {max(away):.1f} % of what recalibration leaves" in first
+    for row, ours, alone in zip(home, pairs(home, "AESI I, %"), pairs(home, "recalibrated, %"), strict=True):
+        name = row["cell"].split(",")[0].split()[-1].replace("pouch", "pouch cell").replace("18650", "LFP")
+        assert re.search(rf"{name} {ours[0]:.1f} (% )?\({alone[0]:.1f}\b", first), row["cell"]
+    covered = pairs(home, "coverage of AESI I, %")
+    assert f"{min(covered)[0]:.1f} to {max(covered)[0]:.1f} % of all rows" in first
+    assert f"{min(worst for _, worst in covered):.1f} % of the worst drive" in first
+
+
+def test_the_right_answers_of_some_seeds_counted_look_alikes_beside_seeds_that_did_not():
+    page = "docs/benchmarks/virtual-cells.md"
+    rows = [
+        *table_below(page, "| cases | exactly right |"),
+        *(row for row in table_below(page, "| seed | cases |") if row["exactly right"]),
+    ]
+    assert len(rows) == 4 + 5
+    columns = ("with effects, exact", "nothing missing, named", "strangers `unknown`")
+    for row in rows:
+        (exact, effects), (named, nothing), (silent, strangers) = (
+            map(int, re.match(r"(\d+) of (\d+)", row[column]).groups()) for column in columns
+        )
+        cases_met = int(re.findall(r"\d+", row["cases"])[-1])
+        assert effects + nothing + strangers == cases_met, row
+        assert exact + (nothing - named) + silent == int(re.match(r"\d+", row["exactly right"])[0]), row
+
+
 ASKED = {
     "a withheld temperature is named": "withheld_named_pct",
     "and within 2 K of the thermocouple's mean": "withheld_within_2k_pct",
@@ -157,13 +292,11 @@ ASKED = {
 
 
 def test_what_is_asked_for_on_measured_cells_stood_in_the_report_alone():
-    lines = (ROOT / MEASURED).read_text(encoding="utf-8").split("\n\n")
-    (table,) = [part for part in lines if part.startswith("| what was asked |")]
-    rows = [[cell.strip() for cell in line[1:-1].split("|")] for line in table.splitlines()[2:]]
-    aims = {key: FIGURES[key][1] for key in ASKED.values()}
+    told = rows_below(MEASURED, "| what was asked |")
     words = {"0": "none", "100": "all"}
-    assert {row[0]: row[-1] for row in rows if row[-1]} == {
-        name: words.get(aims[key], aims[key].replace(" or more", " % or more")) for name, key in ASKED.items()
+    aims = {name: FIGURES[key][1] for name, key in ASKED.items()}
+    assert {name: row[-1] for name, row in told.items() if row[-1]} == {
+        name: words.get(aim, aim.replace(" or more", " % or more")) for name, aim in aims.items()
     }
 
 
