@@ -1,10 +1,14 @@
-"""Registry of the benchmarks that compare this package with other programs or with measurements.
+"""Registry of the benchmarks that compare this package with other programs or with what a virtual cell is known to be.
 
 Each benchmark is a module with a generator `run`, whose rows `aesi bench NAME --json` prints, one JSON object per line.
+Those whose cases are tracked, spread over processes or written into a page of the docs have their `run` in
+`flows.benchmarks`.
 """
 
 from collections.abc import Collection, Iterable, Sequence
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
+
+from pydantic import Field
 
 from aesi.errors import InputError, did_you_mean
 
@@ -21,11 +25,14 @@ BENCHMARKS = {
     "spci": "aesi.bench.intervals.spci",
     "bands": "aesi.bench.intervals.bands",
     "drift": "aesi.bench.intervals.drift",
-    "cells": "aesi.bench.physics.cells",
 }
 """Name of a benchmark -> module with a generator `run(**options)` of rows (`CaseRow`)."""
 
 Chosen = TypeVar("Chosen")
+AtLeastOne = Annotated[Sequence[Chosen], Field(min_length=1)]
+"""Values of a benchmark's option, of which none would leave nothing to print."""
+AtLeastTwo = Annotated[int, Field(ge=2)]
+"""Value of a benchmark's option of which one is too few to compute anything."""
 
 
 def some_chosen(name: str, cases: Sequence[Chosen], names: Iterable[str]) -> Sequence[Chosen]:

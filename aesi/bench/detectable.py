@@ -56,8 +56,8 @@ def seen_on_measured(
     data: Measurement,
     soc0: float | None,
     answers: Sequence[str],
-    good: Sequence[Measurement] = (),
-    holdout: float = 0.3,
+    good: Sequence[Measurement],
+    holdout: float,
 ) -> float | None:
     """Detectability of the answer on a measured record, nats: the log likelihood of held-out data under the best of the
     right answers minus that under the declared model, with the model error of measured cells.

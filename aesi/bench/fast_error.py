@@ -23,18 +23,18 @@ from typing import Any
 import numpy as np
 
 from aesi.bench.real.case import RealCase
-from aesi.bench.real.judge import HELD_OUT, declared_cell, record
+from aesi.bench.real.judge import declared_cell, taken
 from aesi.bench.real.plan import chosen
-from aesi.bench.real.repeatability import ratio
+from aesi.bench.real.repeatability import sizes_in_sds
 from aesi.constants import MV_PER_V
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
+from aesi.pipeline.discovery.discover import HOLDOUT
 from aesi.tracer.case.blocks import blocks_of
 from aesi.tracer.case.problem import OHMIC_SHARE
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.growth import Parent
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.growths import grow_all, growths_on
 from aesi.tracer.search.hypothesis_fits import base_of
 
 RIGHT_TEMPERATURE = ("25degC", "drive_cycle")
@@ -45,7 +45,7 @@ THERE = "clock_skew"
 """Effect that is really present in some records: the voltage channel of one cycler lags by 0.12 s on three of them."""
 
 
-def records() -> Iterator[RealCase]:
+def fast_controls() -> Iterator[RealCase]:
     """The development controls at the temperature of their cell file whose current changes."""
     for case in chosen(only="control-", development=True):
         if case.good or any(word in case.take.file for word in CONSTANT):
@@ -63,7 +63,7 @@ def fast_error(case: RealCase, cells: str = "experiments/cells") -> dict[str, An
     each effect over its standard deviation.  `failed` stands in their place if the model cannot be fitted.
     Raises DataError if the record or the cell file is not available.
     """
-    problem = inverse_problem(declared_cell(case.cell, cells), [record(case.take)], case.soc0, HELD_OUT)
+    problem = inverse_problem(declared_cell(case.cell, cells), [taken(case.take)], case.soc0, HOLDOUT)
     problem = replace(problem, trust="measured")
     blocks, archive = blocks_of(problem), Archive(None, "")
     base, windows = base_of(problem, blocks, archive), blocks.windows
@@ -73,13 +73,12 @@ def fast_error(case: RealCase, cells: str = "experiments/cells") -> dict[str, An
         column - windows.means(column[:, None])[:, 0]
         for column in (base.point.residual_v, base.point.fast_errors_v[:, 0])
     )
-    grown = grow_all(growths_on([Parent(problem, blocks, base)], {}, archive), archive)
     return {
         "case": case.name,
         "rms_mv": MV_PER_V * float(np.sqrt(np.average(left**2, weights=windows.row_duration_s))),
         "lasts_s": lasts_s(problem.time_s, left),
         "resistance_off": OHMIC_SHARE * float(left @ contact) / float(contact @ contact),
-        "sds": {name: round(sds, 2) for name, sds in (ratio(one) for one in grown if one is not None)},
+        "sds": sizes_in_sds(Parent(problem, blocks, base), archive),
     }
 
 
@@ -99,7 +98,7 @@ def lasts_s(time_s: Array, error: Array) -> float:
 def main() -> None:
     """Print one line per record and the summary."""
     rows = []
-    for case in records():
+    for case in fast_controls():
         rows.append(fast_error(case))
         print(json.dumps(rows[-1]), flush=True)
     print(json.dumps(_summary([row for row in rows if "sds" in row])))

@@ -29,6 +29,8 @@ from aesi.tracer.decide.model_to_write import AS_GOOD
 
 LIMIT_S = 900.0
 """Limit of the processor time of one case, s. A convention; the slowest case took 390 s."""
+ROWS = 20_000
+"""Most rows of a record that are used; a longer one is averaged. A convention that limits the processor time."""
 
 
 @dataclass(frozen=True)
@@ -140,9 +142,9 @@ def _asked(case: LeftOutCase) -> CaseRow:
 
 def _records(one: MeasuredSet) -> Iterator[tuple[str, Measurement]]:
     for name in one.slow:
-        yield name, read_measurement(locate(one.data, name), max_rows=20_000)
+        yield name, read_measurement(locate(one.data, name), max_rows=ROWS)
     for name in one.drives:
-        yield name, read_measurement(locate(one.data, name), max_rows=20_000, stop_s=SECONDS_PER_HOUR)
+        yield name, read_measurement(locate(one.data, name), max_rows=ROWS, stop_s=SECONDS_PER_HOUR)
 
 
 def summary(rows: Sequence[CaseRow]) -> dict[str, Any]:

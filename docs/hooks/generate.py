@@ -6,6 +6,7 @@ import re
 import sys
 import textwrap
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from runpy import run_path
 from typing import Any
@@ -90,11 +91,14 @@ def over_time() -> str:
     return str(_hook("recorded")["over_time"](_history()))
 
 
-def speed() -> str:
-    """How fast it is beside its peers, and how close to a fine mesh, from the newest recorded lines."""
+def beside_peers(subject: str) -> str:
+    """How fast a part of the package is beside its peers, or what a run costs, from the newest recorded lines.
+
+    subject : name of a function in `parts/speed.py`.
+    """
     from flows.benchmarks.history import latest
 
-    return str(_hook("speed")["speed"]([line for _, line in latest(_history()).values()]))
+    return str(_hook("speed")[subject]([line for _, line in latest(_history()).values()]))
 
 
 def dfn_curve() -> str:
@@ -172,7 +176,10 @@ def _from_root(name: str) -> str:
 GENERATORS: dict[str, Callable[[], str]] = {
     "catalogue": catalogue,
     "over time": over_time,
-    "speed": speed,
+    "speed of the physics": partial(beside_peers, "physics"),
+    "speed of the intervals": partial(beside_peers, "intervals"),
+    "speed of the search": partial(beside_peers, "search"),
+    "costs of a run": partial(beside_peers, "costs"),
     "dfn curve": dfn_curve,
     "bands in short": bands,
     "experiment": experiment,

@@ -8,8 +8,8 @@ draw.
 
 from __future__ import annotations
 
+import argparse
 import os
-import sys
 import tempfile
 from pathlib import Path
 
@@ -50,6 +50,10 @@ def _kept(output: nbformat.NotebookNode, home: str) -> nbformat.NotebookNode:
 
 
 if __name__ == "__main__":
-    for name in sys.argv[1:] or sorted(str(p) for p in (ROOT / "notebooks").glob("*.ipynb")):
-        execute(Path(name).resolve())
-        print(name)
+    parser = argparse.ArgumentParser(description="Execute notebooks in place.")
+    parser.add_argument(
+        "notebooks", nargs="*", type=Path, metavar="NOTEBOOK.ipynb", help="all without a name"
+    )
+    for path in parser.parse_args().notebooks or sorted((ROOT / "notebooks").glob("*.ipynb")):
+        execute(path.resolve())
+        print(path)

@@ -6,10 +6,10 @@ from the arrays that the report carries, so the picture shows what the run showe
 
 from __future__ import annotations
 
+import argparse
 import base64
 import json
 import re
-import sys
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -155,4 +155,7 @@ def _axes(end: float, limit: float, step: float, unit: str) -> str:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    parser = argparse.ArgumentParser(description="Draw the errors of a report.")
+    parser.add_argument("report")
+    parser.add_argument("out")
+    main(**vars(parser.parse_args()))

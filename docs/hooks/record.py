@@ -4,11 +4,13 @@
     python docs/hooks/record.py --lines FILE [FILE ...]    take what `aesi bench --json` has printed to files
     python docs/hooks/record.py --label TEXT ...           head the column of blind or measured cases with it
 
-Says what got worse since it was last recorded, and then exits with 1; the entry is added all the same.
+Says what got worse since it was last recorded, and then exits with 1; the entry is added all the same. Without a line
+there is no entry.
 """
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import platform
@@ -26,15 +28,24 @@ TARGET = ROOT / "docs" / "benchmarks.json"
 
 def main(arguments: list[str]) -> int:
     """Add an entry; the number of regressions."""
+    parser = argparse.ArgumentParser(description="Add benchmarks to the history in docs/benchmarks.json.")
+    parser.add_argument("names", nargs="*", metavar="NAME", help="benchmark to run; all without a name")
+    parser.add_argument(
+        "--lines", nargs="+", type=Path, metavar="FILE", help="what runs printed, in their place"
+    )
+    parser.add_argument("--label", help="head of the column of blind or measured cases")
+    asked = parser.parse_args(arguments)
+    if asked.lines and asked.names:
+        parser.error("give names to run, or --lines of what was run.")
     load: float | None = None
-    label = arguments[1] if arguments[:1] == ["--label"] else ""
-    arguments = arguments[2:] if label else arguments
-    if arguments[:1] == ["--lines"]:
-        lines = [line for path in arguments[1:] for line in parsed(Path(path).read_text(encoding="utf-8"))]
+    if asked.lines:
+        lines = [line for path in asked.lines for line in parsed(path.read_text(encoding="utf-8"))]
     else:
         load = round(os.getloadavg()[0], 2)
-        lines = [line for name in arguments or [""] for line in run(name)]
-    kept = [line | {"label": label} if label else line for line in worth_keeping(lines)]
+        lines = [line for name in asked.names or [""] for line in run(name)]
+    kept = tuple(line | {"label": asked.label} if asked.label else line for line in worth_keeping(lines))
+    if not kept:
+        parser.error("there is no line of a benchmark to add.")
     entries = read_history(TARGET)
     worse = regressions(entries, kept)
     entry = Entry(datetime.now(UTC).date().isoformat(), commit(), machine(), load, kept)

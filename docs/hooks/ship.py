@@ -7,17 +7,21 @@ old ones are not wrong, only never met.
 
 from __future__ import annotations
 
+import argparse
 import os
 import shutil
-import sys
 import tempfile
-from collections.abc import Sequence
 from pathlib import Path
 
 
-def main(experiments: Sequence[str]) -> None:
-    """Simulate the records of all these in an empty cache and move them beside the laboratory, in place of those
+def main() -> None:
+    """Simulate the records of the experiments in an empty cache and move them beside the laboratory, in place of those
     that are there."""
+    parser = argparse.ArgumentParser(
+        description="Put virtual records into the package, in place of those there."
+    )
+    parser.add_argument("experiments", nargs="+", metavar="EXPERIMENT")
+    experiments = parser.parse_args().experiments
     with tempfile.TemporaryDirectory() as folder:
         os.environ["AESI_CACHE"] = folder
         from aesi.data.laboratory import cache
@@ -35,4 +39,4 @@ def main(experiments: Sequence[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

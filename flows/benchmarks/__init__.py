@@ -1,4 +1,4 @@
-"""Every benchmark by name: those of the package, and those that need the tracker or the scheduler.
+"""Every benchmark by name: those of the package, and those that need the tracker, the scheduler or a page of the docs.
 
 Each module has `run(**options)`, which yields one JSON-ready dict a line.
 """
@@ -14,7 +14,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from aesi.bench import BENCHMARKS as OF_THE_PACKAGE
 from aesi.errors import InputError, wanted
 from aesi.numerics.files.whole import check_writable
-from flows.benchmarks.page import check_page
+from flows.benchmarks.page import check_marks
 
 BENCHMARKS = OF_THE_PACKAGE | {
     "blind": "flows.benchmarks.blind",
@@ -47,10 +47,10 @@ AS_WRITTEN = ConfigDict(coerce_numbers_to_str=True)
 
 
 def run(name: str, **options: Any) -> Iterator[dict[str, Any]]:
-    """Lines of one benchmark, as they come.
+    """Lines of one benchmark, as they come; nothing is run before the first is asked for.
 
-    Raises InputError for an option that it does not have, a value that the option cannot have, and a place that cannot
-    be written to.
+    Raises InputError at once, so that of several benchmarks none has run in vain, for an option that this one does not
+    have, a value that the option cannot have, and a place that cannot be written to.
     """
     module = import_module(BENCHMARKS[name])
     known = get_type_hints(module.run, include_extras=True)
@@ -66,8 +66,8 @@ def run(name: str, **options: Any) -> Iterator[dict[str, Any]]:
     _check_places({option: str(options[option]) for option in PLACES if options.get(option) is not None})
     if options.get("write") is not None:
         marks = module.ARCHIVE_MARKS if options.get("archive") else (module.BEGIN, module.END)
-        check_page(str(options["write"]), *marks)
-    yield from module.run(**options)
+        check_marks(str(options["write"]), *marks)
+    return iter(module.run(**options))
 
 
 def _check_places(places: dict[str, str]) -> None:

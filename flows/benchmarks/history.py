@@ -133,7 +133,7 @@ def case_fields(line: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(name for name in _watch(line).case if name in line)
 
 
-def figures(line: Mapping[str, Any]) -> dict[str, float]:
+def watched_figures(line: Mapping[str, Any]) -> dict[str, float]:
     """The watched figures of a line."""
     watch = _watch(line)
     names = (*watch.higher, *watch.lower)
@@ -158,14 +158,14 @@ def not_compared(entries: Sequence[Entry], lines: Iterable[Line]) -> list[str]:
     compared: dict[str, bool] = {}
     for line in lines:
         _, before = known.get(case_of(line), (None, {"bench": line["bench"]}))
-        met = bool(figures(before).keys() & figures(line).keys())
+        met = bool(watched_figures(before).keys() & watched_figures(line).keys())
         compared[line["bench"]] = compared.get(line["bench"], False) or met
     return [bench for bench, met in compared.items() if not met]
 
 
 def _worse(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
     watch = _watch(now)
-    old, new = figures(before), figures(now)
+    old, new = watched_figures(before), watched_figures(now)
     found = []
     for name in [each for each in old if each in new]:
         room = watch.higher.get(name, watch.lower.get(name, 0.0)) * abs(old[name])

@@ -8,7 +8,7 @@ from pathlib import Path
 from aesi.errors import InputError
 
 
-def check_page(page: str, begin: str, end: str) -> None:
+def check_marks(page: str, begin: str, end: str) -> None:
     """Raises InputError where `write_between` has no page with both marks to write to."""
     try:
         text = Path(page).read_text(encoding="utf-8")
@@ -17,7 +17,8 @@ def check_page(page: str, begin: str, end: str) -> None:
             f"--set write={page}: no page that can be read ({getattr(error, 'strerror', None) or 'it is no text'}); "
             "name one that is there."
         ) from None
-    if not 0 <= text.find(begin) < text.find(end):
+    _, found, below = text.partition(begin)
+    if not found or end not in below:
         raise InputError(
             f"--set write={page}: the page has no lines {begin} and, below it, {end}, between which the table is "
             "written; add them."
@@ -27,7 +28,7 @@ def check_page(page: str, begin: str, end: str) -> None:
 def write_between(page: str, begin: str, end: str, lines: Sequence[str]) -> None:
     """Put lines of Markdown between the marks `begin` and `end` of a page, in the place of what stood there."""
     path = Path(page)
-    text = path.read_text(encoding="utf-8")
-    before, after = text.split(begin)[0], text.split(end)[1]
+    before, _, below = path.read_text(encoding="utf-8").partition(begin)
+    after = below.partition(end)[2]
     body = "\n".join(lines)
     path.write_text(f"{before}{begin}\n{body}\n{end}{after}", encoding="utf-8")

@@ -54,7 +54,6 @@ def run(
     one_s, one_cpu = _measured(config, genomes, 1)
     several_s, several_cpu = _measured(config, genomes, workers)
     yield {
-        "bench": "scale",
         "runner": "dask",
         "rows": len(problem.target),
         "terms": len(problem.library),

@@ -20,6 +20,8 @@ import optuna
 from optuna.storages import BaseStorage, InMemoryStorage
 from pydantic import NonNegativeInt, PositiveInt
 
+from aesi.bench import AtLeastTwo
+from aesi.constants import MILLI
 from aesi.sparse import Candidate, Genome, Problem
 from aesi.sparse.search.genome_space import GenomeSpace
 from flows.search.nsga2 import SearchSettings, search
@@ -32,7 +34,7 @@ SHARED = "SQLite"
 def run(
     terms: PositiveInt = 626,
     candidates: PositiveInt = 60,
-    population: PositiveInt = 20,
+    population: AtLeastTwo = 20,
     seed: NonNegativeInt = 0,
 ) -> Iterator[dict[str, Any]]:
     """One line a storage."""
@@ -45,7 +47,6 @@ def run(
             peer = _peer(terms, number, population, seed, peer_in)
             stored = {"ours_stored": _stored(ours_in), "peer_stored": _stored(peer_in)}
         yield {
-            "bench": "search",
             "storage": storage,
             "terms": terms,
             "candidates": number,
@@ -76,7 +77,7 @@ def _ours(terms: int, candidates: int, population: int, seed: int, storage: str 
     started = time.process_time()
     settings = SearchSettings(population, space=GenomeSpace(terms))
     search(problem, candidates, seed, settings, storage=storage, evaluate_many=evaluate_many)
-    return 1e3 * (time.process_time() - started) / candidates
+    return MILLI * (time.process_time() - started) / candidates
 
 
 def _free_of_charge(genome: Genome, rng: np.random.Generator) -> Candidate:
@@ -110,4 +111,4 @@ def _peer(terms: int, candidates: int, population: int, seed: int, storage: str 
     started = time.process_time()
     study = optuna.create_study(storage=storage, directions=["minimize"] * 3, sampler=sampler)
     study.optimize(losses, n_trials=candidates)
-    return 1e3 * (time.process_time() - started) / candidates
+    return MILLI * (time.process_time() - started) / candidates

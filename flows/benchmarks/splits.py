@@ -17,10 +17,10 @@ from typing import Any
 from pydantic import PositiveFloat, PositiveInt
 
 from aesi.bench import CaseRow
-from aesi.bench.hybrid.split_figures import summary, table
+from aesi.bench.hybrid.split_figures import IN_TABLE, summary, table
 from aesi.bench.hybrid.splits import EXPERIMENTS, SplitCase, chosen_splits, judged
 from aesi.bench.limit import LOST, NO_TIME, NOT_RUN, Stopwatch
-from aesi.errors import AesiError, DataError, FitError
+from aesi.errors import AesiError, DataError, FitError, InputError
 from aesi.pipeline.experiment.config import ExperimentConfig, overridden_key, read_experiment
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.load import Loaded
@@ -102,6 +102,7 @@ def run(
     the table.  keep : a folder for what each split gave; one that is in it is not run again by the same program, as it
     was asked, so that an interrupted run goes on, and the table is of all that the program has kept there with these
     settings, of whatever cells and seeds.
+    Raises InputError for a table without one of the models that its columns are of.
     """
     asked = {"a_cell": a_cell, "seeds": seeds, "candidates": candidates, "resamples": resamples, "dt_s": dt_s}
     standing = {"seeds": 3} if whole else QUICK
@@ -116,6 +117,12 @@ def run(
         for split in chosen_splits(cells, settings.get("a_cell"), only, development)
         for seed in range(int(settings["seeds"]))
     ]
+    if write is not None:
+        lacking = [name for name in IN_TABLE if name not in runs[0].config.models]
+        if lacking:
+            raise InputError(
+                f"--set write={write}: its table has columns of {', '.join(lacking)}, not run here; add them to models."
+            )
     rows = []
     judge = partial(judged_once, judge=_row, keep=keep, files=_files)
     for row in tracked(Cases("splits", 0, runs, judge, summary, _lost, SHOWN), workers, address):

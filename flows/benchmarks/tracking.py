@@ -21,11 +21,11 @@ from typing import Any
 import numpy as np
 from pydantic import NonNegativeInt, PositiveFloat, PositiveInt
 
-from aesi.bench.hybrid.ensemble import synthetic_record
+from aesi.bench.hybrid.ensemble import SYNTHETIC_INPUTS, lowest_terms, synthetic_record
 from aesi.pipeline.experiment.sections import TrackingConfig
 from aesi.pipeline.written import COEFFICIENTS
-from aesi.records import INPUT_NAMES, Split
-from aesi.sparse import Genome, Library, Options, Problem, evaluate
+from aesi.records import Split
+from aesi.sparse import Genome, Options, Problem, evaluate
 from aesi.sparse.terms.inputs import with_inputs
 from flows.base import environment
 
@@ -60,7 +60,6 @@ def run(
             tracked.append(_round(problem, genomes, tracker, artifact, f"{number}"))
     without, with_ = median(cpu for cpu, _ in untracked), median(cpu for cpu, _ in tracked)
     yield {
-        "bench": "tracking",
         "store": "SQLite",
         "rows": n,
         "terms": terms,
@@ -103,11 +102,8 @@ def _round(
 
 
 def _problem(terms: int, n: int, resamples: int, seed: int) -> Problem:
-    names = (*INPUT_NAMES, "soc")
-    every = Library.build(names)
-    library = every.take(np.argsort(every.degrees, kind="stable")[:terms])
-    record = with_inputs(synthetic_record(n + 1, seed), names)
-    return Problem.build(Split((record,), (), ()), Options(resamples=resamples), library)
+    record = with_inputs(synthetic_record(n + 1, seed), SYNTHETIC_INPUTS)
+    return Problem.build(Split((record,), (), ()), Options(resamples=resamples), lowest_terms(terms))
 
 
 def _artifact(kilobytes: float, seed: int) -> dict[str, float]:

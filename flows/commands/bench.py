@@ -45,9 +45,10 @@ def bench(
     chosen = _chosen(name)
     keywords = dict(_pair(option) for option in given or [])
     history = _recorded(compare, keywords) if compare else []
+    runs = [(each, run(each, **keywords)) for each in chosen]
     lines = []
-    for each in chosen:
-        for line in run(each, **keywords):
+    for each, found in runs:
+        for line in found:
             lines.append({"bench": each, **line})
             typer.echo(json.dumps(lines[-1]) if as_json else _plain(each, line))
     apart = not_compared(history, lines) if compare else []

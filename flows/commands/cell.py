@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
+from aesi.constants import MILLI
 from aesi.errors import InputError
 from aesi.pipeline.written import calibration_files, discovery_files
 from flows.commands import options, outputs, record_options
@@ -282,7 +283,7 @@ def impedance(
         options.state_of_health(soh),
         record_options.say_notes,
     )
-    size = 1e3 * abs(z)
+    size = MILLI * abs(z)
     typer.echo(f"{out}: {len(z):,} frequencies, |Z| {size.min():.4g} to {size.max():.4g} mOhm", err=True)
 
 

@@ -1,6 +1,7 @@
 """Numbers that decide: each says what it is and on what it rests, by itself or together with its neighbours."""
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -60,7 +61,7 @@ def unexplained(source: str) -> Iterator[str]:
         commented = "#" in lines[node.end_lineno - 1] or lines[node.lineno - 2].startswith("#")
         shared = explained.get(place + 1, False)
         explained[place] = has_text or shared
-        named = all(each.strip("_ ") in texts for each in name.split(","))
+        named = all(re.search(rf"\b_?{each.strip('_ ')}\b", texts) for each in name.split(","))
         if not (explained[place] or commented or named):
             yield name
 
@@ -98,6 +99,7 @@ def test_a_silent_number_would_be_seen():
     assert sorted(unexplained(source)) == ["C", "F"]
     assert list(unexplained(source + '"""Ten times less than C."""\n')) == []
     assert list(unexplained("G, H = 1.0, 2.0\nI = 'text'\n")) == ["G, H"]
+    assert list(unexplained('"""What the LIMITS are."""\nJ = 1\n\nLIMIT = 2\n')) == ["LIMIT", "J"]
     assert list(unexplained('G, H = 1.0, 2.0\n"""What both are."""\n')) == []
 
 

@@ -19,6 +19,7 @@ BLOCK = re.compile(
     re.MULTILINE | re.DOTALL,
 )
 TESTED = ("python", "console")
+DIRECTIVES = {"slow", "skip", "file", "needs"}
 
 
 @dataclass(frozen=True)
@@ -51,5 +52,10 @@ def blocks(page: Path) -> list[Block]:
 
 
 def _directives(text: str) -> dict[str, str]:
+    """Name -> value.  Raises ValueError for a name that means nothing: a block would be run that should not be."""
     pairs = (item.partition("=") for item in text.split(";") if item.strip())
-    return {name.strip(): value.strip() for name, _, value in pairs}
+    found = {name.strip(): value.strip() for name, _, value in pairs}
+    unknown = found.keys() - DIRECTIVES
+    if unknown:
+        raise ValueError(f"<!-- test: {text} -->: there is no {', '.join(sorted(unknown))}.")
+    return found

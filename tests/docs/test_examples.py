@@ -41,6 +41,17 @@ def _load_blocks():
 blocks = _load_blocks()
 
 
+def test_a_directive_that_means_nothing_was_passed_over(tmp_path):
+    """A reason with a semicolon was cut there, and its rest taken for another directive."""
+    page = tmp_path / "page.md"
+    page.write_text("<!-- test: skip=hours; on two cores -->\n```console\n$ aesi\n```\n")
+    with pytest.raises(ValueError, match="there is no on two cores"):
+        blocks(page)
+    page.write_text("<!-- test: skip=hours, on two cores; slow -->\n```console\n$ aesi\n```\n")
+    (block,) = blocks(page)
+    assert block.directives == {"skip": "hours, on two cores", "slow": ""}
+
+
 @pytest.fixture
 def workspace(tmp_path, monkeypatch):
     """A folder that looks like a checkout to relative paths, with its own tracking store."""

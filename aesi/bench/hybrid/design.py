@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from pydantic import NonNegativeInt, PositiveInt
 
-from aesi.bench import check_listed
+from aesi.bench import AtLeastOne, check_listed
 from aesi.bench.virtual_drives import INPUTS, virtual_splits
 from aesi.errors import FitError
 from aesi.numerics.metrics import mser
@@ -63,7 +63,7 @@ def run(
     cell: str = "experiments/cells/nmc_30ah.bpx.json",
     cells: PositiveInt = 4,
     candidates: PositiveInt = 40,
-    settings: Sequence[str] = tuple(SETTINGS),
+    settings: AtLeastOne[str] = tuple(SETTINGS),
     seed: NonNegativeInt = 0,
     sindy: bool = True,
 ) -> Iterator[dict[str, Any]]:

@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 from pydantic import NonNegativeInt, PositiveInt
 
+from aesi.bench import AtLeastOne
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import InputError
 from aesi.numerics.typing import Array
@@ -37,6 +38,8 @@ from aesi.sparse.terms.inputs import low_pass, with_inputs
 
 CASES = ((60, 1e-3), (200, 1e-12), (626, 1e-3), (626, 1e-12))
 """(number of terms in the library, ridge lambda1) of each case."""
+SYNTHETIC_INPUTS = (*INPUT_NAMES, "soc")
+"""Inputs of the terms."""
 
 _DT_S = 0.1
 """Time step, s, that of the paper's records."""
@@ -45,7 +48,7 @@ _CAPACITY_AS = 30.0 * SECONDS_PER_HOUR
 
 
 def run(
-    cases: Sequence[tuple[int, float]] = CASES,
+    cases: AtLeastOne[tuple[int, float]] = CASES,
     n: PositiveInt = 88_200,
     candidates: PositiveInt = 20,
     resamples: PositiveInt = 100,
@@ -57,7 +60,7 @@ def run(
     cases : (terms, lambda1).  n : rows that are fitted.  candidates : number of candidates, which differ in their
     threshold.  resamples : bootstrap resamples of each.  peer_models : fits of PySINDy that are timed.  seed : of the
     record.  Coefficient errors are relative to the largest coefficient of a QR solution.
-    Raises InputError for more peer_models than resamples.
+    Raises InputError for more peer_models than resamples, and for a library of no terms or of more than there are.
     """
     if peer_models > resamples:
         raise InputError(
@@ -66,6 +69,8 @@ def run(
         )
     from threadpoolctl import threadpool_limits
 
+    for terms, _ in cases:
+        lowest_terms(terms)  # refused before anything is timed
     record = synthetic_record(n + 1, seed)
     with threadpool_limits(1):
         # A small case first, so that loading compiled code and warming up the solvers is not timed.
@@ -100,6 +105,14 @@ def synthetic_record(n: int, seed: int) -> ErrorSeries:
     )
 
 
+def lowest_terms(terms: int) -> Library:
+    """The library of that many terms of lowest degree over SYNTHETIC_INPUTS.  Raises InputError if there are fewer."""
+    every = Library.build(SYNTHETIC_INPUTS)
+    if not 1 <= terms <= len(every):
+        raise InputError(f"a library of {terms} terms: there are 1 to {len(every)} over these inputs.")
+    return every.take(np.argsort(every.degrees, kind="stable")[:terms])
+
+
 def _case(
     record: ErrorSeries, terms: int, lambda1: float, candidates: int, resamples: int, peer_models: int
 ) -> dict[str, Any]:
@@ -110,7 +123,6 @@ def _case(
     peer_s, peer_error, error = _peer(problem, genomes, peer_models)
     peer_total_s = peer_s * candidates * resamples
     return {
-        "bench": "ensemble",
         "terms": terms,
         "lambda1": lambda1,
         "rows": len(problem.target),
@@ -134,10 +146,8 @@ def _case(
 def _ours(
     record: ErrorSeries, terms: int, lambda1: float, candidates: int, resamples: int
 ) -> tuple[Problem, list[Genome], int]:
-    names = (*INPUT_NAMES, "soc")
-    every = Library.build(names)
-    library = every.take(np.argsort(every.degrees, kind="stable")[:terms])
-    split = Split((with_inputs(record, names),), (), ())
+    library = lowest_terms(terms)
+    split = Split((with_inputs(record, SYNTHETIC_INPUTS),), (), ())
     problem = Problem.build(split, Options(resamples=resamples), library)
     thresholds = np.geomspace(1e-2, 1.0, candidates)
     genomes = [Genome.whole(library, lambda1, float(t), 0.41) for t in thresholds]

@@ -17,6 +17,10 @@ from aesi.pipeline.experiment.physics_models import RECALIBRATED
 
 BEST = "AESI I"
 """The model whose figures the table shows."""
+SECOND = "AESI II"
+"""The model that has a column of its own in the table of each split."""
+IN_TABLE = (RECALIBRATED, BEST, SECOND)
+"""Models without which `table` cannot be made."""
 TITLES = {
     "nmc": "NMC pouch, parts of a drive",
     "lfp": "LFP 18650, parts of a drive",
@@ -132,6 +136,7 @@ def table(rows: Sequence[CaseRow]) -> list[str]:
     model are the reduction of the declared model's squared error by it, per cent. `validation minus test` is the
     absolute difference of these two reductions by AESI I, `median / worst`. `coverage` is over all rows, then that of
     the worst drive. Failed runs count as in `summary`, and are listed between the two tables.
+    rows : each with the figures of all of IN_TABLE, or with an `error`.
     """
     ran = [row for row in rows if row.get("verdict") != NOT_RUN]
     lines, each = list(HEAD), list(EACH)
@@ -162,7 +167,7 @@ def _over_seeds(rows: Sequence[CaseRow]) -> dict[str, Any]:
     """
     good = [row for row in rows if "error" not in row]
     first, share = good[0], len(good) / len(rows)
-    validation_pct = [row["validation_mser_pct"].get(BEST) for row in good]
+    validation_pct = [row["validation_mser_pct"][BEST] for row in good]
     return {
         "split": first["split"],
         "seeds": len(rows),
@@ -256,7 +261,7 @@ def _split_lines(split: Mapping[str, Any]) -> Iterator[str]:
 
 def _split_row(split: str, where: str, models: Mapping[str, Any], validation: str) -> str:
     best, physics = models[BEST], models[RECALIBRATED]
-    figures = (physics["mser_pct"], best["mser_pct"], models["AESI II"]["mser_pct"], best["against"])
+    figures = (physics["mser_pct"], best["mser_pct"], models[SECOND]["mser_pct"], best["against"])
     cells = (
         split,
         where,

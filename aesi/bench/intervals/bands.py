@@ -15,7 +15,7 @@ repeat, which lies between two training repeats; the bands of the layout `repeat
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from math import isfinite
 from time import process_time
@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 from pydantic import NonNegativeInt, PositiveInt
 
+from aesi.bench import AtLeastOne
 from aesi.bench.virtual_drives import SplitLayout, cuts_of, virtual_splits
 from aesi.conformal import WHOLE_DRIVE
 from aesi.conformal.scores import interval_score, worst_bin_coverage
@@ -118,7 +119,7 @@ DESIGNS: dict[str, Callable[[_Errors], HalfWidths]] = {
 def run(
     cell: str = "experiments/cells/nmc_30ah.bpx.json",
     cells: PositiveInt = 40,
-    layouts: Sequence[SplitLayout] = LAYOUTS,
+    layouts: AtLeastOne[SplitLayout] = LAYOUTS,
     seed: NonNegativeInt = 0,
 ) -> Iterator[dict[str, Any]]:
     """One row per layout, horizon and design.

@@ -101,10 +101,10 @@ def chamber(record: str) -> str:
     """The chamber temperature that the name of a record gives, in words: `-20 degC`, or `-20 degC, rising` if the
     chamber warms up during the test."""
     rising = ", rising" if record.partition("_")[2].startswith("trise") else ""
-    return f"{degc_of(record):g} degC{rising}"
+    return f"{chamber_degc(record):g} degC{rising}"
 
 
-def degc_of(record: str) -> float:
+def chamber_degc(record: str) -> float:
     """The chamber temperature that the name of a record gives, degC (`n20degC_us06`: -20)."""
     number = record.partition("degC")[0]
     return -float(number[1:]) if number.startswith("n") else float(number)

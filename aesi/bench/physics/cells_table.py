@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from aesi.bench.physics.archive import chamber, degc_of
+from aesi.bench.physics.archive import chamber, chamber_degc
 
 COLUMNS = {
     "declared_mv": "declared",
@@ -48,7 +48,7 @@ def archive_table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     temperature, then a table of the records in a block to open."""
     there = sorted(
         (row for row in rows if "error" not in row),
-        key=lambda row: (row["cell"], degc_of(row["record"]), row["record"]),
+        key=lambda row: (row["cell"], chamber_degc(row["record"]), row["record"]),
     )
     keys = [key for key in JUDGED if any(row.get(key) is not None for row in there)]
     records = (f"    {line}" for line in _by_record(there, keys))

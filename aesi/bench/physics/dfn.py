@@ -23,7 +23,7 @@ from pydantic import NonNegativeInt, PositiveInt
 from aesi.bench import CaseRow
 from aesi.bench.physics.espm import STEP_S, random_load
 from aesi.bench.physics.published import published
-from aesi.constants import SECONDS_PER_HOUR
+from aesi.constants import MV_PER_V, SECONDS_PER_HOUR, ZERO_CELSIUS_K
 from aesi.errors import InputError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
@@ -34,7 +34,7 @@ from aesi.pipeline.cross_check import DEFAULT_MESH, PybammRun, pybamm_run
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
 SOC0 = 0.95
 """State of charge at which each load starts; below 1, so that charging currents do not exceed the full charge."""
-KELVIN = {"25 degC": 298.15, "0 degC": 273.15}
+KELVIN = {"25 degC": 25.0 + ZERO_CELSIUS_K, "0 degC": ZERO_CELSIUS_K}
 """Temperature in words -> K, of the cell and its surroundings."""
 LARGEST_RATE = {"nmc_30ah": 3.0, "lg_m50_chen2020": 2.0, "lfp_prada2013": 1.0}
 """Name of a shipped cell -> largest C-rate of its loads, 1/h. Conventions."""
@@ -88,8 +88,10 @@ def run(
     key of LARGEST_RATE, or a BPX file; empty takes all of LARGEST_RATE.  seed : of the drives.  seconds : duration of
     the drives that are compared, s, in which there are as many whole steps of PULSE_S of the pulses as fit.  curves :
     false leaves out the comparison over numbers of points.  records : false leaves out the published records.
-    Raises InputError where `seconds` leaves no room for a pulse.
+    Raises InputError where `seconds` leaves no room for a pulse, and for a drive of one sample.
     """
+    if samples == 1:
+        raise InputError("samples = 1: a drive has two at least; give more, or 0 to leave it out.")
     if curves and seconds < 2 * PULSE_S:
         raise InputError(
             f"seconds = {seconds}: the first pulse comes after a rest, {PULSE_S:g} s each; give at least "
@@ -231,6 +233,6 @@ def _peer(load: Load, across: int, within: int, graded: bool = False) -> PybammR
 
 def _errors_mv(a: Array, b: Array) -> CaseRow:
     return {
-        "rmse_mv": 1e3 * rms(a - b),
-        "max_mv": 1e3 * float(np.abs(a - b).max()),
+        "rmse_mv": MV_PER_V * rms(a - b),
+        "max_mv": MV_PER_V * float(np.abs(a - b).max()),
     }

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from pydantic import NonNegativeInt, PositiveInt
 
+from aesi.bench import AtLeastTwo
+from aesi.constants import MV_PER_V
 from aesi.errors import InputError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
@@ -32,7 +34,7 @@ discharges the cell."""
 
 
 def run(
-    samples: PositiveInt = 88_200,
+    samples: AtLeastTwo = 88_200,
     repeats: PositiveInt = 5,
     cell: str | Path = DEFAULT_CELL,
     seed: NonNegativeInt = 0,
@@ -58,16 +60,15 @@ def run(
         for mesh in (DEFAULT_MESH, FINE_MESH)
     )
     yield {
-        "bench": "espm",
         "case": f"{samples} samples at 10 Hz, drive profile to 3C, {model.name}",
         "ours_s": ours,
         "ours_first_call_s": first,
         "peer": "PyBaMM SPMe IDAKLU",
         "peer_s": peer.seconds,
         "ratio": peer.seconds / ours,
-        "rmse_mv": _rmse_mv(voltage, fine.voltage_v),
-        "peer_rmse_mv": _rmse_mv(peer.voltage_v, fine.voltage_v),
-        "reference": "PyBaMM SPMe, 60 radial points",
+        "rmse_mv": MV_PER_V * rms(voltage - fine.voltage_v),
+        "peer_rmse_mv": MV_PER_V * rms(peer.voltage_v - fine.voltage_v),
+        "reference": f"PyBaMM SPMe, {FINE_MESH['r_n']} radial points",
     }
 
 
@@ -95,7 +96,3 @@ def _timed(cell: Cell, time: Array, current: Array) -> tuple[float, Array]:
     start = process_time()
     run = simulate(cell, time, current, soc0=SOC0)
     return process_time() - start, run.voltage_v
-
-
-def _rmse_mv(a: Array, b: Array) -> float:
-    return rms(a - b) * 1e3

@@ -59,8 +59,8 @@ def run(
                 yield {"cell": data, "record": name, "error": str(error)}
                 continue
             found += rows
-            yield {"cell": data, "record": name, **figures(rows)}
-        yield {"summary": True, "fitted": fitted, "failed": failed, **figures(found)}
+            yield {"cell": data, "record": name, **reading_figures(rows)}
+        yield {"summary": True, "fitted": fitted, "failed": failed, **reading_figures(found)}
 
 
 def readings(cell: Cell, record: Measurement, cuts: int, rng: np.random.Generator) -> list[dict[str, Any]]:
@@ -98,7 +98,7 @@ def _read(cell: Cell, record: Measurement, truth: float) -> dict[str, Any]:
     }
 
 
-def figures(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+def reading_figures(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """The figures of many readings.
 
     For each basis the number of readings, and their RMS and largest error in percentage points of the state of charge

@@ -12,7 +12,7 @@ GROUP_OF = 2
 """Most members of a group of look-alikes in which a right effect counts as named. A convention."""
 
 
-def scored(
+def answer_scores(
     answers: tuple[str, ...], truth: Mapping[str, float], content: Mapping[str, Any]
 ) -> dict[str, Any]:
     """The scores of one answer, as entries of the row of its case.

@@ -113,7 +113,7 @@ def worst_of(rows: Sequence[CaseRow]) -> list[CaseRow]:
     return sorted(known, key=lambda row: -float(row["after_test_mv"]))[:WORST]
 
 
-def residual_figure(row: CaseRow) -> Figure:
+def case_figure(row: CaseRow) -> Figure:
     """Residual of one case over time, measured minus model, mV, with the declared, the recalibrated and the written
     model. The last part of the record is held out."""
     said = " + ".join(row["effects"]) or "no name"

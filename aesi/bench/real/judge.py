@@ -11,26 +11,24 @@ import numpy as np
 
 from aesi.bench.detectable import seen_on_measured
 from aesi.bench.limit import LOST, NO_TIME, NOT_RUN, NoAnswer, Stopwatch, answer_of
-from aesi.bench.real.answers import initial_state_row, scored
+from aesi.bench.real.answers import answer_scores, initial_state_row
 from aesi.bench.real.case import RealCase, Take
 from aesi.bench.real.faults import declared_with_fault, soc0_with_fault, with_fault
 from aesi.bench.real.references import capacity_row, resistance_row, temperature_row
 from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.data import read_measurement
-from aesi.data.catalogue import M50T, NMC, locate
+from aesi.data.catalogue import locate
 from aesi.data.spectra import read_spectra
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 from aesi.physics import Cell
 from aesi.pipeline.discovery.budget import MOST_ROWS
-from aesi.pipeline.discovery.discover import discovery_content
+from aesi.pipeline.discovery.discover import HOLDOUT, discovery_content
 from aesi.records import Measurement, Spectrum
 from aesi.tracer import Discovery, discover
 
 LIMIT_S = 600.0
 """Limit of the processor time of one case, s. A case that takes longer counts as not answered. A convention."""
-HELD_OUT = 0.3
-"""Last share of a record that is held out, the default of `aesi discover`."""
 DRAWN = 160
 """Number of points of a residual in the report."""
 
@@ -44,10 +42,10 @@ def judged(case: RealCase, cells: str, limit_s: float | None = LIMIT_S) -> dict[
     spent = Stopwatch()
     row = _case_row(case)
     try:
-        data = record(case.take)
+        data = taken(case.take)
         declared = declared_cell(case.cell, cells)
         truth = _truth(case, data, declared)
-        good = [record(take) for take in case.good]
+        good = [taken(take) for take in case.good]
     except DataError as error:
         return row | {"verdict": NOT_RUN, "error": str(error), **spent.row}
     soc0 = case.soc0
@@ -55,7 +53,7 @@ def judged(case: RealCase, cells: str, limit_s: float | None = LIMIT_S) -> dict[
         data = with_fault(data, case.fault.kind, case.fault.size)
         declared = declared_with_fault(declared, case.fault.kind, case.fault.size)
         soc0 = soc0_with_fault(soc0, case.fault.kind, case.fault.size)
-    held = 0.0 if good else HELD_OUT  # beside known-good records the whole record is compared with them
+    held = 0.0 if good else HOLDOUT  # beside known-good records the whole record is compared with them
     found = answer_of(lambda: discover(declared, [data], soc0=soc0, holdout=held, good=good), limit_s)
     if isinstance(found, NoAnswer):
         answer = found.row | MISSED
@@ -124,7 +122,7 @@ def _truth(case: RealCase, data: Measurement, declared: Cell) -> Truth:
     parameters = dict(case.parameters)
     measured_degc, lost = None, None
     if case.group == "withheld":
-        full = record(replace(case.take, temperature=True))
+        full = taken(replace(case.take, temperature=True))
         if full.temperature_degc is None:
             raise DataError(f"{full.name} has no column of temperature.")
         measured_degc = full.temperature_degc
@@ -132,7 +130,7 @@ def _truth(case: RealCase, data: Measurement, declared: Cell) -> Truth:
         reference_degc = declared.initial_temperature_k - ZERO_CELSIUS_K
         parameters["ambient_temperature.shift_k"] = float(np.mean(measured_degc)) - reference_degc
     if case.against is not None:
-        other_ah = record(case.against).charge_ah
+        other_ah = taken(case.against).charge_ah
         by_file = case.measured == "declared capacity"
         lost = 1 - (other_ah / declared.capacity_ah if by_file else data.charge_ah / other_ah)
     spectra = () if case.spectra is None else read_spectra(locate(case.take.set, case.spectra))
@@ -152,7 +150,7 @@ def _scored_row(
 
     data, declared, given_soc0 : record, cell and initial state of charge as the tracer had them, with the fault.
     """
-    row = scored(case.answers, truth.parameters, content) | {"residual": _residual(found)}
+    row = answer_scores(case.answers, truth.parameters, content) | {"residual": _residual(found)}
     if truth.temperature_degc is not None:
         row |= temperature_row(found, data, truth.temperature_degc)
     if truth.lost is not None:
@@ -164,16 +162,13 @@ def _scored_row(
     return row
 
 
-def record(take: Take) -> Measurement:
+def taken(take: Take) -> Measurement:
     """The record as the tracer is given it, with at most as many rows as `aesi discover` takes.
 
     Raises DataError if it is not available.
     """
     columns: dict[str, str | None] | None = None if take.temperature else {"temperature_degc": None}
-    path = locate(take.set, take.file)
-    if take.set in (NMC, M50T):
-        columns = None  # these data sets have no temperature column to leave out
-    return read_measurement(path, columns, max_rows=MOST_ROWS, stop_s=take.stop_s)
+    return read_measurement(locate(take.set, take.file), columns, max_rows=MOST_ROWS, stop_s=take.stop_s)
 
 
 def _residual(found: Discovery) -> dict[str, list[float]]:

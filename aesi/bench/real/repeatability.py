@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from aesi.bench.real.case import Take
-from aesi.bench.real.judge import declared_cell, record
+from aesi.bench.real.judge import declared_cell, taken
 from aesi.bench.real.plan import CELLS, WINDOW_S
 from aesi.constants import MV_PER_V
 from aesi.data.catalogue import HG2, NMC, PANASONIC
@@ -51,7 +51,7 @@ def pairs() -> Iterator[tuple[str, str, str]]:
             yield cell, good, other
 
 
-def scatter(cell: str, good: str, other: str, cells: str = "experiments/cells") -> dict[str, Any]:
+def pair_row(cell: str, good: str, other: str, cells: str = "experiments/cells") -> dict[str, Any]:
     """The row of one pair of records.
 
     cells : folder of the cell files.  `sds` is the fitted size of each effect over its standard deviation,
@@ -60,45 +60,49 @@ def scatter(cell: str, good: str, other: str, cells: str = "experiments/cells") 
     """
     problem = inverse_problem(
         declared_cell(CELLS[cell], cells),
-        [record(Take(cell, other, WINDOW_S))],
+        [taken(Take(cell, other, WINDOW_S))],
         1.0,
         0.0,
-        good=[record(Take(cell, good))],
+        good=[taken(Take(cell, good))],
     )
     problem = replace(problem, trust="beside")
     blocks, archive = blocks_of(problem), Archive(None, "")
     base = base_of(problem, blocks, archive)
     if base is None:
         return {"cell": cell, "good": good, "other": other, "failed": True}
-    grown = grow_all(growths_on([Parent(problem, blocks, base)], {}, archive), archive)
-    ratios = [ratio(one) for one in grown if one is not None]
     return {
         "cell": cell,
         "good": good,
         "other": other,
         "model_error_mv": MV_PER_V * base.score.delta_v,
         "soc0_off": [round(base.values["soc0"][str(k)] - r.soc0, 4) for k, r in enumerate(problem.records)],
-        "sds": {name: round(sds, 2) for name, sds in ratios},
+        "sds": sizes_in_sds(Parent(problem, blocks, base), archive),
     }
 
 
-def ratio(one: Grown) -> tuple[str, float]:
-    """(effect, size over standard deviation) of the last effect of a hypothesis: of its amplitudes the one that is the
-    most standard deviations from zero; 0 if all are zero."""
+def sizes_in_sds(parent: Parent, archive: Archive) -> dict[str, float]:
+    """Effect -> its size over its standard deviation, fitted to first order beside a fitted hypothesis, to 0.01."""
+    grown = grow_all(growths_on([parent], {}, archive), archive)
+    return {one.hypothesis[-1]: round(_size_in_sds(one), 2) for one in grown if one is not None}
+
+
+def _size_in_sds(one: Grown) -> float:
+    """Size over standard deviation of the last effect of a hypothesis: of its amplitudes the one that is the most
+    standard deviations from zero; 0 if all are zero."""
     effect = one.hypothesis[-1]
     sds = np.sqrt(np.diagonal(one.score.covariance))
     x = one.point.x + one.score.shift
     found = [
         x[j] / sds[j] for j, f in enumerate(one.free) if f.owner == effect and f.amplitude and sds[j] > 0
     ]
-    return effect, float(max(found, key=abs, default=0.0))
+    return float(max(found, key=abs, default=0.0))
 
 
 def main() -> None:
     """Print one line per pair and the summary."""
     rows = []
     for cell, good, other in pairs():
-        rows.append(scatter(cell, good, other))
+        rows.append(pair_row(cell, good, other))
         print(json.dumps(rows[-1]), flush=True)
     ran = [row for row in rows if "sds" in row]
     by_effect: dict[str, list[float]] = {}

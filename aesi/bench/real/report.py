@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from aesi.bench import CaseRow
-from aesi.bench.real.figures import confusion_figure, residual_figure, sizes_figure, worst_of
+from aesi.bench.real.figures import case_figure, confusion_figure, sizes_figure, worst_of
 from aesi.pipeline.report.page import write_page
 
 FIGURES: Mapping[str, tuple[str, str]] = {
@@ -71,7 +71,7 @@ def write_report(path: Path, rows: Sequence[CaseRow], summary: Mapping[str, Any]
     """
     sized = [r for r in rows if r.get("size_error") is not None and "size_neutral" in r]
     worst = worst_of(rows)
-    figures = {f"worst_{k}": residual_figure(row) for k, row in enumerate(worst)}
+    figures = {f"worst_{k}": case_figure(row) for k, row in enumerate(worst)}
     if summary["confusion"]:
         figures["confusion"] = confusion_figure(summary["confusion"])
     if sized:

@@ -39,10 +39,10 @@ def tables(root: type[BaseModel], choices: Mapping[str, Iterable[str]]) -> str:
     return "\n".join(parts)
 
 
-def sections(root: type[BaseModel], name: str = "") -> Iterator[tuple[str, type[BaseModel]]]:
+def sections(root: type[BaseModel]) -> Iterator[tuple[str, type[BaseModel]]]:
     """Each section with its dotted name, once: what a fallback holds are sections that stand before."""
     seen: set[type[BaseModel]] = set()
-    left = [(name, root)]
+    left = [("", root)]
     while left:
         name, section = left.pop(0)
         if section not in seen:

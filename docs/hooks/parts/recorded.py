@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from flows.benchmarks.history import Entry, case_fields, case_of, figures, latest
+from flows.benchmarks.history import Entry, case_fields, case_of, latest, watched_figures
 
 Line = dict[str, Any]
 LONG = 12
@@ -41,7 +41,7 @@ def over_time(entries: Sequence[Entry]) -> str:
     moved: dict[tuple[Any, ...], list[str]] = {}
     for entry in entries:
         for line in entry.lines:
-            for figure, value in figures(line).items():
+            for figure, value in watched_figures(line).items():
                 moved.setdefault((*case_of(line), figure), []).append(f"{_cell(float(value))} ({entry.date})")
     rows = [
         f"| {bench} | {', '.join(_cell(each) for each in case)} | {figure} | {' → '.join(values)} |"

@@ -4,6 +4,7 @@ import json
 import os
 import signal
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -67,6 +68,20 @@ def test_tracking_costs_something_and_leaves_the_workspace_alone(workspace):
             "seconds = 10: the first pulse comes after a rest, 30 s each; give at least 60",
         ),
         ("ensemble", {"peer_models": 5, "resamples": 2}, "peer_models = 5 with resamples = 2"),
+        (
+            "ensemble",
+            {"cases": [[60, 1.0], [5000, 1.0]]},
+            "library of 5000 terms: there are 1 to 890 over these",
+        ),
+        ("ensemble", {"cases": [[0, 1.0]]}, "library of 0 terms: there are 1 to"),
+        ("ensemble", {"cases": []}, r"cases=\[\]: it has to have at least 1 item"),
+        ("spci", {"methods": []}, r"methods=\[\]: it has to have at least 1 item"),
+        ("design", {"settings": []}, r"settings=\[\]: it has to have at least 1 item"),
+        ("bands", {"layouts": []}, r"layouts=\[\]: it has to have at least 1 item"),
+        ("espm", {"samples": 1}, "samples=1: it has to be greater than or equal to 2"),
+        ("dfn", {"samples": 1, "curves": False}, "samples = 1: a drive has two at least; give more, or 0"),
+        ("search", {"population": 1}, "population=1: it has to be greater than or equal to 2"),
+        ("tracking", {"terms": 5000}, "library of 5000 terms: there are 1 to"),
     ],
 )
 def test_an_option_that_a_benchmark_cannot_take_is_refused_before_it_runs(name, options, said):
@@ -101,20 +116,46 @@ def test_options_that_leave_no_case_gave_a_summary_of_none(options, name, worksp
     assert not list(workspace.iterdir())  # nothing was tracked, either
 
 
-def test_the_options_of_every_benchmark_are_checked():
+def test_the_options_of_every_benchmark_are_checked_and_each_has_a_name():
     for name in benchmarks.BENCHMARKS:
-        with pytest.raises(InputError, match="has no such option"):
-            next(benchmarks.run(name, no_such_option=1))
+        with pytest.raises(
+            InputError, match=rf"`aesi bench {name}` has no such option; it has: [a-z]\w*(, [a-z]\w*)*\.$"
+        ):
+            benchmarks.run(name, no_such_option=1)
 
 
-def test_a_benchmark_offered_an_option_without_a_name():
-    for name in benchmarks.BENCHMARKS:
-        with pytest.raises(InputError, match=r"it has: [a-z]\w*(, [a-z]\w*)*\.$"):
-            next(benchmarks.run(name, no_such_option=1))
+def test_an_option_that_one_of_all_benchmarks_lacks_was_refused_after_hours_of_others(call, monkeypatch):
+    """`aesi bench --set seed=1`: nine have a seed and were run before the first without one was met."""
+
+    def started(seed: int = 0) -> Iterator[dict]:
+        yield pytest.fail(f"it was started with {seed}")
+
+    monkeypatch.setattr("aesi.bench.physics.espm.run", started)
+    monkeypatch.setattr("flows.commands.bench._chosen", lambda name: ["espm", "scale"])
+    code, out, err = call("bench", "--set", "seed=1")
+    assert code == 2
+    assert out == ""
+    assert "--set seed: `aesi bench scale` has no such option; it has: experiment, candidates" in err
 
 
 def test_the_timed_drive_of_the_porous_electrode_could_not_be_left_out():
     assert list(benchmarks.run("dfn", samples=0, curves=False, records=False)) == [{"summary": True}]
+
+
+def test_a_peer_was_timed_by_steps_beyond_the_end_of_its_series(monkeypatch):
+    """200 of MAPIE on 50 rows were 50, and a step came out four times as fast."""
+    asked = []
+
+    def step_s(past, future, steps):
+        asked.append((len(future), steps))
+        return 1.0
+
+    monkeypatch.setattr("aesi.bench.intervals.spci.PEERS", {"MAPIE ACI": step_s})
+    (line,) = benchmarks.run("spci", n_calibration=300, n_test=50, methods=["split"], mapie_steps=200)
+    assert asked == [(50, 50)]
+    assert (line["peer_steps_timed"], line["peer_s"]) == (50, 50.0)
+    # Rounded to milliseconds ours were none here, by which the ratio was divided, and 4 of the full size.
+    assert line["ratio"] == pytest.approx(50.0 / line["ours_s"], rel=1e-3)
 
 
 def test_a_benchmark_that_was_killed_was_tracked_as_running_for_ever(tracked):
@@ -481,6 +522,19 @@ def test_a_table_of_kept_splits_mixed_settings(tmp_path, monkeypatch, capsys):
         "of other settings, and left out of the table: hg2 without 25degC_us06, seed 1."
         in capsys.readouterr().err
     )
+
+
+@pytest.mark.parametrize("asked", [{"models": ["ESPM", "AESI I"]}, {"overrides": ['models=["ESPM"]']}])
+def test_a_table_of_splits_without_one_of_its_models_ended_in_a_traceback_after_all_splits(
+    tmp_path, monkeypatch, asked
+):
+    page = tmp_path / "page.md"
+    page.write_text(f"{splits.BEGIN}\n{splits.END}\n")
+    with pytest.raises(InputError, match=r"its table has columns of ESPM recalibrated.*add them to models"):
+        asked_splits(monkeypatch, cells=["hg2"], a_cell=1, write=str(page), **asked)
+    assert asked_splits(
+        monkeypatch, cells=["hg2"], a_cell=1, **asked
+    )  # without a table there is nothing to miss
 
 
 @pytest.mark.parametrize(

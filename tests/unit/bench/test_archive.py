@@ -4,7 +4,7 @@ from pathlib import PurePath
 
 import pytest
 
-from aesi.bench.physics.archive import ARCHIVE, chamber, degc_of
+from aesi.bench.physics.archive import ARCHIVE, chamber, chamber_degc
 from aesi.bench.physics.cells import ARCHIVED, RECORDS
 from aesi.bench.physics.cells_table import archive_table
 from aesi.bench.physics.tested import TESTED
@@ -83,7 +83,7 @@ def test_the_table_holds_median_and_worst_of_each_chamber_coldest_first():
     assert cold[2] == "| c | -20 degC | 2 | 400.0 / 500.0 | 40.0 / 50.0 | 39.0 / 49.0 | 20.0 / 20.0 |  |"
     assert "    | c | n20degC_la92 | -5.0 | 300.0 | 30.0 | 29.0 | 9.0 (fitted) |" in cold
     assert not any("n20degC_nn" in line for line in lines)
-    assert (chamber("n20degC_trise_us06"), degc_of("n20degC_trise_us06"), degc_of("10degC_nn")) == (
+    assert (chamber("n20degC_trise_us06"), chamber_degc("n20degC_trise_us06"), chamber_degc("10degC_nn")) == (
         "-20 degC, rising",
         -20.0,
         10.0,

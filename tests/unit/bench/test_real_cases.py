@@ -9,9 +9,9 @@ import pytest
 from aesi.bench.detectable import seen_on_measured
 from aesi.bench.limit import NO_TIME
 from aesi.bench.real import chosen, judged, plan, summary, table, write_report
-from aesi.bench.real.answers import initial_state_row, scored
+from aesi.bench.real.answers import answer_scores, initial_state_row
 from aesi.bench.real.faults import declared_with_fault, soc0_with_fault, with_fault
-from aesi.bench.real.judge import _truth, declared_cell, record
+from aesi.bench.real.judge import _truth, declared_cell, taken
 from aesi.bench.real.references import measured_resistances, model_resistances
 from aesi.physics import Cell
 from aesi.physics.effect import Record
@@ -126,22 +126,22 @@ def test_each_right_name_takes_back_what_was_put_into_the_current():
 
 def test_a_name_counts_in_a_group_of_two_and_not_of_three():
     right = ("current_sensor_offset",)
-    assert scored(right, {}, content("current_sensor_offset"))["named"]
+    assert answer_scores(right, {}, content("current_sensor_offset"))["named"]
     pair = [("leakage_current", "current_sensor_offset")]
-    assert scored(right, {}, content("leakage_current", groups=pair))["named"]
+    assert answer_scores(right, {}, content("leakage_current", groups=pair))["named"]
     three = [("leakage_current", "current_sensor_offset", "ocp_shape")]
-    assert not scored(right, {}, content("leakage_current", groups=three))["named"]
-    assert scored(right, {}, content("ocp_shape", "current_sensor_offset"))["others"] == ["ocp_shape"]
+    assert not answer_scores(right, {}, content("leakage_current", groups=three))["named"]
+    assert answer_scores(right, {}, content("ocp_shape", "current_sensor_offset"))["others"] == ["ocp_shape"]
 
 
 def test_a_control_is_right_where_nothing_is_named():
-    assert scored((), {}, content(verdict="none"))["named"]
-    assert not scored((), {}, content("ocp_shape", verdict="unknown"))["named"]
+    assert answer_scores((), {}, content(verdict="none"))["named"]
+    assert not answer_scores((), {}, content("ocp_shape", verdict="unknown"))["named"]
 
 
 def test_sizes_count_from_where_there_is_no_effect():
     estimate = {"gain": {"value": 1.018, "low": 1.01, "high": 1.03, "unit": "dimensionless"}}
-    row = scored(
+    row = answer_scores(
         ("current_sensor_gain",),
         {"current_sensor_gain.gain": 1.02},
         content("current_sensor_gain", parameters=estimate),
@@ -149,7 +149,7 @@ def test_sizes_count_from_where_there_is_no_effect():
     assert row["size_error"] == pytest.approx(0.1)
     assert row["size_covered"]
     estimate["gain"] |= {"low": None}
-    without = scored(
+    without = answer_scores(
         ("current_sensor_gain",),
         {"current_sensor_gain.gain": 1.02},
         content("current_sensor_gain", parameters=estimate),
@@ -189,7 +189,7 @@ def test_the_report_is_one_file_with_what_was_said(tmp_path):
         },
     }
     estimate = {"offset_a": {"value": 0.11, "low": 0.09, "high": 0.13, "unit": "A"}}
-    row |= scored(
+    row |= answer_scores(
         ("current_sensor_offset",),
         {"current_sensor_offset.offset_a": 0.1},
         content("current_sensor_offset", parameters=estimate),
@@ -243,7 +243,7 @@ def test_a_case_without_an_answer_left_the_rates_and_the_table(shared_data, monk
 def test_what_the_tracer_refuses_says_nothing():
     cell = Cell.from_bpx(f"{CELLS}/lg_m50_chen2020.bpx.json")
     short = Measurement(np.arange(20.0), np.zeros(20), np.full(20, 3.7), name="short")
-    assert seen_on_measured(cell, short, 0.5, ("series_resistance",)) is None
+    assert seen_on_measured(cell, short, 0.5, ("series_resistance",), (), 0.3) is None
 
 
 @pytest.fixture
@@ -256,8 +256,8 @@ def gain_rows():
     }
     estimate = {"gain": {"value": 1.018, "low": 1.01, "high": 1.03, "unit": "dimensionless"}}
     truth, right = {"current_sensor_gain.gain": 1.02}, ("current_sensor_gain",)
-    seen = put_in | {"seen_nats": 9.0} | scored(right, truth, content(*right, parameters=estimate))
-    unseen = put_in | {"seen_nats": 0.3} | scored(right, truth, content(verdict="unknown"))
+    seen = put_in | {"seen_nats": 9.0} | answer_scores(right, truth, content(*right, parameters=estimate))
+    unseen = put_in | {"seen_nats": 0.3} | answer_scores(right, truth, content(verdict="unknown"))
     return [seen, unseen, control("still", "ocp_shape") | {"record": "x/drive"}, {"verdict": "not run"}]
 
 
@@ -271,7 +271,7 @@ def test_half_of_a_wrong_initial_state_taken_back():
 
 def control(name, *effects):
     head = {"case": name, "group": "control", "development": False, "put_in": "", "processor_s": 1.0}
-    return head | {"answer": [], "matched": None} | scored((), {}, content(*effects))
+    return head | {"answer": [], "matched": None} | answer_scores((), {}, content(*effects))
 
 
 def test_a_control_that_shows_the_name_of_its_matched_case_is_counted():
@@ -315,7 +315,7 @@ def test_a_contact_is_in_the_ohmic_part_of_the_model_and_slow_kinetics_in_the_ot
 
 def known(name):
     case = next(case for case in plan() if case.name == name)
-    data = record(case.take)
+    data = taken(case.take)
     return case, data, _truth(case, data, declared_cell(case.cell, CELLS))
 
 
@@ -336,7 +336,7 @@ def test_a_withheld_temperature_is_in_the_answer_and_not_in_the_data(shared_data
     assert len(truth.temperature_degc) == len(data)
     assert truth.parameters["ambient_temperature.shift_k"] == pytest.approx(10.9 - 25, abs=0.3)
     given = replace(case, take=replace(case.take, temperature=True))
-    assert record(given.take).temperature_degc is not None
+    assert taken(given.take).temperature_degc is not None
 
 
 def test_the_spectra_of_a_witness_are_those_of_its_month(shared_data):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from aesi.bench.physics import start
-from aesi.bench.physics.start import figures, readings
+from aesi.bench.physics.start import reading_figures, readings
 from aesi.errors import DataError
 from aesi.physics import Cell, simulate
 from aesi.records import Measurement
@@ -26,7 +26,7 @@ def discharge() -> Measurement:
 
 
 def test_what_the_cell_itself_answers_is_read_within_what_is_claimed():
-    found = figures(readings(CELL, discharge(), 6, np.random.default_rng(0)))
+    found = reading_figures(readings(CELL, discharge(), 6, np.random.default_rng(0)))
     assert found["readings"] == 6
     assert found["refused"] == 0
     assert found["load_worst_points"] < 1.0
@@ -37,9 +37,9 @@ def test_what_the_cell_itself_answers_is_read_within_what_is_claimed():
 def test_a_voltage_that_is_off_shows_in_points_of_charge():
     data = discharge()
     later = replace(data, voltage_v=data.voltage_v + np.where(data.time_s > 600.0, 0.03, 0.0))
-    right = figures(readings(CELL, data, 6, np.random.default_rng(0)))
+    right = reading_figures(readings(CELL, data, 6, np.random.default_rng(0)))
     assert (
-        figures(readings(CELL, later, 6, np.random.default_rng(0)))["load_rms_points"]
+        reading_figures(readings(CELL, later, 6, np.random.default_rng(0)))["load_rms_points"]
         > 1.0 + (right["load_rms_points"])
     )
 
