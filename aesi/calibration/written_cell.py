@@ -16,6 +16,10 @@ from aesi.numerics.typing import Array
 from aesi.physics.balance import aged_range, same_rest
 from aesi.physics.cell import Cell
 
+GRID = 20001
+"""States of charge between which the empty cell is interpolated, over all that both electrodes can have."""
+
+
 def written_cell(model: Model, x: Array) -> Cell:
     """The cell of the file: full as in the fit, and empty at a rest voltage of its lower voltage limit.
 
@@ -51,7 +55,8 @@ def start_soc(model: Model, x: Array, index: int) -> float:
 def _as_aged(model: Model, x: Array, material: float, silicon: float) -> Cell:
     """The written cell with these shares of active material and silicon left."""
     cell = model.aged(model.cell_at(x), 1.0, silicon)
-    soc = np.linspace(*aged_range(cell), 4001)
+    # The windows of a fit are as wide as the start file's capacity, and its cell may be much larger than that.
+    soc = np.linspace(*aged_range(cell, beyond=np.inf), GRID)
     ocv = np.maximum.accumulate(cell.rest_voltage_v(soc))
     empty = float(np.interp(cell.lower_voltage_v, ocv, soc))
     n_1, p_1 = cell.stoichiometries(1.0)
