@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from aesi.calibration.fit import prepared_model
+from aesi.calibration.parameters import with_interfaces
 from aesi.calibration.records.conditions import Conditions
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.physics import Cell, simulate
@@ -52,3 +53,11 @@ def test_the_thermal_conductivity_was_a_parameter_that_nothing_answered_to(model
     number = [free.name for free in model.free].index("thermal.conductivity")
     slopes = model.jacobian(x)[: len(model.records[0].rows), number]
     assert np.abs(slopes).max() > 1e-2
+
+
+def test_a_file_without_a_volume_was_given_a_thermal_conductivity_that_nothing_told():
+    lacking = replace(NMC, volume_m3=None, thermal_conductivity_w_m_k=None)
+    assert with_interfaces(lacking, on_case=True).thermal_conductivity_w_m_k is None
+    assert (
+        with_interfaces(replace(lacking, volume_m3=NMC.volume_m3), on_case=True).winding_resistance_k_w > 0.0
+    )
