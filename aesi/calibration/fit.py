@@ -17,7 +17,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from aesi.calibration.ageing import Ageing
-from aesi.calibration.heat import with_fitted_heat
+from aesi.calibration.heat import case_records, with_fitted_heat
 from aesi.calibration.model import FitState, Model
 from aesi.calibration.parameters import free_parameters, with_interfaces, with_priors
 from aesi.calibration.records.conditions import Conditions
@@ -239,7 +239,7 @@ def _fitted_twice(
     model = reporting.model
     x = _descend(reporting, evaluations, start)
     plain = written_cell(model, x)
-    found, sentences = with_fitted_heat(plain, model.records)
+    found, sentences = with_fitted_heat(plain, case_records(model, x))
     if found is not plain:
         # The thermal lag of the winding behind its case is part of the file, so that the fit has to include it.
         model.set_thermal_data(found)

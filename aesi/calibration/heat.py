@@ -1,7 +1,7 @@
 """Heat capacity and conductance of a cell, from the temperature measured on its case.
 
     C dT/dt = Q - (T - T_case)/R,   (T - T_case)/R = G (T_case - T_amb)
-    Q = I (U - V) - I T dU/dT        I > 0 on discharge; V as measured, U of the calibrated cell
+    Q = I (U - V) - I T dU/dT        I > 0 on discharge; V as measured, U of the fit in its mean state
 
 The heat capacity of the case is left out. R is that of the calibrated cell (`Cell.winding_resistance_k_w`). Each record
 has surroundings of its own, within `AMBIENT_SD_K` of the cell's first temperature. A temperature is used only where the
@@ -18,13 +18,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from aesi.calibration.records.prepared import Prepared
-from aesi.constants import ZERO_CELSIUS_K
+from aesi.calibration.model import Model
+from aesi.calibration.written_cell import cell_in_record
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
 from aesi.physics.effects.self_heating import PARAMETERS
-from aesi.physics.simulation import simulate
 
 LEAST_RISE_K = 2.0
 """Least warming of a record that is used, K."""
@@ -43,6 +42,19 @@ READING_K = 0.3
 """Standard deviation of a thermocouple, K."""
 TYPICAL_W_K = 0.1
 """Start of the fit: a small cylindrical cell in still air."""
+
+
+@dataclass(frozen=True, eq=False)
+class CaseRecord:
+    """A record with a temperature of the case.
+
+    time_s, kelvin : (rows,) s and K, as measured.  watts : (rows,) W that the cell released by the fit.
+    """
+
+    name: str
+    time_s: Array
+    kelvin: Array
+    watts: Array
 
 
 @dataclass(frozen=True)
@@ -65,13 +77,31 @@ class HeatFit:
         )
 
 
-def with_fitted_heat(cell: Cell, records: Sequence[Prepared]) -> tuple[Cell, tuple[str, ...]]:
+def case_records(model: Model, x: Array) -> tuple[CaseRecord, ...]:
+    """The records of a fit that have a temperature, at a working vector."""
+    return tuple(
+        CaseRecord(record.name, record.rows.time_s, record.kelvin, _heat_w(model, x, index, record.kelvin))
+        for index, record in enumerate(model.records)
+        if record.kelvin is not None
+    )
+
+
+def with_fitted_heat(cell: Cell, records: Sequence[CaseRecord]) -> tuple[Cell, tuple[str, ...]]:
     """(cell with its thermal data fitted, sentences). The same cell object is returned where no record determines the
-    heat, or where the file declares no volume."""
-    warming = [r for r in records if r.kelvin is not None and float(np.ptp(r.kelvin)) > LEAST_RISE_K]
-    declared = cell.heat_capacity_j_k
-    if not warming or declared is None or cell.surface_area_m2 is None or cell.specific_heat_j_kg_k is None:
-        return cell, ()
+    heat, or where the file lacks thermal data; a sentence then says so."""
+    warming = [r for r in records if float(np.ptp(r.kelvin)) > LEAST_RISE_K]
+    declared, lacks = cell.heat_capacity_j_k, _lacking(cell)
+    if not warming:
+        stays = f"the start file has no {lacks}" if lacks else "they stay as in the start file"
+        return cell, (
+            f"heat: no record has a measured temperature that changes by more than {LEAST_RISE_K:g} K, so that heat "
+            f"capacity and cooling are not fitted; {stays}.",
+        )
+    if declared is None or cell.specific_heat_j_kg_k is None or lacks:
+        return cell, (
+            f"heat: the start file has no {lacks}, so that the temperature of {', '.join(r.name for r in warming)} "
+            "tells no heat capacity and no cooling.",
+        )
     explained = (
         warming if _losses_explain(cell, warming) else [r for r in warming if _losses_explain(cell, [r])]
     )
@@ -91,7 +121,18 @@ def with_fitted_heat(cell: Cell, records: Sequence[Prepared]) -> tuple[Cell, tup
     return changed, (fit.sentence, *notes)
 
 
-def _losses_explain(cell: Cell, records: Sequence[Prepared]) -> bool:
+def _lacking(cell: Cell) -> str:
+    """The fields of the cell's file without which no heat can be fitted, in words; '' where it has all."""
+    fields = {
+        "'Density [kg.m-3]'": cell.density_kg_m3,
+        "'Specific heat capacity [J.K-1.kg-1]'": cell.specific_heat_j_kg_k,
+        "'Volume [m3]'": cell.volume_m3,
+        "'External surface area [m2]'": cell.surface_area_m2,
+    }
+    return " and no ".join(name for name, value in fields.items() if value is None)
+
+
+def _losses_explain(cell: Cell, records: Sequence[CaseRecord]) -> bool:
     """True where the losses explain the temperatures and the surroundings alone do not, with plausible thermal data."""
     declared = cell.heat_capacity_j_k
     assert declared is not None
@@ -105,13 +146,13 @@ def _losses_explain(cell: Cell, records: Sequence[Prepared]) -> bool:
     return all(low <= found[name] <= high for name, (low, high) in ((n, PARAMETERS[n].bounds) for n in found))
 
 
-def fit_heat(cell: Cell, records: Sequence[Prepared], start_j_k: float, *, losses: bool = True) -> HeatFit:
+def fit_heat(cell: Cell, records: Sequence[CaseRecord], start_j_k: float, *, losses: bool = True) -> HeatFit:
     """Least-squares fit to all records. Each record counts as one reading, since its errors are correlated.
 
     start_j_k : heat capacity at the start, J/K.  losses : False for a cell that releases no heat and only follows its
     surroundings.
     """
-    driven = [(r, heat_w(cell, r) if losses else np.zeros(len(r.rows))) for r in records]
+    driven = [(r, r.watts if losses else np.zeros_like(r.watts)) for r in records]
 
     def residual(z: Array) -> Array:
         # The logarithms of both thermal values, then the surroundings of each record.
@@ -121,9 +162,8 @@ def fit_heat(cell: Cell, records: Sequence[Prepared], start_j_k: float, *, losse
         share = through / conductance
         parts = []
         for (record, watts), shift in zip(driven, z[2:], strict=True):
-            assert record.kelvin is not None
             ambient = record.kelvin[0] + SURROUNDINGS_UNIT * AMBIENT_SD_K * shift
-            winding = temperature_k(record.rows.time_s, watts, record.kelvin[0], ambient, capacity, through)
+            winding = temperature_k(record.time_s, watts, record.kelvin[0], ambient, capacity, through)
             case_k = ambient + share * (winding - ambient)
             parts.append((case_k - record.kelvin) / READING_K / len(case_k) ** 0.5)
         return np.concatenate([*parts, SURROUNDINGS_UNIT * z[2:]])
@@ -147,21 +187,22 @@ def _with_conductance(cell: Cell, conductance_w_k: float) -> Cell:
     return replace(cell, heat_transfer_w_m2_k=conductance_w_k / cell.surface_area_m2)
 
 
-def heat_w(cell: Cell, record: Prepared) -> Array:
-    """(rows,) W released by the cell: from the voltage as measured and the open-circuit voltage of the mean state."""
-    rows = record.rows
-    assert record.kelvin is not None
-    run = simulate(
-        cell, rows.time_s, rows.current_a, record.start.soc, (), record.kelvin - ZERO_CELSIUS_K, record.hold,
-        on_depletion="clip",
-    )  # fmt: skip
+def _heat_w(model: Model, x: Array, index: int, kelvin: Array) -> Array:
+    """(rows,) W released by the cell in a record: from the voltage as measured and the open-circuit voltage of the mean
+    state that the fit has it in, which may be far from what the start file reads.
+
+    kelvin : (rows,) K, of the case.
+    """
+    cell = cell_in_record(model, x, index)
+    (empty_n, full_n) = cell.balance.window_n
+    mean_n = model.run(index, model.cell_at(x), x)[5]
     # Errors of start and capacity may take the charge beyond full or empty, where the potential of the limit is used.
-    soc = np.clip(run.series["soc"], 0.0, 1.0)
+    soc = np.clip((mean_n - empty_n) / (full_n - empty_n), 0.0, 1.0)
     theta_n, theta_p = cell.balance.stoichiometries(soc)
     entropic = cell.positive.entropic(np.asarray(theta_p)) - cell.negative.entropic(np.asarray(theta_n))
-    rise = record.kelvin - cell.reference_temperature_k
-    open_circuit = cell.rest_voltage_v(soc) + rise * entropic
-    return rows.current_a * (open_circuit - rows.voltage_v - record.kelvin * entropic)
+    open_circuit = cell.rest_voltage_v(soc) + (kelvin - cell.reference_temperature_k) * entropic
+    lost_v = open_circuit - model.records[index].rows.voltage_v - kelvin * entropic
+    return model.current_a(index, x) * lost_v
 
 
 def temperature_k(

@@ -17,8 +17,9 @@ from aesi.calibration.shapes import Shapes
 from aesi.calibration.silicon import SILICON_SD, may_have_silicon, silicon_edge, stretched, with_silicon
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
+from aesi.physics.effect import Record
 from aesi.physics.model import EspmModel
-from aesi.physics.simulation import ModelName, solver
+from aesi.physics.simulation import ModelName, solved, solver
 from aesi.records import Spectrum
 
 ELECTRODE_POINTS = 4
@@ -156,6 +157,12 @@ class Model:
             return 1.0
         return float(np.exp(SILICON_SD * (self.ageing.silicon[index] @ x[self.layout.silicons])))
 
+    def current_a(self, index: int, x: Array) -> Array:
+        """(rows,) A of a record; of a slow one without the zero offset of its cycler."""
+        record = self.records[index]
+        current = record.rows.current_a
+        return current - self.zero.at(float(x[self.layout.zero])) * record.flows if record.slow else current
+
     def aged(self, cell: Cell, material: float, silicon: float) -> Cell:
         """The cell with these shares of its active material and of its silicon."""
         return replace(cell, negative=with_silicon(cell.negative, self.edge, silicon)).with_material(material)
@@ -182,11 +189,8 @@ class Model:
             most_substeps=MOST_STEPS,
         )
         soc = record.start.soc + record.soc_sd * float(x[self.layout.soc(index)])
-        current = record.rows.current_a
-        if record.slow:
-            current = current - self.zero.at(float(x[self.layout.zero])) * record.flows
-        solve = solver(self.model_name)
-        rows, _, at, _ = solve(model, record.rows.time_s, current, record.kelvin, soc, record.hold)
+        load = Record(record.rows.time_s, self.current_a(index, x), record.kelvin)
+        rows, _, at, _ = solved(solver(self.model_name), model, load, soc, record.hold)
         return rows, at
 
     def as_simulated(self, x: Array) -> Array:

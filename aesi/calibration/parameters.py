@@ -275,7 +275,9 @@ def with_interfaces(cell: Cell, on_case: bool = False) -> Cell:
     within.
     """
     if on_case and cell.thermal_conductivity_w_m_k is None:
-        cell = replace(cell, thermal_conductivity_w_m_k=CONDUCTIVITY_W_M_K)
+        conducting = replace(cell, thermal_conductivity_w_m_k=CONDUCTIVITY_W_M_K)
+        # Without a body and a heat capacity no winding is simulated, and what is assumed of one would only be written.
+        cell = conducting if conducting.winding_resistance_k_w else cell
     if not cell.contact_resistance_ohm:
         cell = replace(cell, contact_resistance_ohm=CONTACT_V / cell.nominal_capacity_ah)
     film = Constant(FILM_OHM_M2)

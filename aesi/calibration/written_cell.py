@@ -16,6 +16,9 @@ from aesi.numerics.typing import Array
 from aesi.physics.balance import aged_range, same_rest
 from aesi.physics.cell import Cell
 
+GRID = 20001
+"""States of charge between which the empty cell is interpolated, over all that both electrodes can have."""
+
 
 def written_cell(model: Model, x: Array) -> Cell:
     """The cell of the file: full as in the fit, and empty at a rest voltage of its lower voltage limit.
@@ -28,10 +31,12 @@ def written_cell(model: Model, x: Array) -> Cell:
 def capacities(model: Model, x: Array) -> dict[str, float]:
     """Name of a record -> capacity of the cell in it, over that of the written cell."""
     written_ah = written_cell(model, x).capacity_ah
-    return {
-        r.name: _as_aged(model, x, model.material(i, x), model.silicon(i, x)).capacity_ah / written_ah
-        for i, r in enumerate(model.records)
-    }
+    return {r.name: cell_in_record(model, x, i).capacity_ah / written_ah for i, r in enumerate(model.records)}
+
+
+def cell_in_record(model: Model, x: Array, index: int) -> Cell:
+    """The written cell with the active material and silicon that it had in a record."""
+    return _as_aged(model, x, model.material(index, x), model.silicon(index, x))
 
 
 def start_soc(model: Model, x: Array, index: int) -> float:
@@ -44,13 +49,14 @@ def start_soc(model: Model, x: Array, index: int) -> float:
     material, silicon = model.material(index, x), model.silicon(index, x)
     fitted = model.aged(model.cell_at(x), material, silicon)
     soc = record.start.soc + record.soc_sd * float(x[model.layout.soc(index)])
-    return same_rest(fitted, _as_aged(model, x, material, silicon), soc)
+    return same_rest(fitted, cell_in_record(model, x, index), soc)
 
 
 def _as_aged(model: Model, x: Array, material: float, silicon: float) -> Cell:
     """The written cell with these shares of active material and silicon left."""
     cell = model.aged(model.cell_at(x), 1.0, silicon)
-    soc = np.linspace(*aged_range(cell), 4001)
+    # The windows of a fit are as wide as the start file's capacity, and its cell may be much larger than that.
+    soc = np.linspace(*aged_range(cell, beyond=np.inf), GRID)
     ocv = np.maximum.accumulate(cell.rest_voltage_v(soc))
     empty = float(np.interp(cell.lower_voltage_v, ocv, soc))
     n_1, p_1 = cell.stoichiometries(1.0)

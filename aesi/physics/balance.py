@@ -98,13 +98,13 @@ def _soc_at_same_rest(before: Balance, after: Balance, soc: float) -> float:
     return float(brentq(excess, grid[k], grid[k + 1], xtol=1e-13))
 
 
-def aged_range(cell: Cell) -> tuple[float, float]:
-    """States of charge at which both electrodes are within (0, 1), at most 5 % beyond the windows."""
-    return _aged_range(cell.balance)
+def aged_range(cell: Cell, beyond: float = SOC_BEYOND) -> tuple[float, float]:
+    """States of charge at which both electrodes are within (0, 1), at most `beyond` outside the windows."""
+    return _aged_range(cell.balance, beyond)
 
 
-def _aged_range(balance: Balance) -> tuple[float, float]:
-    low, high = -SOC_BEYOND, 1.0 + SOC_BEYOND
+def _aged_range(balance: Balance, beyond: float = SOC_BEYOND) -> tuple[float, float]:
+    low, high = -beyond, 1.0 + beyond
     (empty_n, full_n), (empty_p, full_p) = balance.window_n, balance.window_p
     span_n, span_p = full_n - empty_n, empty_p - full_p
     low = max(low, (EDGE - empty_n) / span_n, (empty_p - 1.0 + EDGE) / span_p)

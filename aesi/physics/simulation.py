@@ -116,12 +116,11 @@ def simulate(
         soc0 = same_rest(cell, changed.cell, soc0)
     backward = hold == "backward"
     # A clock or lag effect reads the voltage between the rows of the current, at rows of their own.
-    solved, reading_rows = (record, None) if record.read_s is None else record.with_readings(backward)
-    model_of_record = of_record(changed, record.temperature_k is not None)
-    if profiles or len(solved.time_s) > MOST_ROWS:
-        rows, further, fault_at, fault = _solved(solve, model_of_record, solved, soc0, hold)
+    taken, reading_rows = (record, None) if record.read_s is None else record.with_readings(backward)
+    if profiles or len(taken.time_s) > MOST_ROWS:
+        rows, further, fault_at, fault = solved(solve, changed, taken, soc0, hold)
     else:
-        cached = _cached_solution(model, model_of_record, _KeyedRecord.of(solved), soc0, hold)
+        cached = _cached_solution(model, changed, _KeyedRecord.of(taken), soc0, hold)
         rows, further, fault_at, fault = _copied(cached)
     series = _series(changed.cell, rows) | further
     written_at = (
@@ -131,11 +130,11 @@ def simulate(
         kelvin = float(further["temperature_k"][fault_at])
         own = slice(None) if reading_rows is None else reading_rows
         raise SimulationError(
-            depletion_sentence(changed, time, solved.current_a[own], kelvin, rows[:, own], written_at, fault)
+            depletion_sentence(changed, time, taken.current_a[own], kelvin, rows[:, own], written_at, fault)
         )
     if on_depletion == "clip":
-        series["depleted"] = _depleted(fault_at, len(solved.time_s))
-    voltage = _with_effects_in_series(changed, active, solved, rows[0], series, backward)
+        series["depleted"] = _depleted(fault_at, len(taken.time_s))
+    voltage = _with_effects_in_series(changed, active, taken, rows[0], series, backward)
     if reading_rows is not None:
         voltage = voltage[reading_rows]
         series = {name: values[reading_rows] for name, values in series.items()}
@@ -171,7 +170,7 @@ def _with_effect(model: EspmModel, active: ActiveEffect) -> EspmModel:
 
 
 Solver = Callable[[EspmModel, Array, Array, Array | None, float, Hold], Solution]
-"""(model, time, current, temperature or None, soc0, hold) -> the solution."""
+"""(model, time, current, temperature or None, soc0, hold) -> the solution, of a model as `of_record` gives it."""
 
 
 def solver(model_name: str, profiles: dict[str, Array] | None = None) -> Solver:
@@ -192,12 +191,11 @@ def solver(model_name: str, profiles: dict[str, Array] | None = None) -> Solver:
     )
 
 
-def _solved(solve: Solver, model: EspmModel, record: Record, soc0: float, hold: Hold) -> Solution:
-    """One solution; a constant temperature column becomes the initial temperature of the cell.
-
-    model : that of `of_record`.
-    """
+def solved(solve: Solver, model: EspmModel, record: Record, soc0: float, hold: Hold) -> Solution:
+    """One solution. Where the temperature of the case was measured, the winding follows it (`of_record`); a constant
+    column becomes the initial temperature of the cell."""
     temperature = record.temperature_k
+    model = of_record(model, temperature is not None)
     if temperature is not None and np.ptp(temperature) == 0.0:
         model = model.with_cell(initial_temperature_k=float(temperature[0]))
         if model.heat is None:
@@ -232,7 +230,7 @@ def _cached_solution(
 ) -> Solution:
     """One solution, from a cache: effects on the voltage and on readings do not change the states of the cell, so that
     14 to 32 % of the solutions in four blind cases were computed before."""
-    return _solved(solver(model_name), model, keyed.record, soc0, hold)
+    return solved(solver(model_name), model, keyed.record, soc0, hold)
 
 
 def forget_solutions() -> None:

@@ -120,6 +120,20 @@ def step_particle(  # type: ignore[no-untyped-def]
     return mean, taken, largest
 
 
+@njit(inline="always", fastmath=FASTMATH)
+def slope_at(psi, s):  # type: ignore[no-untyped-def]
+    """Slope of psi at position s in its table, linear between the middles of its cells.
+
+    It is continuous: by the slope of the cell alone the exactly stepped diffusivity jumps where a profile enters the
+    next one.
+    """
+    last = psi.shape[0] - 1
+    middle = min(max(s - 0.5, 0.0), last - 1.0)
+    cell = min(int(middle), last - 2)
+    before, after = psi[cell + 1] - psi[cell], psi[cell + 2] - psi[cell + 1]
+    return last * (before + (middle - cell) * (after - before))
+
+
 @compiled
 def solid_forcing(mean, z, at, project, psi, nodes, force):  # type: ignore[no-untyped-def]
     """force[k] : mode k of the integral psi of the diffusivity's variable part, at the profile of (mean, z).
@@ -136,9 +150,8 @@ def solid_forcing(mean, z, at, project, psi, nodes, force):  # type: ignore[no-u
     for i in range(nodes.shape[0]):
         s = nodes[i] * last
         cell = int(min(max(s, 0.0), last - 1.0))
-        slope = psi[cell + 1] - psi[cell]
-        steepest = max(steepest, slope * last)
-        value = psi[cell] + (s - cell) * slope
+        value = psi[cell] + (s - cell) * (psi[cell + 1] - psi[cell])
+        steepest = max(steepest, slope_at(psi, s))
         for j in range(force.shape[0]):
             force[j] += project[j, i] * value
     return steepest

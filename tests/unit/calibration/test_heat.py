@@ -6,8 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aesi.calibration.heat import fit_heat, with_fitted_heat
-from aesi.calibration.records.prepared import prepared
+from aesi.calibration.fit import prepared_model
+from aesi.calibration.heat import CaseRecord, case_records, fit_heat, with_fitted_heat
+from aesi.calibration.model import Model
+from aesi.calibration.records.conditions import Conditions
 from aesi.errors import CellError, ParameterError
 from aesi.physics import Cell, simulate
 from aesi.physics.effects import CATALOGUE
@@ -16,6 +18,17 @@ from aesi.records import Measurement
 
 NMC = Cell.from_bpx(Path(__file__).resolve().parents[3] / "experiments" / "cells" / "nmc_30ah.bpx.json")
 TRUE_W_K, TRUE_FACTOR = 0.7, 1.3
+
+
+def fit_of(cell: Cell, *records: Measurement, soc0: float = 0.9) -> Model:
+    """A fit of the cell itself, before its first step."""
+    return prepared_model(cell, records, Conditions(soc0=soc0, same_cell=True))[0]
+
+
+def seen_by(cell: Cell, *records: Measurement) -> tuple[CaseRecord, ...]:
+    """The temperatures of the records, and what the cell released."""
+    model = fit_of(cell, *records)
+    return case_records(model, np.zeros(model.layout.size))
 
 
 @pytest.fixture(scope="module")
@@ -28,15 +41,14 @@ def warming() -> Measurement:
 
 
 def test_the_heat_balance_behind_a_temperature_is_found(warming):
-    ready = prepared(NMC, [warming], 0.9)
-    found = fit_heat(NMC, ready, NMC.heat_capacity_j_k)
+    found = fit_heat(NMC, seen_by(NMC, warming), NMC.heat_capacity_j_k)
     assert found.conductance_w_k == pytest.approx(TRUE_W_K, rel=0.15)
     assert found.heat_capacity_j_k == pytest.approx(TRUE_FACTOR * NMC.heat_capacity_j_k, rel=0.15)
     assert found.rmse_k < 0.3
 
 
 def test_it_goes_into_the_file_and_comes_back(warming):
-    cell, notes = with_fitted_heat(NMC, prepared(NMC, [warming], 0.9))
+    cell, notes = with_fitted_heat(NMC, seen_by(NMC, warming))
     again = Cell.from_bpx(cell.to_bpx())
     assert again.conductance_w_k == pytest.approx(TRUE_W_K, rel=0.15)
     assert again.heat_capacity_j_k == pytest.approx(cell.heat_capacity_j_k)
@@ -61,7 +73,7 @@ def test_a_case_that_lags_its_winding_does_not_make_the_cell_heavier(warming):
     case = air + (winding - air) / (1.0 + outside * cell.winding_resistance_k_w)
     record = Measurement(time, warming.current_a, run.voltage_v, case, "case")
     found, as_one_lump = (
-        fit_heat(one, prepared(one, [record], 0.9), one.heat_capacity_j_k)
+        fit_heat(one, seen_by(one, record), one.heat_capacity_j_k)
         for one in (cell, replace(cell, thermal_conductivity_w_m_k=None))
     )
     assert found.heat_capacity_j_k == pytest.approx(cell.heat_capacity_j_k, rel=0.15)
@@ -71,7 +83,49 @@ def test_a_case_that_lags_its_winding_does_not_make_the_cell_heavier(warming):
 
 def test_records_that_do_not_warm_leave_the_file_as_it_is(warming):
     flat = replace(warming, temperature_degc=np.full(len(warming), 25.0))
-    assert with_fitted_heat(NMC, prepared(NMC, [flat], 0.9)) == (NMC, ())
+    cell, notes = with_fitted_heat(NMC, seen_by(NMC, flat))
+    assert cell is NMC
+    assert "no record has a measured temperature that changes by more than 2 K" in notes[0]
+    assert "they stay as in the start file" in notes[0]
+
+
+def test_that_heat_is_not_fitted_where_no_temperature_was_measured_was_said_nowhere(warming):
+    bare = replace(warming, temperature_degc=None)
+    cell, notes = with_fitted_heat(NMC, seen_by(NMC, bare))
+    assert cell is NMC
+    assert notes[0].endswith(
+        "so that heat capacity and cooling are not fitted; they stay as in the start file."
+    )
+
+
+@pytest.mark.parametrize("measured", [True, False])
+def test_a_file_without_a_volume_left_a_measured_temperature_without_a_word(warming, measured):
+    lacking = replace(NMC, volume_m3=None, surface_area_m2=None)
+    record = warming if measured else replace(warming, temperature_degc=None)
+    cell, notes = with_fitted_heat(lacking, seen_by(lacking, record))
+    assert cell is lacking
+    assert "the start file has no 'Volume [m3]' and no 'External surface area [m2]'" in notes[0]
+    assert ("temperature of warming tells no heat capacity" in notes[0]) == measured
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_what_a_cell_released_was_that_of_a_start_which_the_fit_had_left(direction):
+    """Of a start that was 0.05 of charge off, a third of a charge at 1C seemed to release 1.08 times the heat on
+    discharge, and 0.56 times on charge."""
+    time = np.arange(0.0, 1200.0, 2.0)
+    current = np.where(time < 60.0, 0.0, direction * NMC.capacity_ah)
+    effect = CATALOGUE["self_heating"].activate(heat_transfer_w_k=TRUE_W_K, heat_capacity_factor=1.0)
+    run = simulate(NMC, time, current, 0.45, [effect], hold="backward")
+    kelvin = run.series["temperature_k"]
+    record = Measurement(time, current, run.voltage_v, kelvin - 273.15, "moved", hold="backward")
+    model = fit_of(NMC, record, soc0=0.5)
+    x = np.zeros(model.layout.size)
+    x[model.layout.soc(0)] = (0.45 - 0.5) / model.records[0].soc_sd
+    (case,) = case_records(model, x)
+    released_j = float(case.watts[1:] @ np.diff(case.time_s))
+    lost_w = TRUE_W_K * (kelvin - NMC.ambient_temperature_k)
+    balance_j = NMC.heat_capacity_j_k * (kelvin[-1] - kelvin[0]) + float(lost_w[1:] @ np.diff(time))
+    assert released_j == pytest.approx(balance_j, rel=2e-3)
 
 
 def in_a_chamber(degc, c_rate: float = 0.1) -> Measurement:
@@ -95,7 +149,7 @@ CHAMBERS = {
 @pytest.mark.parametrize("what", CHAMBERS)
 def test_a_chamber_or_a_noisy_sensor_was_written_into_the_file_as_heat(what):
     """Twelve times the heat capacity of noise; of a swing 9e5 W/K, which left all 2.8 K of it."""
-    cell, notes = with_fitted_heat(NMC, prepared(NMC, [in_a_chamber(CHAMBERS[what])], 0.9))
+    cell, notes = with_fitted_heat(NMC, seen_by(NMC, in_a_chamber(CHAMBERS[what])))
     assert cell is NMC
     assert notes == (
         "heat: the losses of the cell do not explain the temperature of chamber; it is not used.",
@@ -103,10 +157,8 @@ def test_a_chamber_or_a_noisy_sensor_was_written_into_the_file_as_heat(what):
 
 
 def test_a_record_in_a_chamber_does_not_take_part_in_what_another_tells_of_heat(warming):
-    alone, of_alone = with_fitted_heat(NMC, prepared(NMC, [warming], 0.9))
-    both, of_both = with_fitted_heat(
-        NMC, prepared(NMC, [warming, in_a_chamber(CHAMBERS["a ramp down"])], 0.9)
-    )
+    alone, of_alone = with_fitted_heat(NMC, seen_by(NMC, warming))
+    both, of_both = with_fitted_heat(NMC, seen_by(NMC, warming, in_a_chamber(CHAMBERS["a ramp down"])))
     assert both.heat_capacity_j_k == pytest.approx(alone.heat_capacity_j_k, rel=1e-6)
     assert both.conductance_w_k == pytest.approx(alone.conductance_w_k, rel=1e-6)
     assert of_both[0] == of_alone[0]

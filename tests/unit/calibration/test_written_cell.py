@@ -36,6 +36,19 @@ def test_it_is_the_one_that_shares_are_deviations_from(model):
     assert shares == pytest.approx({"slow": np.exp(SLOW_SD), "loaded": np.exp(-LOADED_SD)})
 
 
+@pytest.mark.parametrize("deviations", [-2.0, 0.0, 0.6, 2.0])
+def test_a_cell_that_is_a_tenth_larger_than_its_start_file_was_written_with_an_empty_state_of_three_volts(
+    model, deviations
+):
+    """Its capacity was 1.05 times the file's at most."""
+    x = np.zeros(model.layout.size)
+    names = [free.name for free in model.free]
+    x[[names.index("negative.capacity"), names.index("positive.capacity")]] = deviations
+    cell = written_cell(model, x)
+    assert cell.rest_voltage_v(0.0)[0] == pytest.approx(cell.lower_voltage_v, abs=1e-3)
+    assert cell.capacity_ah == pytest.approx(model.cell.capacity_ah * np.exp(0.1 * deviations), rel=2e-3)
+
+
 def test_a_loaded_record_that_was_charged_starts_where_a_simulation_of_the_file_does(model):
     slow, loaded = model.records
     assert loaded.start.basis == slow.start.basis == "full charge"
