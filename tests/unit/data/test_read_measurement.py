@@ -303,7 +303,7 @@ def test_a_cell_that_was_taken_off_at_the_end_is_told_how_to_be_read(tmp_path):
     volts = np.array(VOLTAGE)
     volts[-2:] = -0.0006
     message = refusal(tmp_path, text(voltage=volts))
-    assert f"leave out where the cell was not connected: --to-s {TIME[-3]:g}." in message
+    assert f"leave out where the cell was not connected: --to-s {TIME[-3]:g} (" in message
     read_measurement(written(tmp_path, text(voltage=volts)), stop_s=float(TIME[-3]))
     volts[50] = -0.0006
     assert "--to-s" not in refusal(tmp_path, text(voltage=volts))
@@ -617,8 +617,8 @@ def test_an_si_unit_of_the_header_was_overruled_in_silence(tmp_path):
 def test_a_time_in_hours_is_doubted(tmp_path):
     path = written(tmp_path, text(time=TIME / 3600.0))
     (note,) = read_measurement(path).notes
-    assert note.endswith(
-        "every 0.278 ms, quicker than cyclers write them; if the time is in hours: --unit time_s=h."
+    assert (
+        "every 0.278 ms, quicker than cyclers write them; if the time is in hours: --unit time_s=h (" in note
     )
     profile = written(
         tmp_path, "time_s,current_a\n" + "".join(f"{t / 3600},1\n" for t in TIME), "profile.csv"
