@@ -90,7 +90,7 @@ def test_commands_and_experiment_files_are_told_nothing_of_python():
 
 def test_a_discovery_speaks_to_who_asked_for_it():
     cell = aesi.Cell.from_bpx(CELL)
-    record = aesi.Measurement(TIME, CURRENT, VOLTAGE, name="drive")
+    record = aesi.Measurement(TIME, CURRENT, VOLTAGE, name="drive", source="drive.csv")
     case = Case(aesi.HybridModel(cell), (record,), reader="python")
     assert any(note.endswith("(in Python: columns of aesi.read_measurement).") for note in case.assumed)
 
