@@ -51,18 +51,20 @@ BATCH_COLUMNS = (
     "metrics.`after/test_rmse_mv`",
     "tags.`batch`",
 )
+UNFOLDED = "once they are sorted by a figure: in the order of time MLflow folds them into their runs"
 HOW_TO_READ = (
     "A run is one `aesi run`, and the table lists those alone: it loads a hundred rows at a time, which one run's "
     "candidates would fill. With the filter ``tags.`aesi.kind` = 'candidate'`` it lists candidates (the one that the "
-    "models come from is tagged `aesi.chosen`), with `'model'` the final models. `free_run/` is without any measured "
-    "voltage after the first sample, `one_step/` and `intervals/` are one step ahead. Sort candidates by "
+    f"models come from is tagged `aesi.chosen`), with `'model'` the final models, {UNFOLDED}. `free_run/` is without "
+    "any measured voltage after the first sample, `one_step/` and `intervals/` are one step ahead. Sort candidates by "
     "`free_run/valid_mser_pct` (against the declared model; `free_run/valid_mser_recalibrated_pct` against the "
     "recalibrated one): selection never meets the test records."
 )
 HOW_TO_READ_DISCOVERIES = (
-    "A run is one `aesi discover`, and the table lists those alone; without the filter it also lists the hypotheses "
-    "that were fitted, with what each says of unseen data (`gain_nats`). `finding` is the verdict in a line; the "
-    "report is among the artifacts."
+    "A run is one `aesi discover`, and the table lists those alone; with the filter "
+    "``tags.`aesi.kind` = 'hypothesis'`` it lists the hypotheses, with what each says of unseen data (`gain_nats`), "
+    f"{UNFOLDED}; one that was fitted again stands there again. `finding` is the verdict in a line; the report is "
+    "among the artifacts."
 )
 HOW_TO_READ_BATCHES = (
     "A run is one `aesi batch`, and the table lists its cells: what the model of each lacks, or why the cell could not "
