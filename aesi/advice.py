@@ -60,6 +60,9 @@ OF_CALL = {
 }
 """Option of other commands -> the argument of the same meaning, in the functions that have one."""
 
+OF_PLAN = {"--soc0": "soc0", "--soh": "soh"}
+"""Option of other commands -> the column of a batch's table with the same meaning."""
+
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z0-9-]*")
 TELLS_APART = ("in Python", "on the command line")
 """What a sentence holds that speaks to both readers by itself."""
@@ -91,6 +94,19 @@ def with_arguments(sentence: str) -> str:
     if of_reading:
         names.append(f"{_listed(of_reading)} of aesi.read_measurement")
     return f"{sentence.removesuffix('.')} (in Python: {'; '.join(names)})." if names else sentence
+
+
+def with_columns(sentence: str) -> str:
+    """The sentence, with what its options are for one cell of a batch: a column of the table, or a file that is written
+    anew, since a batch reads the files of all its cells alike."""
+    options = dict.fromkeys(OPTION.findall(sentence))
+    columns = [OF_PLAN[option] for option in options if option in OF_PLAN]
+    told = [f"the column {_listed(columns)} of the batch's table"] if columns else []
+    if any(option in OF_READING for option in options):
+        told.append(
+            "in a batch these options hold for all cells; for this one alone give them to `aesi data convert`"
+        )
+    return f"{sentence.removesuffix('.')} ({'; '.join(told)})." if told else sentence
 
 
 def advises_python(function: Callable[Arguments, T]) -> Callable[Arguments, T]:

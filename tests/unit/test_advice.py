@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 import aesi
-from aesi.advice import OF_CALL, OF_READING, told, with_arguments, with_keys
+from aesi.advice import OF_CALL, OF_READING, told, with_arguments, with_columns, with_keys
 from aesi.errors import AesiError, DataError
 from aesi.pipeline.discovery.discover import Case
 
@@ -86,6 +86,15 @@ def test_commands_and_experiment_files_are_told_nothing_of_python():
         told("python", sentence)
         == "give A, or declare it: --unit current_a=mA (in Python: units of aesi.read_measurement)."
     )
+
+
+def test_a_start_is_a_column_of_a_batch_s_table():
+    told = "(the column soc0 of the batch's table)."
+    assert (
+        with_columns("it is none of this cell; give --soc0.")
+        == f"it is none of this cell; give --soc0 {told}"
+    )
+    assert with_columns("there is no file a.csv.") == "there is no file a.csv."
 
 
 def test_a_discovery_speaks_to_who_asked_for_it():
