@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aesi.data.convert import write_csv
-from aesi.data.read import Sign, read_measurement
+from aesi.data.read import Reading, Sign, read
 from aesi.errors import DataAway, DataError
 
 TIMEOUT_S = 30
@@ -47,7 +47,7 @@ def fetch(remote: Remote, folder: Path) -> Path:
             if remote.columns is None:
                 shutil.copyfile(raw, ready)
             else:
-                record = read_measurement(raw, remote.columns, remote.sign, max_rows=None)
+                record = read(raw, Reading(remote.columns, sign=remote.sign), max_rows=None)
                 write_csv(ready, record.to_frame())
             os.replace(ready, target)
     except DataError:

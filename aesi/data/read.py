@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from aesi.advice import advises_python, with_arguments
 from aesi.data.channels.checks import Columns, Context, check_constant, check_finite, check_ranges, check_time
 from aesi.data.channels.columns import QUANTITIES, REQUIRED, Mapped
 from aesi.data.channels.gaps import ambiguous_charge_notes, without_gaps
@@ -23,6 +24,7 @@ from aesi.data.readers.formats.format import Sign
 from aesi.data.readers.table import TableFile
 from aesi.data.reading import Duplicates, Reading, by_quantity, column_name, record_name
 from aesi.data.resample import decimate
+from aesi.data.state import Direction
 from aesi.errors import InputError
 from aesi.records import Measurement
 
@@ -32,6 +34,7 @@ MAX_ROWS = 2_000_000
 """A tenth of a second for two days; more rows are decimated, and a note says so."""
 
 
+@advises_python
 def read_measurement(
     path: str | Path,
     columns: Mapping[str, str | float | None] | None = None,
@@ -40,6 +43,7 @@ def read_measurement(
     *,
     units: Mapping[str, str] | None = None,
     state: str | None = None,
+    state_words: Mapping[str, Direction] | None = None,
     cycle: int | str | None = None,
     step: int | str | None = None,
     start_s: float | None = None,
@@ -56,7 +60,8 @@ def read_measurement(
         In BDF it is charge.
     max_rows : most rows; more are decimated (interval averages). None keeps all.
     units : quantity -> unit of the file's column, where it is not SI: {"current_a": "mA", "time_s": "h:m:s"}.
-    state : name of the column with the direction of a current that has no sign.
+    state : name of the column with the direction of a current that has no sign.  state_words : word there -> charge,
+        discharge or rest, for words that are not known.
     cycle, step : keep the rows with this number (or "from:to").  start_s, stop_s : keep rows between these times, s.
     duplicates : which of several rows with the same time to keep; None refuses them, but keeps the first in known
         exports.
@@ -75,13 +80,15 @@ def read_measurement(
         {quantity: column_name(name) for quantity, name in given.items()},
         by_quantity("units", units),
         sign,
+        by_quantity("state_words", state_words, "words"),
         cycle=None if cycle is None else str(cycle),
         step=None if step is None else str(step),
         start_s=start_s,
         stop_s=stop_s,
         duplicates=duplicates,
     )
-    return read(path, reading, max_rows, name)
+    found = read(path, reading, max_rows, name)
+    return replace(found, notes=tuple(map(with_arguments, found.notes)))
 
 
 def read(

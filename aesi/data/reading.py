@@ -31,7 +31,11 @@ SUFFIXES = (
 )
 """Suffixes of files that are not part of a record's name."""
 
-EXAMPLES = {"columns": '{"current_a": "I"}', "units": '{"current_a": "mA"}'}
+EXAMPLES = {
+    "columns": '{"current_a": "I"}',
+    "units": '{"current_a": "mA"}',
+    "state_words": '{"E": "discharge"}',
+}
 
 
 @dataclass(frozen=True)
@@ -96,16 +100,16 @@ def column_name(given: Any) -> Any:
     return str(given)
 
 
-def by_quantity(name: str, given: Any) -> dict[str, Any]:
+def by_quantity(name: str, given: Any, of: str = "quantities") -> dict[str, Any]:
     """An argument that has a value for each quantity, as a dict; an empty one for None.
 
-    name : of the argument, for the sentence.  Raises DataError where it is no mapping.
+    name, of : of the argument and what its keys are, for the sentence.  Raises DataError where it is no mapping.
     """
     if given is None:
         return {}
     if not isinstance(given, Mapping):
         raise DataError(
-            f"{name} = {given!r} names no quantities; give a dict from each to its value, as in {EXAMPLES[name]}."
+            f"{name} = {given!r} names no {of}; give a dict from each to its value, as in {EXAMPLES[name]}."
         )
     return dict(given)
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from aesi.advice import advises_python, with_arguments
 from aesi.calibration import Calibration, Conditions
 from aesi.calibration import calibrate as fit_cell
 from aesi.calibration.records.spectra import check_spectra
@@ -50,6 +51,7 @@ MOST_HOLDOUT, MOST_EFFECTS = 0.9, 10
 """Upper limits of `holdout` and `max_effects`, as of `--holdout` and `--max-effects`."""
 
 
+@advises_python
 def discover(
     cell: Declared,
     data: Data,
@@ -112,6 +114,7 @@ def discover(
         _names("without", without),
         model,
         good=known,
+        reader="python",
     )
     case = with_cold_admitted(within_budget(case.checked()))  # refused before anything is searched
     finding = Finding(case, run_case(case, folder, progress))
@@ -120,6 +123,7 @@ def discover(
     return finding
 
 
+@advises_python
 def calibrate(
     cell: Declared,
     data: Data,
@@ -184,7 +188,8 @@ def calibrate(
     check_distinct_spectra(conditions.spectra, ())
     check_spectra(scaled, conditions.spectra)
     found = fit_cell(declared, measurements, conditions, starts=starts, seed=seed)
-    return replace(found, notes=(*omitted_effect_sentences(given), *body, *found.notes))
+    notes = (*omitted_effect_sentences(given), *body, *found.notes)
+    return replace(found, notes=tuple(map(with_arguments, notes)))
 
 
 def _read_spectra(given: Spectra) -> tuple[Spectrum, ...]:

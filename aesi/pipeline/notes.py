@@ -20,11 +20,14 @@ from aesi.physics.simulation import MODEL_WORDS, model_with
 from aesi.physics.start.temperature import contradicted_temperature
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.product.prediction import Prediction
-from aesi.records import Hold, Measurement, Run, at_its_temperature, measured_on_case
+from aesi.records import LABORATORY, Hold, Measurement, Run, at_its_temperature, measured_on_case
 
 SEPARATOR = ": "
 MERE_NAMES = re.compile(r"[^\s,]+(, [^\s,]+)*")
 """Pattern by which notes of several records are joined: a record's name without a space. Other notes stay separate."""
+OTHER_TEMPERATURE = {LABORATORY: "", "": "; for another one give its temperature_degc"}
+"""Source of a record that is no file -> how it is given another temperature: one of the virtual laboratory, which makes
+it at the file's, is not; one that was made in memory takes it as an argument."""
 TELLING_K = 5.0
 """K from a cell's reference temperature beyond which activation energies tell: with 20 kJ/mol rates differ by a
 sixth. A convention."""
@@ -63,10 +66,12 @@ def temperature_sentence(cell: Cell, record: Measurement, effects: Sequence[Acti
         return f"{record.name}: {at_its_temperature(record.temperature_degc)}{of_case}{beside}."
     degc = cell.initial_temperature_k - ZERO_CELSIUS_K
     beside = f" and {inferred} {'change' if several else 'changes'} it" if inferred else ""
-    return (
-        f"{record.name}: no temperature column; taken at {degc:.4g} degC, as the cell's file declares{beside}; "
-        "for another one add a column temperature_degc, or give --column temperature_degc=40."
+    another = OTHER_TEMPERATURE.get(
+        record.source,
+        "; for another one add a column temperature_degc, or give --column temperature_degc=40",
     )
+    told = f"{record.name}: no temperature column; taken at {degc:.4g} degC, as the cell's file declares"
+    return f"{told}{beside}{another}."
 
 
 def _on_case(cell: Cell, effects: Sequence[ActiveEffect]) -> HeatBalance | None:

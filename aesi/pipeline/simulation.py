@@ -292,6 +292,7 @@ def _record(profile: CurrentProfile, file: Path, hold: Hold | None) -> Measureme
         voltage,
         profile.temperature_degc,
         record_name(file),
+        str(file),
         hold=hold,
     )
 

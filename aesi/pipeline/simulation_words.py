@@ -154,8 +154,8 @@ def exact_start_sentence(record: Measurement, prediction: Prediction, model: Hyb
     worth_v = model.start_worth_v(record, soc0, TOLD_SD, prediction.physics_v)
     return (
         f"{record.name}: the band takes the initial state of charge of {soc0:.4g} as exact; an error of {TOLD_SD:g} in "
-        f"it changes the voltage by {MV_PER_V * rms(worth_v):.1f} mV RMS along this record. --soc0-sd widens the band "
-        "by the uncertainty of the initial state."
+        f"it changes the voltage by {MV_PER_V * rms(worth_v):.1f} mV RMS along this record. --soc0-sd, beside "
+        "--soc0, widens the band by the uncertainty of the initial state."
     )
 
 

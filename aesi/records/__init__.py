@@ -6,6 +6,7 @@ SI units and seconds; current is positive on discharge; voltage error e = V_meas
 from aesi.records.error_series import INPUT_NAMES, ErrorModel, ErrorSeries, FreeRun
 from aesi.records.failed import Failed
 from aesi.records.measurement import (
+    LABORATORY,
     Hold,
     Measurement,
     Spectrum,
@@ -20,6 +21,7 @@ from aesi.records.split import ROLES, HeldOutDrive, LeftOutDrives, Role, Split
 
 __all__ = [
     "INPUT_NAMES",
+    "LABORATORY",
     "ROLES",
     "ErrorModel",
     "ErrorSeries",

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 Hold = Literal["linear", "backward"]
 """How the current runs between samples: straight lines, or constant since the row before (as loggers do)."""
+LABORATORY = "virtual laboratory (PyBaMM)"
+"""Source of a record that was simulated, not measured."""
 
 
 SLOW_SAMPLING_S = 5.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
     from flows.tracking.tracker import Tracker
 
 Runner = Literal["local", "dask"]
+ERRORS = {f"{state}_test_mv": f"{state}/test_rmse_mv" for state in ("before", "recalibrated", "after")}
+"""Column of a batch's summary -> the metric by which a discovery tracks the same."""
 
 
 def batch(
@@ -70,7 +73,7 @@ def batch(
             console.say(f"{len(rows)}/{len(jobs)} {row['name']}: {told}")
             title = f"{source.name}: what the models of these cells lack"
             page = write_summary(out, _ordered(jobs, rows), title)
-            _track(tracker, row)
+            _track(tracker, row, source.name)
         _track_summary(tracker, rows, out)
         failed = sum(row["status"] == "failed" for row in rows.values())
         console.say(f"Finished in {duration(time.monotonic() - started)}; {failed} failed. Summary: {page}")
@@ -101,6 +104,7 @@ def _tracked(
     from flows.tracking.experiment_log import CODE
     from flows.tracking.provenance import versions
     from flows.tracking.tracker import Subject
+    from flows.tracking.view import BATCH_COLUMNS, CELLS, HOW_TO_READ_BATCHES, experiment_tags
 
     of_jobs = {job.name: job.unusable or job.key(settings.key) for job in jobs}
     key = sha256(repr(sorted(of_jobs.items())).encode()).hexdigest()[:16]
@@ -108,29 +112,46 @@ def _tracked(
     subject = Subject("batch", settings.seed, key, "batch", quiet)
     with tracked_job(subject, asked["source"], console) as tracker:
         if tracker is not None:
+            tracker.about(experiment_tags(HOW_TO_READ_BATCHES, BATCH_COLUMNS, CELLS))
             content = {"plan_digest": key, "cells": len(jobs), "versions": versions()}
             tracker.parameters(asked | content, {CODE: source_digest()})
         yield tracker
 
 
-def _track(tracker: Tracker | None, row: dict[str, Any]) -> None:
-    """One cell or check-up: its errors and state of health as metrics, the finding as a parameter."""
+def _track(tracker: Tracker | None, row: dict[str, Any], source: str) -> None:
+    """One cell or check-up: its errors and state of health as metrics, the finding as a parameter.
+
+    source : name of the folder or table, by which cells of several batches are told apart.
+    """
     if tracker is None:
         return
-    metrics = {k: float(v) for k, v in row.items() if isinstance(v, int | float) and k != "seconds"}
+    numbers = {k: float(v) for k, v in row.items() if isinstance(v, int | float) and k != "seconds"}
+    metrics = {ERRORS.get(name, name): value for name, value in numbers.items()}
     told = {k: str(v) for k, v in row.items() if isinstance(v, str) and v}
     failed = row.get("reason") if row["status"] == "failed" else None
     label, seconds = f"cell:{row['name']}", row.get("seconds", 0.0)
-    tracker.nested(label, row["name"], "cell", told, metrics, failed=failed, seconds=seconds)
+    tags = {"batch": source}
+    tracker.nested(label, row["name"], "cell", told, metrics, failed=failed, seconds=seconds, tags=tags)
 
 
 def _track_summary(tracker: Tracker | None, rows: dict[str, dict[str, Any]], out: Path) -> None:
     if tracker is None:
         return
+    from flows.tracking.view import NOTE
+
     done = [row for row in rows.values() if row["status"] == "done"]
     tracker.metrics({"done": float(len(done)), "failed": float(len(rows) - len(done))})
+    tracker.parameters({}, {NOTE: _note(list(rows.values()))})
     for name in (SUMMARY_TABLE, SUMMARY_PAGE):
         tracker.files(out / name)
+
+
+def _note(rows: Sequence[dict[str, Any]]) -> str:
+    """What came of a batch, in a sentence: how many cells ended with each verdict, and how many failed."""
+    ends = Counter(row["verdict"] if row["status"] == "done" else row["status"] for row in rows)
+    counts = ", ".join(f"{count} {end}" for end, count in sorted(ends.items()))
+    cells = "1 cell" if len(rows) == 1 else f"{len(rows)} cells"
+    return f"{cells}: {counts}. The page of all, {SUMMARY_PAGE}, and {SUMMARY_TABLE} are among the artifacts."
 
 
 def _ordered(jobs: Sequence[Job], rows: dict[str, dict[str, Any]]) -> list[dict[str, Any]]:

@@ -11,7 +11,8 @@ from typing import Any
 from aesi.errors import InputError
 from aesi.pipeline.report.compare import ComparedRun, write_comparison
 from aesi.pipeline.written import COMPARISON, FINDING
-from flows.tracking.store import Store, beginning, job_of
+from flows.tracking.experiment_log import OF_A_MODEL
+from flows.tracking.store import Store, beginning, is_of_experiment, job_of
 from flows.tracking.tracker import was_cut
 
 OF_THE_RESULT = ("chosen_candidate", "chosen_model")
@@ -67,13 +68,19 @@ def _compared(store: Store, experiment: str, run: Any) -> ComparedRun:
         started=datetime.fromtimestamp(run.info.start_time / 1000, UTC).strftime("%Y-%m-%d %H:%M"),
         job=job_of(run),
         settings={k: v for k, v in run.data.params.items() if k not in OF_THE_RESULT},
-        metrics=run.data.metrics,
+        metrics=_metrics(run),
         chosen=run.data.params.get("chosen_model", ""),
         judged_on=_judged_on(run.data.params),
         tags=run.data.tags,
         comparison=_content(store, run, COMPARISON),
         discovery=_content(store, run, FINDING) if "verdict" in run.data.tags else {},
     )
+
+
+def _metrics(run: Any) -> dict[str, float]:
+    """By the names of now: runs of earlier versions have a figure of their chosen model by that of a whole run."""
+    names = OF_A_MODEL if is_of_experiment(run) else {}
+    return {names.get(name, name): value for name, value in run.data.metrics.items()}
 
 
 def _judged_on(params: Mapping[str, str]) -> str:

@@ -119,7 +119,9 @@ def _chosen(store: Store, name: str, run_ids: Sequence[str]) -> tuple[list[Any],
         asked = {run.info.run_id: run for run in (_by_id(finished, i, name) for i in run_ids)}
         return _of_one_setting(asked), _LeftOut()
     if not finished:
-        raise InputError(f"experiment {name!r} has no finished run yet; `aesi run` makes one.")
+        raise InputError(
+            f"experiment {name!r} has no finished run yet; `aesi run` makes one{_of_other_jobs(store, name)}."
+        )
     newest = finished[0].data.tags
     of_program: dict[str, Any] = {}
     of_others: dict[str, Any] = {}
@@ -133,6 +135,16 @@ def _chosen(store: Store, name: str, run_ids: Sequence[str]) -> tuple[list[Any],
             otherwise_set.append(run)
     left_out = {seed: run for seed, run in of_others.items() if seed not in of_program}
     return _by_seed(of_program), _LeftOut(tuple(otherwise_set), tuple(_by_seed(left_out)))
+
+
+def _of_other_jobs(store: Store, name: str) -> str:
+    """A clause on discoveries, batches and benchmarks that are tracked under the name; '' for fewer than two."""
+    found = store.find_experiment(name)
+    jobs = [] if found is None else store.jobs(found)
+    others = sum(run.info.status == "FINISHED" and not is_of_experiment(run) for run in jobs)
+    if others < 2:
+        return ""
+    return f". Discoveries, batches and benchmarks have none; `aesi compare {name}` shows the {others} that are there"
 
 
 def _finished(store: Store, name: str) -> list[Any]:

@@ -14,13 +14,14 @@ from flows.base import environment
 from flows.base.console import first_line
 from flows.base.store_address import PLACE, checked_address, without_login
 from flows.tracking.store import Store
-from flows.tracking.view import VIEW, view_of
+from flows.tracking.view import TRAINING, VIEW, view_of
 
 if TYPE_CHECKING:
     from optuna.storages import BaseStorage
 
-TRAINING = "#/experiments?workflowType=machine_learning"
-"""MLflow opens on what it has for language models, where runs are hard to find."""
+LOOPBACK = ("localhost", "127.0.0.1", "::1")
+EVERY_ADDRESS = ("0.0.0.0", "::")
+"""Hosts that stand for all addresses of this machine."""
 # The jobs that MLflow would run beside the server are for language models, and take eight processes.
 QUIETLY = {
     "MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false",
@@ -49,16 +50,48 @@ def serve(port: int, host: str, uri: str | None) -> None:
         uri,
     ]
     command += ["--host", host, "--port", str(port), "--workers", "1"]
-    address = f"http://{host}:{port}/"
-    print(f"MLflow shows the runs at {address}{TRAINING} (Ctrl-C ends it)")
+    address = f"http://{_shown(host)}:{port}/"
+    print(f"MLflow shows the runs at {address}#/experiments?{TRAINING} (Ctrl-C ends it)")
     for name, view in _views(store):
         print(f"  {name}: {address}{view}")
     if not store.all_jobs():
         print(f"  Nothing is tracked in {without_login(uri)} yet; {PLACE}.")
     sys.stdout.flush()
-    os.execve(
-        sys.executable, command, os.environ | QUIETLY
-    )  # so that whatever ends this process ends the server
+    surroundings = _admitted(host, port) | os.environ | QUIETLY
+    os.execve(sys.executable, command, surroundings)  # so that whatever ends this process ends the server
+
+
+def _shown(host: str) -> str:
+    """A host as it is written in an address; where all of this machine's are served, its name."""
+    host = socket.gethostname() if host in EVERY_ADDRESS else host
+    return f"[{host}]" if ":" in host else host
+
+
+def _admitted(host: str, port: int) -> dict[str, str]:
+    """MLflow's settings by which other machines are answered under each name and address of this one.
+
+    Without them it refuses whoever names another host than localhost, and what a page asks for from such an address.
+    """
+    if host in LOOPBACK:
+        return {}
+    names = [*LOOPBACK, host, socket.gethostname(), socket.getfqdn(), *_addresses()]
+    hosts = list(dict.fromkeys(f"[{name}]" if ":" in name else name for name in names))
+    return {
+        "MLFLOW_SERVER_ALLOWED_HOSTS": ",".join(f"{one},{one}:{port}" for one in hosts),
+        "MLFLOW_SERVER_CORS_ALLOWED_ORIGINS": ",".join(f"http://{one}:{port}" for one in hosts),
+    }
+
+
+def _addresses() -> list[str]:
+    """The addresses of this machine, IPv4 and IPv6."""
+    import psutil
+
+    known = [one for each in psutil.net_if_addrs().values() for one in each]
+    return [
+        one.address
+        for one in known
+        if one.family in (socket.AF_INET, socket.AF_INET6) and "%" not in one.address
+    ]
 
 
 def _views(store: Store) -> list[tuple[str, str]]:

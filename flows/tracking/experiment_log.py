@@ -46,6 +46,8 @@ WITH_UNIT = {
     "bands_by_horizon": "bands_by_horizon_s",
 }
 """Names for sections whose entries are horizons."""
+OF_A_MODEL = {"seconds": "fit_and_evaluation_s"}
+"""Names for figures of the chosen model that would be taken for the run's own: a search takes longer."""
 
 
 def track_start(tracker: Tracker, config: ExperimentConfig, loaded: Loaded, folder: Path) -> None:
@@ -249,7 +251,7 @@ def _numbers(row: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
             below = prefix or ("" if name in HEADLINES else "tables/")
             result |= _numbers(value, f"{below}{WITH_UNIT.get(name, name)}/")
         elif isinstance(value, int | float) and not isinstance(value, bool):
-            result[f"{prefix}{name}"] = float(value)
+            result[f"{prefix}{OF_A_MODEL.get(name, name)}"] = float(value)
             if name.endswith(
                 "_width_v"
             ):  # what is read is in millivolts; the summary's own name stays beside it

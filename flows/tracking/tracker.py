@@ -25,6 +25,7 @@ from flows.tracking.delivery import deliver
 from flows.tracking.outbox import FLUSH_S, Outbox
 from flows.tracking.provenance import source_tags
 from flows.tracking.store import EXPERIMENT, JOB, KIND, Store, now_ms
+from flows.tracking.view import TRAINING
 
 PARAMETER_LIMIT = 6000  # MLflow cuts longer ones off
 CUT = "… sha256 "
@@ -124,7 +125,7 @@ class Tracker:
     def address(self) -> str:
         """Where MLflow's UI shows the run: on the server, or on the one that `aesi ui` starts."""
         server = without_login(self.store.uri) if self.store.uri.startswith("http") else LOCAL_UI
-        return f"{server.rstrip('/')}/#/experiments/{self._experiment_id}/runs/{self.run_id}"
+        return f"{server.rstrip('/')}/#/experiments/{self._experiment_id}/runs/{self.run_id}?{TRAINING}"
 
     def parameters(self, values: Mapping[str, Any], tags: Mapping[str, str] | None = None) -> None:
         """Parameters of the parent run.

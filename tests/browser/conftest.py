@@ -69,7 +69,14 @@ class Page:
             assert time.monotonic() < end, f"{condition} did not come true in {timeout_s:g} s"
             time.sleep(0.05)
 
-    def open(self, path, width=1280, height=900, dark=False):
+    def open(
+        self,
+        path,
+        width=1280,
+        height=900,
+        dark=False,
+        shown="document.documentElement?.dataset.plots === 'drawn'",
+    ):
         metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
         self.call("Emulation.setDeviceMetricsOverride", **metrics)
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
@@ -77,7 +84,7 @@ class Page:
         self.errors.clear()
         self.requests.clear()
         self.call("Page.navigate", url=Path(path).resolve().as_uri())
-        self.wait_for("document.documentElement?.dataset.plots === 'drawn'")
+        self.wait_for(shown)
 
     def drag(self, element, start, stop):
         """Press, move and release the mouse over an element, at shares of its width."""

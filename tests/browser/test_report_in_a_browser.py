@@ -3,6 +3,7 @@
 import pytest
 
 from aesi.pipeline.report import write_discovery_report, write_run_report
+from aesi.pipeline.report.compare import ComparedRun, write_comparison
 
 
 @pytest.fixture(scope="module")
@@ -102,3 +103,17 @@ def test_a_hundred_thousand_samples_stay_smooth(page, views, tmp_path):
         await new Promise(done => setTimeout(done, 61)); await Plotly.relayout({div}, {{}});
         return performance.now() - start; }})()"""
     assert page.evaluate(zoom) < 2000
+
+
+def test_a_long_setting_pushed_all_runs_but_the_first_off_the_page(page, tmp_path):
+    """The digests of five records, in one line, took half of the page for each run."""
+    digests = [", ".join(f"{16 * run + record:016x}" for record in range(5)) for run in range(4)]
+    keys = [f"data.key_{k}" for k in range(9)]  # more than there are runs: a column is a run
+    runs = [
+        ComparedRun(f"{k:032x}", "smoke, seed 0", "smoke", "2026-01-01 00:00", dict.fromkeys(keys, long), {})
+        for k, long in enumerate(digests)
+    ]
+    table = "document.querySelector('#settings table')"
+    page.open(write_comparison(tmp_path / "page.html", runs), 1280, shown=f"{table} !== null")
+    assert page.evaluate(f"{table}.rows[0].cells.length") == 5
+    assert page.evaluate(f"{table}.scrollWidth <= {table}.parentElement.clientWidth")

@@ -124,13 +124,22 @@ def check_resolution(columns: Columns, context: Context) -> None:
     several = same & np.any(others, axis=0)
     if int(np.sum(several)) <= ROUNDED_SHARE * len(time_s):
         return
-    row, apart = int(np.argmax(several)) + 1, np.diff(np.unique(time_s))
-    every = f" {np.median(apart):.4g} s apart" if apart.size else ""
+    row, (stamps, rows) = int(np.argmax(several)) + 1, np.unique(time_s, return_counts=True)
+    if len(stamps) == 1:
+        raise DataError(
+            f"{context.at('time_s', row)}: the time is {stamps[0]:.10g} s in all {len(time_s):,} rows, so that it is "
+            "that of no test; name another column: --column time_s=NAME."
+        )
+    mixed = (
+        f" Or the file holds {rows[0]} cells or channels, a row of each at every stamp: give each a file of its own."
+        if np.all(rows == rows[0])
+        else ""
+    )
     raise DataError(
         f"{context.at('time_s', row)}: {np.mean(several):.0%} of the rows have the stamp of the row before and another "
-        f"current or voltage: the time was written too coarsely for the rate of the rows, with stamps{every}; export "
-        "it with its decimals, or the whole date and time. (--duplicates first would keep one row of each and drop "
-        "the rest.)"
+        "current or voltage: the time was written too coarsely for the rate of the rows, with stamps "
+        f"{np.median(np.diff(stamps)):.4g} s apart; export it with its decimals, or the whole date and time.{mixed} "
+        "(--duplicates first would keep one row of each and drop the rest.)"
     )
 
 

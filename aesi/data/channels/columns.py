@@ -168,7 +168,7 @@ class _Finder:
     def missing(self, quantities: list[str]) -> DataError:
         """The error for missing quantities, with the options that would map them."""
         header = self._table.header
-        likely = [name for name in (headers.nearest(q, header) for q in quantities) if name]
+        likely = [name for name in (headers.likeliest(q, header) for q in quantities) if name]
         found = f"; the nearest: {', '.join(repr(name) for name in likely)}" if likely else ""
         if set(quantities) <= set(SELECTORS):
             options = " ".join(f"--column {q}=NAME" for q in quantities)

@@ -9,16 +9,17 @@ from aesi.data import units
 from aesi.data.readers.formats.format import plain
 from aesi.data.readers.layout import COLUMN_NUMBER
 
+OF_PLACE = r"\bt[ _]?(cell|can|case|surf|skin|batt|core|amb|chamber|env|room)"
+"""Pattern of names of a temperature by its place, such as T_cell."""
 LIKELY = {
     "time_s": r"time|zeit|elapsed|\bt\b|^t$|duration",
     "current_a": r"current|strom|\bamps?\b|\bi\b|^<?i>?\b|ampere",
     "voltage_v": r"volt|spannung|ecell|ewe|potential|\b[uv]\b",
-    "temperature_degc": r"temp|°[cf]|deg[cf]|celsius|thermo|\bt[ck]?\d\b|"
-    r"\bt[ _]?(cell|can|case|surf|skin|batt|core|amb|chamber|env|room)",
+    "temperature_degc": r"temp|°[cf]|deg[cf]|celsius|thermo|\bt[ck]?\d\b|" + OF_PLACE,
     "state": r"^(state|status|step type|mode|md|command|zustand|direction)\b",
 }
 UNLIKELY = {
-    "time_s": r"step|rest\b|date|stamp|real|absolute|cycle|dpt|dt\b|/dt",
+    "time_s": r"step|rest\b|date|stamp|real|absolute|cycle|dpt|dt\b|/dt|" + OF_PLACE,
     "current_a": r"density|range|limit|capacity|control|set\b|rate|time|temp|dq|power|shunt|offset",
     "voltage_v": r"limit|control|set\b|max|min|dv|range|aux|offset|power|upper|lower",
     "temperature_degc": r"time|/dt|set\b|limit|circuit|\bt?amb|chamber|env|room|umgebung|kammer",
@@ -26,6 +27,8 @@ UNLIKELY = {
 }
 WHOLE_TIME = r"total|test|cumul|elapsed"
 """Pattern of names of the whole test's time; beside such a column, a plain 'Time' restarts with each step."""
+STAMP = r"stamp|date ?time|\bdat(e|um)\b|uhrzeit"
+"""Pattern of names of a date and time of day, which tell the time of a test where no other column does."""
 NO_TEMPERATURE = r"time|/dt|set\b|limit|circuit"
 """Pattern of names that only look like a temperature."""
 RATE_OR_POWER = r"\bc[-_ ]?rate\b|\bpower\b|\bleistung\b"
@@ -44,6 +47,12 @@ def nearest(quantity: str, header: Sequence[str], doubtful: bool = False) -> str
     likely = [name for name in header if quantity in LIKELY and re.search(LIKELY[quantity], plain(name))]
     best = min(likely, key=lambda name: _doubt(quantity, name), default=None)
     return best if best is None or doubtful or not _doubt(quantity, best)[0] else None
+
+
+def likeliest(quantity: str, header: Sequence[str]) -> str | None:
+    """The column to propose for the quantity: the nearest, or for the time one of dates where none else tells it."""
+    stamps = (name for name in header if quantity == "time_s" and re.search(STAMP, plain(name)))
+    return nearest(quantity, header) or next(stamps, None)
 
 
 def temperatures(header: Sequence[str]) -> list[str]:
@@ -92,7 +101,7 @@ def unit_of(quantity: str, name: str) -> str | None:
 
 def options(quantities: Iterable[str], header: Sequence[str]) -> str:
     """The options that map the quantities to the most likely columns, with their units where these are not SI."""
-    return " ".join(of_column(quantity, nearest(quantity, header) or "NAME") for quantity in quantities)
+    return " ".join(of_column(quantity, likeliest(quantity, header) or "NAME") for quantity in quantities)
 
 
 def of_column(quantity: str, name: str) -> str:

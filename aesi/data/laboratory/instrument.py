@@ -8,7 +8,7 @@ import numpy as np
 
 from aesi.data.laboratory.simulator import TrueRun
 from aesi.numerics.typing import Array
-from aesi.records import Measurement
+from aesi.records import LABORATORY, Measurement
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Instrument:
             voltage_v=_stepped(voltage, self.voltage_step_v),
             temperature_degc=_stepped(warmth, self.temperature_step_k) if temperature else None,
             name=name,
-            source="virtual laboratory (PyBaMM)",
+            source=LABORATORY,
             notes=notes,
         )
 

@@ -253,4 +253,4 @@ def _advice(cell: str, name: str, layout: Layout) -> str:
         return (
             ": write nothing between the thousands and a decimal point, or separate the cells by semicolons"
         )
-    return ""
+    return ": correct it, or remove the row"

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from aesi.advice import with_columns
 from aesi.calibration import Conditions
 from aesi.data.reading import Reading
 from aesi.errors import AesiError
@@ -65,7 +66,7 @@ def run_job(job: Job, out: Path, settings: Settings) -> dict[str, Any]:
             folder / ROW, json.dumps({"key": key, "code": source_digest(), "row": row}, indent=1) + "\n"
         )
     except AesiError as error:
-        return _failed(job, folder, str(error))
+        return _failed(job, folder, with_columns(str(error)))
     except OSError as error:
         return _failed(job, folder, f"{error.filename or 'a file'}: {error.strerror or error}")
     return row

@@ -102,7 +102,8 @@ def _check_names(source: Path, names: list[str]) -> None:
             other = first[name.lower()]
             also = "" if other == name else f" and {other!r}, which differ in capitals alone"
             raise InputError(
-                f"{source}: two rows are named {name!r}{also}; names tell the folders of results apart."
+                f"{source}: two rows are named {name!r}{also}; names tell the folders of results apart: give each row "
+                "its own."
             )
         first[name.lower()] = name
         if Path(name).name != name or name.startswith("."):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from aesi.advice import with_keys
 from aesi.data.read import Reading, read
 from aesi.data.reading import record_names
 from aesi.errors import ConfigError, DataError
@@ -15,7 +16,7 @@ from aesi.pipeline.discovery.cold import with_cold_admitted
 from aesi.pipeline.discovery.discover import Case
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.sections import DiscoverConfig
-from aesi.pipeline.experiment.sources import cell_path, discovery_records, with_keys
+from aesi.pipeline.experiment.sources import cell_path, discovery_records
 from aesi.records import Hold
 
 
@@ -94,7 +95,7 @@ def case_of_experiment(config: ExperimentConfig) -> Case:
         model=config.cell.model,
         soh=config.cell.soh,
         good=good,
-        of_experiment=True,
+        reader="experiment",
     )
     try:
         return with_cold_admitted(within_budget(case.checked()))

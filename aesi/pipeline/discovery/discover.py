@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from aesi.advice import Reader, told
 from aesi.constants import MILLI, MV_PER_V, ZERO_CELSIUS_K
 from aesi.numerics.files.whole import write_whole
 from aesi.physics.cell import Soh
@@ -19,7 +20,6 @@ from aesi.physics.effects import CATALOGUE, Effect, known_effects, selected
 from aesi.physics.folded import folded
 from aesi.physics.simulation import ModelName
 from aesi.pipeline.distinct import check_distinct
-from aesi.pipeline.experiment.sources import with_keys
 from aesi.pipeline.notes import soh_day_sentences, temperature_range_sentences, temperature_sentence, together
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
@@ -58,7 +58,7 @@ class Case:
     not; empty for all.
     model : "espm" or "dfn" for every hypothesis; None takes that of a saved porous electrode, else what the data ask
     for.
-    of_experiment : whether an experiment file describes the case; warnings then name its keys beside the options.
+    reader : whom its sentences are for; they name keys or arguments beside the options for who uses none.
     """
 
     cell: Path | HybridModel
@@ -74,7 +74,7 @@ class Case:
     model: ModelName | None = None
     soh: Soh | None = None
     good: tuple[Measurement, ...] = ()
-    of_experiment: bool = False
+    reader: Reader = "command"
 
     def checked(self) -> Case:
         """The case as it is.  Raises DataError for a record that is given twice."""
@@ -135,7 +135,7 @@ class Case:
                 given.cell, (m.temperature_degc for m in self.records), given.effects
             ),
             *left,
-            *(map(with_keys, temperatures) if self.of_experiment else temperatures),
+            *(told(self.reader, sentence) for sentence in temperatures),
         )
 
     @property
@@ -173,7 +173,10 @@ def run_case(case: Case, out: Path | None = None, progress: Progress | None = No
         model=case.model or ("dfn" if given.model == "dfn" else None),
         good=case.good,
     )
-    return replace(found, warnings=tuple(map(with_keys, found.warnings))) if case.of_experiment else found
+    warnings, notes = (
+        tuple(told(case.reader, one) for one in said) for said in (found.warnings, found.notes)
+    )
+    return replace(found, warnings=warnings, notes=notes)
 
 
 def write_discovery(out: Path, case: Case, found: Discovery, mlflow_run_id: str = "") -> dict[str, Any]:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from aesi.advice import with_keys
 from aesi.data.resample import DENSE, is_sparse, off_rows, to_even
 from aesi.data.virtual import DEFAULT_MIX
 from aesi.errors import ConfigError, DataAway, DataError, InputError, SimulationError
@@ -31,7 +32,6 @@ from aesi.pipeline.experiment.sources import (
     check_had,
     check_roles,
     sources_of,
-    with_keys,
 )
 from aesi.pipeline.notes import (
     contradiction_sentences,

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from aesi.advice import with_keys
 from aesi.data.read import Reading, read
 from aesi.data.reading import record_names
 from aesi.data.virtual import DEFAULT_MIX
@@ -22,21 +23,6 @@ from aesi.records import ROLES, Measurement, Role
 
 if TYPE_CHECKING:
     from aesi.data.virtual import VirtualExperiment
-
-
-KEYS = {
-    "--sign": "data.sign",
-    "--column": "data.columns",
-    "--unit": "data.units",
-    "--state": "data.columns: {state: COLUMN}",
-    "--duplicates": "data.duplicates",
-    "--soc0": "cell.soc0",
-    "--step": "a file of its own, by `aesi data convert --step`",
-    "--to-s": "data.to_s",
-    "--from-s": "data.from_s",
-    "--soh": "cell.soh",
-}
-"""Option of a command that reads files -> the key of an experiment file with the same meaning."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,12 +208,6 @@ def _record(path: Path, reading: Reading, record_name: str | None = None) -> Mea
         )  # all rows are read, since they are averaged once, to the step of the experiment
     except DataError as error:
         raise DataError(with_keys(str(error))) from None
-
-
-def with_keys(sentence: str) -> str:
-    """The sentence, with the keys of an experiment file added that mean the same as the options it names."""
-    keys = [key for option, key in KEYS.items() if option in sentence]
-    return f"{sentence.removesuffix('.')} (in an experiment file: {', '.join(keys)})." if keys else sentence
 
 
 def _locator(config: ExperimentConfig) -> Callable[[str], Path]:

@@ -14,6 +14,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from aesi.advice import advises_python
 from aesi.conformal import WHOLE_DRIVE, Calibrated, FreeRunBands, calibrated_from_dict
 from aesi.data.resample import is_even, is_sparse, to_even
 from aesi.errors import CellError, DataError, InputError, SimulationError
@@ -99,6 +100,7 @@ class HybridModel:
         """The states of charge and temperatures that the correction was trained on; None where they are not known."""
         return trained_on(self.correction, self.bands)
 
+    @advises_python
     def predict(
         self,
         time_s: Numbers,

@@ -52,6 +52,7 @@ def test_a_batch_that_goes_on_after_an_upgrade_says_what_is_done_again(tracked, 
 def test_a_batch_is_tracked_with_the_trend_of_its_specimens(tracked, runner):
     from flows.jobs.batch import batch
     from flows.tracking.store import JOB, Store
+    from flows.tracking.view import NOTE, VIEW_TAG
 
     for name in ("a.csv", "b.csv"):
         (tracked / name).write_text(name)
@@ -67,6 +68,16 @@ def test_a_batch_is_tracked_with_the_trend_of_its_specimens(tracked, runner):
     store = Store()
     runs = {run.info.run_name: run for run in store.runs(store.find_experiment("batch"), "")}
     assert runs["aged"].data.metrics["resistance_mohm"] == 5.0
+    errors = {f"{state}/test_rmse_mv": 2.0 for state in STATES}  # as a discovery names them
+    assert runs["aged"].data.metrics.items() >= errors.items()
+    assert runs["aged"].data.tags["batch"] == "plan.csv"
+    assert runs["plan.csv"].data.tags[NOTE].startswith("3 cells: 1 failed, 2 none.")
+    about = store.client.get_experiment(store.find_experiment("batch")).tags
+    assert "its cells" in about[NOTE]
+    view = json.loads(about[VIEW_TAG])
+    assert view["searchFilter"] == "tags.`aesi.kind` = 'cell'"
+    assert view["orderByKey"] == "tags.`mlflow.runName`"  # else cells are folded into their batch
+    assert "metrics.`after/test_rmse_mv`" in view["selectedColumns"]
     assert runs["other"].info.status == "FAILED"
     parent = runs["plan.csv"]
     assert parent.data.metrics["failed"] == 1.0

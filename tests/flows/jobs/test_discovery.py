@@ -51,8 +51,8 @@ def test_everything_is_written_and_tracked(tracked, case):
     assert content["effects"] == ["series_resistance"]
     assert content["after"]["test"]["rmse_mv"] < content["before"]["test"]["rmse_mv"]
     assert content["notes"][:2] == [
-        "drive: no temperature column; taken at 25 degC, as the cell's file declares; for another one add a column "
-        "temperature_degc, or give --column temperature_degc=40.",
+        "drive: no temperature column; taken at 25 degC, as the cell's file declares; for another one give its "
+        "temperature_degc.",
         "drive: thinned.",
     ]
     report = (out / "report.html").read_text()

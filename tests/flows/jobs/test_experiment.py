@@ -96,7 +96,11 @@ def test_settings_records_and_every_candidate_of_a_run_are_tracked(finished):
             assert set(content) == {"bagging", "stability", "inclusion"}
             assert set(content["bagging"]) <= set(content["inclusion"])
             assert child.info.end_time > child.info.start_time
-    headlines = {name.split("/")[0] for name in parent.data.metrics} - {"system", "terms", "seconds"}
+    headlines = {name.split("/")[0] for name in parent.data.metrics} - {
+        "system",
+        "terms",
+        "fit_and_evaluation_s",
+    }
     assert headlines == {"free_run", "one_step", "intervals", "tables"}
     of_candidates = {name for child in candidates(children).values() for name in child.data.metrics}
     assert not [name for name in of_candidates if "test" in name]  # only the chosen model meets the test set

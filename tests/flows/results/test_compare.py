@@ -281,3 +281,16 @@ def test_what_waits_in_the_workspace_was_not_compared_nor_rebuilt(tracked, call,
 def test_the_hints_at_the_end_of_a_run_did_not_find_it_on_a_server():
     assert _uri_option(None) == ""
     assert _uri_option("https://me:secret@host/my runs") == " --uri 'https://host/my runs'"
+
+
+def test_the_time_of_a_fit_is_called_so_of_an_earlier_version_s_runs_too(tracked, tmp_path):
+    store = Store()
+    experiment = store.experiment("two")
+    for job in ("experiment", "experiment", "discovery", "discovery"):
+        run_id = store.create_run(experiment, "two", {KIND: "run", JOB: job})
+        store.client.log_metric(run_id, "seconds", 0.5)
+        store.client.set_terminated(run_id)
+    runs = compare(["two"], tmp_path / "page.html")
+    assert [list(run.metrics) for run in runs if run.job == "experiment"] == [["fit_and_evaluation_s"]] * 2
+    html = (tmp_path / "page.html").read_text()
+    assert [html.count(f">{words}</th>") for words in ("fit and evaluation, s", "time, s")] == [1, 1]

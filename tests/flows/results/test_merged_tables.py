@@ -132,6 +132,9 @@ def test_a_batch_stood_for_the_newest_run_of_an_experiment_of_that_name(
     store.client.set_terminated(of_batch)
     code, _, err = call("tables", "batch")
     assert (code, "'batch' has no finished run yet" in err) == (2, True)
+    assert "aesi compare" not in err  # which takes two
+    store.client.set_terminated(finish({JOB: job}, **{parameter: 3}))
+    assert "`aesi compare batch` shows the 2 that are there" in call("tables", "batch")[2]
     ours = finish({JOB: "experiment"}, seed=0)
     store.client.log_dict(ours, {"models": run(30.0, 90.0, None)}, "summary.json")
     store.client.set_terminated(ours)

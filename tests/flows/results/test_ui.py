@@ -73,6 +73,28 @@ def test_a_storage_without_searches_was_an_unexpected_error(call, workspace, sto
     assert err.count("\n") == 1
 
 
+def test_who_came_from_another_machine_was_refused(call, tracked, monkeypatch):
+    """MLflow refuses hosts that it is not told of, and pages from there that ask it for runs."""
+    from mlflow.server.security_utils import is_allowed_host_header, should_block_cors_request
+
+    given = []
+    monkeypatch.setattr(os, "execve", lambda program, command, environment: given.append(environment))
+    monkeypatch.setattr(socket, "gethostname", lambda: "labserver")
+    _, out, _ = call("ui", "--port", "5599", "--host", "0.0.0.0")
+    assert "http://labserver:5599/#/experiments" in out
+    hosts = given[0]["MLFLOW_SERVER_ALLOWED_HOSTS"].split(",")
+    origins = given[0]["MLFLOW_SERVER_CORS_ALLOWED_ORIGINS"].split(",")
+    for host in ("labserver:5599", "localhost:5599", "127.0.0.1:5599"):
+        assert is_allowed_host_header(hosts, host)
+        assert not should_block_cors_request(f"http://{host}", "POST", origins)
+    assert not is_allowed_host_header(hosts, "elsewhere:5599")
+    monkeypatch.setenv("MLFLOW_SERVER_ALLOWED_HOSTS", "proxy")  # what a person has set stays
+    call("ui", "--port", "5599", "--host", "0.0.0.0")
+    assert given[1]["MLFLOW_SERVER_ALLOWED_HOSTS"] == "proxy"
+    call("ui", "--port", "5599")
+    assert "MLFLOW_SERVER_CORS_ALLOWED_ORIGINS" not in given[2]
+
+
 def test_a_host_that_is_not_here_was_told_as_a_port_that_is_taken():
     with pytest.raises(InputError, match=r"nothing can be served at 192\.0\.2\.1, port 5599"):
         ui.serve_flows(5599, "192.0.2.1")

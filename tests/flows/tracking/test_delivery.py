@@ -8,7 +8,15 @@ import pytest
 
 from flows.tracking.delivery import deliver
 from flows.tracking.store import KIND
-from flows.tracking.view import DISCOVERY_COLUMNS, NOTE, RUN_COLUMNS, VIEW, experiment_tags
+from flows.tracking.view import (
+    DISCOVERY_COLUMNS,
+    HOW_TO_READ,
+    HOW_TO_READ_DISCOVERIES,
+    NOTE,
+    RUN_COLUMNS,
+    VIEW,
+    experiment_tags,
+)
 
 CONTENT = {"bagging": {"T1(I)": 0.25}}
 
@@ -120,3 +128,9 @@ def test_the_client_told_on_stdout_where_a_run_is_amidst_the_tables_written_ther
     monkeypatch.delenv("MLFLOW_SUPPRESS_PRINTING_URL_TO_STDOUT")
     client.set_terminated("ab" * 16)
     assert "View run a run at" in capsys.readouterr().out  # else it is silenced in vain
+
+
+@pytest.mark.parametrize("text", [HOW_TO_READ, HOW_TO_READ_DISCOVERIES])
+def test_a_filter_for_nested_runs_was_said_to_list_what_mlflow_folds_away(text):
+    """In the order of time, MLflow's own, a filtered table shows the runs that hold them."""
+    assert "once they are sorted by a figure" in text

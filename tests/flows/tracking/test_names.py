@@ -49,3 +49,9 @@ def test_a_cell_with_an_apostrophe_was_not_found_to_be_sent_before(store):
         deliver(store, {"kind": "run"} | whose | content | ended, again)
     assert list(store.children(experiment, parent)) == ["cell:Anna's"]
     assert store.child(experiment, parent, "cell:Anna's").info.run_name == "Anna's"
+
+
+def test_the_address_of_a_run_opened_the_pages_for_language_models(store, said):
+    tracker = Tracker(store, QUIET, said.append)
+    assert tracker.address.endswith(f"/runs/{tracker.run_id}?workflowType=machine_learning")
+    tracker.end("FINISHED")

@@ -89,7 +89,7 @@ def test_a_dead_current_under_a_voltage_of_a_drive_was_taken(tmp_path, dead_a):
     tail[2400:] = dead_a
     message = refusal(tmp_path, tail, VOLTAGE)
     assert "row 2401 (line 2402)" in message
-    assert message.endswith("read one side of it: --to-s 2400.")
+    assert "read one side of it: --to-s 2400 (" in message
 
 
 def test_a_noisy_voltage_and_one_that_relaxes_need_no_current(tmp_path):
@@ -139,7 +139,7 @@ def test_a_unit_that_was_declared_wrongly_was_advised_another(tmp_path, declared
 
 
 def test_the_days_of_a_spreadsheet_are_named(tmp_path):
-    assert "declare it: --unit time_s=d." in refusal(tmp_path, CURRENT, VOLTAGE, 45000.0 + TIME / 86400.0)
+    assert "declare it: --unit time_s=d (" in refusal(tmp_path, CURRENT, VOLTAGE, 45000.0 + TIME / 86400.0)
 
 
 def test_a_time_in_whole_minutes_was_advised_to_drop_nearly_all_rows(tmp_path):

@@ -111,6 +111,40 @@ def test_a_missing_column_names_the_nearest_and_the_option(tmp_path):
     assert '--column current_a="I[A]"' in message
 
 
+@pytest.mark.parametrize("stamps", ["timestamp", "Date_Time", "Datum", "DateTime"])
+def test_a_temperature_was_proposed_as_the_time_beside_a_column_of_dates(tmp_path, stamps):
+    header = f"T_amb,{stamps},current_a,voltage_v"
+    line = "25.0,2024-03-05 09:12:00,1.0,3.7"
+    message = refusal(tmp_path, "\n".join([header, line, line]) + "\n")
+    assert f"the nearest: '{stamps}'." in message
+    assert f'--column time_s="{stamps}"' in message
+
+
+def test_a_test_s_time_is_proposed_before_a_date(tmp_path):
+    message = refusal(tmp_path, "Date,Test Time,current_a,voltage_v\n1,2,3,4\n1,2,3,4\n")
+    assert '--column time_s="Test Time"' in message
+
+
+def test_a_mark_for_a_missing_value_was_refused_without_a_remedy(tmp_path):
+    message = refusal(tmp_path, with_line(6, "4.0,---,3.7"))
+    assert message.endswith("holds '---', which is not a number: correct it, or remove the row.")
+
+
+def test_a_column_that_is_no_time_was_told_as_one_written_too_coarsely(tmp_path):
+    message = refusal(tmp_path, text(time=np.full(len(TIME), 25.0)))
+    assert f"the time is 25 s in all {len(TIME)} rows" in message
+    assert "--column time_s=NAME" in message
+    assert "--duplicates" not in message
+
+
+def test_two_cells_row_by_row_in_one_file_were_told_as_a_coarse_time(tmp_path):
+    both = {"time": np.repeat(TIME, 2), "current": np.repeat(CURRENT, 2), "voltage": np.repeat(VOLTAGE, 2)}
+    both["voltage"] = both["voltage"] - 0.01 * (np.arange(2 * len(TIME)) % 2)
+    assert "Or the file holds 2 cells or channels, a row of each at every stamp" in refusal(
+        tmp_path, text(**both)
+    )
+
+
 @pytest.mark.parametrize(
     ("line", "words"),
     [
@@ -303,7 +337,7 @@ def test_a_cell_that_was_taken_off_at_the_end_is_told_how_to_be_read(tmp_path):
     volts = np.array(VOLTAGE)
     volts[-2:] = -0.0006
     message = refusal(tmp_path, text(voltage=volts))
-    assert f"leave out where the cell was not connected: --to-s {TIME[-3]:g}." in message
+    assert f"leave out where the cell was not connected: --to-s {TIME[-3]:g} (" in message
     read_measurement(written(tmp_path, text(voltage=volts)), stop_s=float(TIME[-3]))
     volts[50] = -0.0006
     assert "--to-s" not in refusal(tmp_path, text(voltage=volts))
@@ -617,8 +651,8 @@ def test_an_si_unit_of_the_header_was_overruled_in_silence(tmp_path):
 def test_a_time_in_hours_is_doubted(tmp_path):
     path = written(tmp_path, text(time=TIME / 3600.0))
     (note,) = read_measurement(path).notes
-    assert note.endswith(
-        "every 0.278 ms, quicker than cyclers write them; if the time is in hours: --unit time_s=h."
+    assert (
+        "every 0.278 ms, quicker than cyclers write them; if the time is in hours: --unit time_s=h (" in note
     )
     profile = written(
         tmp_path, "time_s,current_a\n" + "".join(f"{t / 3600},1\n" for t in TIME), "profile.csv"

@@ -7,6 +7,8 @@ from datetime import date
 from pathlib import Path
 from urllib.parse import unquote
 
+import numpy as np
+import pandas as pd
 import pytest
 
 import aesi
@@ -167,6 +169,17 @@ def test_a_job_that_cannot_be_done_is_a_row_with_its_reason(tmp_path):
     row = run_job(Job("bad", CELL, (touched(tmp_path / "bad.csv"),)), tmp_path / "out", Settings())
     assert row["status"] == "failed"
     assert "bad.csv" in row["reason"]
+
+
+def test_a_batch_advised_an_option_for_one_cell_that_holds_for_all(tmp_path):
+    """Given for the one in mA, it is the other that cannot be used."""
+    time_s = np.arange(600.0)
+    current_a = np.repeat(np.random.default_rng(0).normal(3.0, 4.0, 20), 30)
+    columns = {"time_s": time_s, "current_a": 1e3 * current_a, "voltage_v": 3.7 - 0.02 * current_a}
+    pd.DataFrame(columns).to_csv(tmp_path / "milli.csv", index=False)
+    row = run_job(Job("milli", CELL, (tmp_path / "milli.csv",)), tmp_path / "out", Settings())
+    assert "--unit current_a=mA (in a batch these options hold for all cells" in row["reason"]
+    assert row["reason"].endswith("for this one alone give them to `aesi data convert`).")
 
 
 def left(folder, content):

@@ -205,13 +205,16 @@ def test_a_discovery_of_an_experiment_advised_options_that_it_does_not_have(tmp_
     @dataclass(frozen=True)
     class Found:
         warnings: tuple[str, ...]
+        notes: tuple[str, ...] = ("drive starts under 1 A; give --soc0 if it is known.",)
 
     found = Found(("drive: its sensor is at fault (--column temperature_degc= leaves it out).",))
     monkeypatch.setattr(tracing, "discover", lambda *args, **options: found)
     record = write_record(tmp_path)
     settings = experiment(record, discover={"fit": [str(record)]})
-    (told,) = run_case(case_of_experiment(settings)).warnings
+    of_experiment = run_case(case_of_experiment(settings))
+    (told,), (start,) = of_experiment.warnings, of_experiment.notes
     assert told.endswith("leaves it out) (in an experiment file: data.columns).")
+    assert start.endswith("if it is known (in an experiment file: cell.soc0).")
     assert run_case(case_of_files(BPX, [record])) == found
 
 

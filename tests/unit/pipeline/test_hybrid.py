@@ -659,6 +659,17 @@ def test_a_profile_alone_was_said_to_start_as_given(model, data, tmp_path):
     folder, said = model.save(tmp_path / "model"), []
     predict_file(folder, tmp_path / "profile.csv", tmp_path / "out.csv", say_notes=said.extend)
     assert f"profile starts at the saved model's state of charge of {SOC0:g}; --soc0 takes another." in said
+    assert any(note.endswith("or give --column temperature_degc=40.") for note in said)
+
+
+def test_the_uncertainty_of_a_start_that_is_not_given_was_advised_by_itself(model, data, tmp_path):
+    data.to_frame()[["time_s", "current_a"]].to_csv(tmp_path / "profile.csv", index=False)
+    files, said = (model.save(tmp_path / "model"), tmp_path / "profile.csv", tmp_path / "out.csv"), []
+    predict_file(*files, say_notes=said.extend)
+    assert any("as exact" in note and "--soc0-sd, beside --soc0, widens the band" in note for note in said)
+    with pytest.raises(InputError, match="give it with --soc0"):  # what followed the advice of old
+        predict_file(*files, ProfileRequest(soc0_sd=0.02))
+    predict_file(*files, ProfileRequest(soc0=SOC0, soc0_sd=0.02))
 
 
 def test_the_temperature_that_a_prediction_is_made_at_is_said(model, data, tmp_path):

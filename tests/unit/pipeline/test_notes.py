@@ -21,7 +21,7 @@ from aesi.pipeline.notes import (
     together,
 )
 from aesi.pipeline.product.hybrid import HybridModel
-from aesi.records import Measurement
+from aesi.records import LABORATORY, Measurement
 
 NMC = Path(__file__).resolve().parents[3] / "experiments" / "cells" / "nmc_30ah.bpx.json"
 
@@ -81,6 +81,24 @@ def test_two_effects_that_change_the_temperature_were_one():
     both = [CATALOGUE[name].activate() for name in ("self_heating", "ambient_temperature")]
     assert "self_heating and ambient_temperature change it; " in temperature_sentence(cell, record, both)
     assert "and self_heating changes it; " in temperature_sentence(cell, record, both[:1])
+
+
+@pytest.mark.parametrize(
+    ("source", "end"),
+    [
+        (
+            "drive.csv",
+            "declares; for another one add a column temperature_degc, or give --column temperature_degc=40.",
+        ),
+        ("", "declares; for another one give its temperature_degc."),
+        (LABORATORY, "as the cell's file declares."),
+    ],
+    ids=["file", "memory", "virtual"],
+)
+def test_a_record_that_is_no_file_was_to_be_given_a_column_by_an_option(source, end):
+    """An experiment of virtual records refuses data.columns, which was the advice."""
+    record = Measurement(np.arange(3.0), np.zeros(3), np.full(3, 3.7), source=source)
+    assert temperature_sentence(Cell.from_bpx(NMC), record, ()).endswith(end)
 
 
 def test_a_shift_of_the_temperature_was_no_temperature_that_energies_are_missing_for():

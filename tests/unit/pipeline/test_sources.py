@@ -16,7 +16,7 @@ from aesi.physics.initial_state import OTHER_STATE
 from aesi.pipeline.experiment import sources
 from aesi.pipeline.experiment.config import parse_experiment
 from aesi.pipeline.experiment.load import load
-from aesi.pipeline.experiment.sources import _record, discovery_records, sources_of, with_keys
+from aesi.pipeline.experiment.sources import _record, discovery_records, sources_of
 from aesi.records import Measurement
 
 
@@ -47,11 +47,6 @@ def test_what_needs_no_option_is_told_as_it_is(tmp_path):
     path.touch()
     with pytest.raises(DataError, match=r"at least two rows\.$"):
         _record(path, Reading())
-
-
-def test_a_state_of_charge_that_a_run_may_be_given_was_called_by_a_command_s_option():
-    sentence = "drive starts under 1 A at 3.9 V: state of charge 0.7 +/- 0.1; give --soc0 if it is known."
-    assert with_keys(sentence).endswith("if it is known (in an experiment file: cell.soc0).")
 
 
 def days(folder: Path, inner: str = "") -> list[str]:
