@@ -2,9 +2,9 @@
 
 An effect on the other records alone takes up half of what all records share: a contact resistance that the file lacks
 looks like one that has increased. A found effect is therefore compared with the same effect in all records. Where that
-says more of unseen data than can be a tie, the good records have shown the effect, and it is opened in all records like
-a declared parameter; then the search for differences is repeated. Good records that cannot show it (a lag, under
-constant current) are taken to be what they were declared to be.
+says more of unseen data, by more than `ALIKE_NATS`, the good records have shown the effect, and it is opened in all
+records like a declared parameter; then the search for differences is repeated. Good records that cannot show it (a lag,
+under constant current) are taken to be what they were declared to be.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from aesi.tracer.search.archive import Archive, context_of
 from aesi.tracer.search.forward import forward_search
 from aesi.tracer.search.hypothesis_fits import base_of
 from aesi.tracer.search.path import Path, Report
-from aesi.tracer.search.plausible import alike
+from aesi.tracer.search.plausible import ALIKE_NATS
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,9 +59,9 @@ def _with_shared(found: Unshared, name: str, most: int, report: Report) -> Unsha
         f"{name} gains {shared:.1f} nats on unseen data if it acts in all records, and {named:.1f} if only in those "
         "that are compared with the good ones: "
     )
-    if alike(base, alone):
-        if not alike(alone, base):
-            return found
+    if shared < named - ALIKE_NATS:
+        return found
+    if shared <= named + ALIKE_NATS:
         told += "the good ones do not tell whether they have it, too, and are taken to be good."
         return replace(found, shared=(*found.shared, told))
     told += (

@@ -9,7 +9,6 @@ def test_a_line_for_each_size():
     lines = list(run(cases=((30, 1e-3), (40, 1e-12)), n=3000, candidates=3, resamples=10, peer_models=1))
     assert [line["terms"] for line in lines] == [30, 40]
     for line in lines:
-        assert line["bench"] == "ensemble"
         assert line["peer"] == "PySINDy STLSQ"
         assert line["rows"] == 3000
         assert line["peer_s"] == pytest.approx(line["peer_s_per_model"] * 3 * 10, rel=0.05, abs=0.1)
