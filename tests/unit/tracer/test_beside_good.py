@@ -81,7 +81,7 @@ def test_a_contact_that_good_records_have_too_was_found_as_a_difference(cell, tr
 def test_a_lag_that_constant_current_cannot_show_was_taken_as_common_to_all(cell, make):
     """A discharge at constant current says nothing of a lag."""
     tried = {name: CATALOGUE[name] for name in ("series_resistance", "voltage_sensor_offset", "clock_skew")}
-    other = make([CATALOGUE["clock_skew"].activate(skew=0.0, lag_s=3.0)], n=3600)
+    other = make([CATALOGUE["clock_skew"].activate(skew=0.0, lag_s=1.0)], n=7200)
     time, current = np.arange(3600.0), np.r_[0.0, np.full(3599, 9.0)]
     noise = 1e-3 * np.random.default_rng(5).normal(size=3600)
     good = Measurement(time, current, simulate(cell, time, current, 0.9).voltage_v + noise, name="steady")
