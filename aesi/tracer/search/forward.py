@@ -30,10 +30,11 @@ from aesi.tracer.search.plausible import most_plausible, plausibility
 from aesi.tracer.search.reach import REACH_FACTOR, reach_check
 
 FINALISTS = 6
-"""Most effects that are fitted with the whole model in a step, the best ones. Growth is to first order in the parent's
-parameters, so that a right effect can gain too little in it. On a blind development case (leakage and a
-resistance on the LG M50) the right second effect stood fifth to first order, with 10 nats, and first with 61 when
-fitted: three fits left 1.36 mV with a wrong name, six 1.006 of a noise of 1.01, in 30 instead of 22 s of processor."""
+"""Effects that are fitted with the whole model in a step, the best ones; further ones only where no fit of these does
+what the next growth promises. Growth is to first order in the parent's parameters, so that a right effect can gain too
+little in it. On a blind development case (leakage and a resistance on the LG M50) the right second effect stood fifth
+to first order, with 10 nats, and first with 61 when fitted: three fits left 1.36 mV with a wrong name, six 1.006 of a
+noise of 1.01, in 30 instead of 22 s of processor."""
 FINALIST_SHARE = 0.5
 """Least share of the best gain to first order that an effect needs in order to be fitted. On six blind cases of
 seeds 0 and 12 those below ended at 2 to 27 % of the best one's full fit."""
