@@ -7,7 +7,7 @@ where a function of the package is called.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import wraps
 from typing import Literal, ParamSpec, TypeVar
 
@@ -92,7 +92,7 @@ def with_arguments(sentence: str) -> str:
     of_reading = [OF_READING[option] for option in options if option in OF_READING]
     names = [OF_CALL[option] for option in options if option in OF_CALL]
     if of_reading:
-        names.append(f"{_listed(of_reading)} of aesi.read_measurement")
+        names.append(f"{listed(of_reading)} of aesi.read_measurement")
     return f"{sentence.removesuffix('.')} (in Python: {'; '.join(names)})." if names else sentence
 
 
@@ -101,7 +101,7 @@ def with_columns(sentence: str) -> str:
     anew, since a batch reads the files of all its cells alike."""
     options = dict.fromkeys(OPTION.findall(sentence))
     columns = [OF_PLAN[option] for option in options if option in OF_PLAN]
-    told = [f"the column {_listed(columns)} of the batch's table"] if columns else []
+    told = [f"the column {listed(columns)} of the batch's table"] if columns else []
     if any(option in OF_READING for option in options):
         told.append(
             "in a batch these options hold for all cells; for this one alone give them to `aesi data convert`"
@@ -123,6 +123,8 @@ def advises_python(function: Callable[Arguments, T]) -> Callable[Arguments, T]:
     return door
 
 
-def _listed(names: list[str]) -> str:
+def listed(names: Sequence[str]) -> str:
     """`a`, `a and b`, `a, b and c`."""
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+    if len(names) < 2:
+        return "".join(names)
+    return f"{', '.join(names[:-1])} and {names[-1]}"

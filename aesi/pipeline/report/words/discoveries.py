@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from aesi.advice import listed
 from aesi.constants import MV_PER_V, SECONDS_PER_HOUR
 from aesi.numerics.typing import Array
 from aesi.pipeline.digits import decimals
@@ -15,7 +16,6 @@ from aesi.pipeline.report.words.sizes import (
     capitalised,
     explain_part,
     finding_line,
-    listed,
     refit_does_as_well,
     unexplained_by,
     what_good_records_lack,

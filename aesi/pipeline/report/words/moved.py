@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from aesi.advice import listed
 from aesi.pipeline.report.views import Row
 from aesi.pipeline.report.words.discoveries import WITH_FINDING, states_of
 from aesi.pipeline.report.words.sizes import (
     PERCENT,
     TELLING,
     capitalised,
-    listed,
     name_words,
     resized,
     rounded,

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from aesi.advice import listed
 from aesi.over_time import stamp
 from aesi.pipeline.product.trained import ALL_PCT, trained_sentence
 from aesi.pipeline.report.views import Row, RunView
-from aesi.pipeline.report.words.sizes import listed
 
 NEARLY = 0.98
 """A one-step error above this share of persistence's is called no better than it."""

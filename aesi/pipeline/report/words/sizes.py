@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from math import floor, log10
 from typing import Any
 
+from aesi.advice import listed
 from aesi.parameters import Parameter
 from aesi.physics.effects import CATALOGUE
 
@@ -139,13 +140,6 @@ def two_digits(value: float) -> str:
 def capitalised(text: str) -> str:
     """With a capital letter, as a sentence begins."""
     return text[:1].upper() + text[1:]
-
-
-def listed(names: Sequence[str]) -> str:
-    """`a`, `a and b`, `a, b and c`."""
-    if len(names) < 2:
-        return "".join(names)
-    return f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def what_good_records_lack(discovery: Mapping[str, Any]) -> str:
