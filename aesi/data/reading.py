@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -135,8 +136,9 @@ def record_name(path: str | Path) -> str:
 
 def record_names(paths: Sequence[Path]) -> list[str]:
     """Names of the records in several files, different for different files: equal names get the name of their folder in
-    front, and of the folders above as far as needed. Files of the same folder keep their suffix then."""
-    files = [path.resolve() for path in paths]
+    front, and of the folders above as far as needed. Files of the same folder keep their suffix then. A link has its
+    own name: that of its target may be a checksum."""
+    files = [Path(os.path.abspath(path)) for path in paths]
     names = {file: record_name(file) for file in files}
     beside = Counter((file.parent, name) for file, name in names.items())
     names = {file: file.name if beside[file.parent, name] > 1 else name for file, name in names.items()}

@@ -113,6 +113,15 @@ def test_records_of_one_name_in_one_folder_keep_their_suffix(tmp_path):
     assert record_names(paths) == ["drive.csv", "drive.parquet", "rest"]
 
 
+def test_the_record_behind_a_link_was_called_by_the_name_of_its_target(tmp_path):
+    from aesi.data.reading import record_names
+
+    target, link = tmp_path / "SHA256E-s1--5f.csv", tmp_path / "us06.csv"
+    target.touch()
+    link.symlink_to(target)
+    assert record_names([link]) == ["us06"]
+
+
 def test_a_copy_of_a_training_record_was_taken_to_validate(tmp_path):
     first, second, test = days(tmp_path)
     copy = tmp_path / "copy.csv"
