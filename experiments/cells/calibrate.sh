@@ -1,9 +1,9 @@
 #!/bin/sh
 # Makes the calibrated cell files of this folder from public records (AESI_DATA as in docs/reference/files.md).
 #   sh experiments/cells/calibrate.sh [panasonic | panasonic_25degc | hg2 | hg2_25degc | hg2_cold] [OUT]
-# Without arguments the first four, into this folder; hg2_cold needs two records of the published archive, as `aesi data
-# get lg_18650hg2 --out "$AESI_DATA/measured/lg_18650hg2"` lays an unpacked one out. Each takes 4 to 40 minutes of one
-# processor. All are the most probable of three fits, from the start file and from two cells drawn from the priors.
+# Without arguments the first four, into this folder; hg2_cold needs two records of the published archive, unpacked in the
+# folder of the set ("$AESI_DATA/measured/lg_18650hg2"). Each takes 4 to 40 minutes of one processor. All are the most
+# probable of three fits, from the start file and from two cells drawn from the priors.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 which=${1:-all}
@@ -51,9 +51,12 @@ hg2() {
     hg2_with calibrated lg_18650hg2
 }
 hg2_cold() {
-    p=$data/lg_18650hg2
+    p=$data/lg_18650hg2 cold=$(mktemp -d) # with the files under the names of their records
+    trap 'rm -r "$cold"' EXIT
+    ln -s "$p/n10degC/604_Mixed6.csv" "$cold/n10degC_604_mixed6.csv"
+    ln -s "$p/n20degC/610_LA92.csv" "$cold/n20degC_610_la92.csv"
     hg2_with "calibrated down to -20 degC" lg_18650hg2_cold \
-        --data "$p/n10degC_604_mixed6.csv" "$p/n20degC_610_la92.csv" \
+        --data "$cold/n10degC_604_mixed6.csv" "$cold/n20degC_610_la92.csv" \
         --date n10degC_604_mixed6=2018-12-18 --date n20degC_610_la92=2018-12-24
 }
 hg2_25degc() {
