@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import time
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from hashlib import sha256
@@ -130,6 +131,7 @@ class HypothesisTracker:
     def __init__(self, tracker: Tracker | None, console: Console) -> None:
         self._tracker, self._console = tracker, console
         self._started, self._done = time.monotonic(), 0
+        self._fits: Counter[str] = Counter()
 
     def __call__(self, tried: TriedHypothesis) -> None:
         """One hypothesis: what it says of unseen data, its error and its parameters."""
@@ -148,9 +150,11 @@ class HypothesisTracker:
             "model_error_mv": MV_PER_V * tried.delta_v,
             "simulations": float(tried.simulations),
         }
+        title = f"{name or 'nothing'}, {tried.trust}"
+        self._fits[title] += 1
         self._tracker.nested(
             f"{name}#{self._done}",
-            name or "nothing",
+            title if self._fits[title] == 1 else f"{title}, fit {self._fits[title]}",
             "hypothesis",
             {"hypothesis": name, "trust": tried.trust, **parameters},
             metrics,

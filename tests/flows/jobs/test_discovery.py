@@ -64,8 +64,11 @@ def test_everything_is_written_and_tracked(tracked, case):
     assert np.sqrt(np.mean((voltage - data.voltage_v) ** 2)) < 1.1e-3
     store = Store()
     runs = list(store.runs(store.find_experiment("discover"), ""))
-    names = {run.info.run_name for run in runs}
-    assert {"drive", "series_resistance", "voltage_sensor_offset"} <= names
+    names = [run.info.run_name for run in runs]
+    assert {"drive", "series_resistance, tight", "series_resistance, tight, fit 2", "nothing, tight"} <= {
+        *names
+    }
+    assert len(names) == len({*names}), "fits of one hypothesis looked like one that was tracked twice"
 
 
 def test_searches_of_other_cells_records_or_options_are_told_apart_by_what_is_tracked(case, tmp_path):
