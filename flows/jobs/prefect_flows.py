@@ -20,9 +20,8 @@ from flows.jobs.temporary_server import as_the_job
 def _experiment_name() -> str:
     """`measured_nmc, seed 0`."""
     given = flow_run.parameters
-    read = given.get("request")
-    config = (read or RunRequest(given["path"], tuple(given.get("overrides") or ()))).config
-    return f"{config.name}, seed {config.seed}"
+    request = given.get("request") or RunRequest(given["path"], tuple(given.get("overrides") or ()))
+    return str(request.title)
 
 
 def _discovery_name() -> str:

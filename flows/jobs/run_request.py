@@ -8,7 +8,16 @@ from functools import cached_property
 from typing import Literal
 
 from aesi.errors import InputError
-from aesi.pipeline.experiment.config import ExperimentConfig, read_experiment
+from aesi.pipeline.experiment.config import (
+    LIMITS,
+    NO_PART,
+    ExperimentConfig,
+    overridden_key,
+    read_experiment,
+)
+
+UNTOLD = ("name", "seed", *NO_PART)
+"""Sections that a title need not tell what was laid over: it does already, or they have no part in the result."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +51,19 @@ class RunRequest:
         address = (self.address or config.runner.address) if kind == "dask" else None
         runner = config.runner.model_copy(update={"kind": kind, "address": address})
         return config.model_copy(update={"runner": runner})
+
+    @property
+    def title(self) -> str:
+        """What the run is called: `measured_nmc, seed 0`, with what is laid over the file and has a part in the result,
+        `measured_nmc, seed 0: data.dt_s=2`."""
+        keys = {text: overridden_key(text).split(".") for text in self.overrides}
+        told = [
+            text
+            for text, key in keys.items()
+            if key[0] not in UNTOLD and not (key[0] == "search" and key[-1] in LIMITS)
+        ]
+        title = f"{self.config.name}, seed {self.config.seed}"
+        return f"{title}: {', '.join(told)}" if told else title
 
     @property
     def resuming(self) -> str:

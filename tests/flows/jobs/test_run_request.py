@@ -126,3 +126,11 @@ def test_a_file_that_was_edited_after_the_command_had_read_it_was_what_was_run(w
         monkeypatch.setattr(module, "start_server", lambda: None)
     module.start(file, use_prefect=way != "plain")
     assert seen == [1]
+
+
+def test_runs_that_differ_by_what_was_laid_over_their_file_had_one_name(path):
+    assert RunRequest(path).title == "x, seed 0"
+    laid = ("data.dt_s=2", "seed=3", "search.candidates=8", "search.workers=2", "note=again")
+    assert RunRequest(path, laid).title == "x, seed 3: data.dt_s=2, search.candidates=8"
+    secret = ("tracking.uri=http://me:secret@there:5000", "runner.storage=postgresql://me:secret@there/x")
+    assert RunRequest(path, secret).title == "x, seed 0"
