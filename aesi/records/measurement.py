@@ -147,8 +147,8 @@ class Measurement:
 
     @property
     def charge_ah(self) -> float:
-        """Charge taken out over the record, Ah, with the current in straight lines between rows."""
-        return float(np.trapezoid(self.current_a, self.time_s)) / SECONDS_PER_HOUR
+        """Charge taken out over the record, Ah, with the current as `hold_taken` between rows."""
+        return float(self.steps_as(self.hold_taken).sum()) / SECONDS_PER_HOUR
 
     def discharged_ah(self, hold: Hold) -> Array:
         """(n,) Ah, charge taken out since the first row, minus the charge put in.
