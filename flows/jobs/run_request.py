@@ -9,6 +9,7 @@ from typing import Literal
 
 from aesi.errors import InputError
 from aesi.pipeline.experiment.config import ExperimentConfig, read_experiment
+from flows.base.store_address import without_login
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,12 @@ class RunRequest:
         return config.model_copy(update={"runner": runner})
 
     @property
+    def shown_overrides(self) -> list[str]:
+        """What is laid over the file, without the logins of the addresses in it."""
+        pairs = (text.partition("=") for text in self.overrides)
+        return [f"{key}{equals}{without_login(value)}" for key, equals, value in pairs]
+
+    @property
     def resuming(self) -> str:
         """The command line that goes on with what this one began."""
         words = ["aesi", "run", self.path]
@@ -53,3 +60,13 @@ class RunRequest:
         words += [] if self.use_cache else ["--no-cache"]
         words += [] if self.use_prefect else ["--no-prefect"]
         return shlex.join([*words, "--resume"])
+
+
+class HandedOver:
+    """A request on its way into a flow. Prefect keeps and shows what it can read of a parameter: nothing of this one,
+    as it has no fields that can be listed."""
+
+    __slots__ = ("request",)
+
+    def __init__(self, request: RunRequest) -> None:
+        self.request = request

@@ -1,5 +1,8 @@
 """Who evaluates the candidates: by the experiment file, and by what the command line says over it."""
 
+import inspect
+from types import SimpleNamespace
+
 import pytest
 
 from aesi.errors import ConfigError, InputError
@@ -126,3 +129,33 @@ def test_a_file_that_was_edited_after_the_command_had_read_it_was_what_was_run(w
         monkeypatch.setattr(module, "start_server", lambda: None)
     module.start(file, use_prefect=way != "plain")
     assert seen == [1]
+
+
+@pytest.mark.parametrize("job", ["experiment", "discovery"])
+def test_the_password_of_an_address_was_kept_and_shown_by_prefect(workspace, monkeypatch, job):
+    from flows.jobs import prefect_flows
+    from flows.jobs import start as module
+
+    file = workspace / "x.yaml"
+    file.write_text("name: x\ndata: {kind: virtual}\n")
+    flow = getattr(prefect_flows, job)
+    kept = []
+
+    def keeps(*given, **named):
+        parameters = inspect.signature(flow.fn).bind(*given, **named).arguments
+        kept.append(flow.serialize_parameters(parameters | {"case": None}))
+        return workspace
+
+    monkeypatch.setattr(prefect_flows, job, keeps)
+    monkeypatch.setattr(module, "start_server", lambda: None)
+    monkeypatch.setattr("flows.tracking.store.check_reached", lambda uri: None)
+    monkeypatch.setattr(module, "check_case", lambda case: None)
+    overrides = ("tracking.uri=postgresql://me:secret@host/db", "seed=1")
+    if job == "experiment":
+        module.start(file, overrides)
+    else:
+        request = RunRequest(str(file), overrides)
+        case = SimpleNamespace(cell=file, measurements=())
+        module.discover(case, workspace, request=request)
+    assert "secret" not in str(kept)
+    assert kept[0]["overrides"] == ["tracking.uri=postgresql://host/db", "seed=1"]
