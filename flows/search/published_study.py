@@ -28,7 +28,7 @@ from flows.base import environment
 from flows.base.console import first_line
 from flows.base.databases import limits, with_driver
 from flows.search.nsga2 import Constraints
-from flows.search.term_sampler import distributions, widened
+from flows.search.term_sampler import distributions
 
 LOSSES = ("loss out of bag", "loss on validation", "terms")
 CANDIDATE = "candidate"
@@ -92,7 +92,7 @@ class PublishedStudy:
     ) -> optuna.trial.FrozenTrial:
         genes: dict[str, tuple[Any, BaseDistribution]] = {
             GENE_WORDS[gene]: (getattr(genome, gene), distribution)
-            for gene, distribution in widened(distributions(self._space), genome).items()
+            for gene, distribution in distributions(self._space, genome).items()
         }
         noted: dict[str, Any] = {CANDIDATE: number, "terms offered": int(genome.mask(self._space.size).sum())}
         common = {
