@@ -14,7 +14,7 @@ from flows.base import environment
 from flows.base.console import first_line
 from flows.base.store_address import PLACE, checked_address, without_login
 from flows.tracking.store import Store
-from flows.tracking.view import TRAINING, VIEW, view_of
+from flows.tracking.view import TRAINING, VIEW_TAG, view_of
 
 if TYPE_CHECKING:
     from optuna.storages import BaseStorage
@@ -92,7 +92,7 @@ def _views(store: Store) -> list[tuple[str, str]]:
     return [
         (each.name, view_of(each.experiment_id))
         for each in store.client.search_experiments()
-        if f"mlflow.sharedViewState.{VIEW}" in each.tags
+        if VIEW_TAG in each.tags
     ]
 
 
