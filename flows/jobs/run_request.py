@@ -52,9 +52,9 @@ class RunRequest:
 
     @property
     def resuming(self) -> str:
-        """The command line that goes on with what this one began."""
+        """The command line that goes on with what this one began, without the logins of addresses in it."""
         words = ["aesi", "run", self.path]
-        words += [word for text in self.overrides for word in ("--set", text)]
+        words += [word for text in self.shown_overrides for word in ("--set", text)]
         words += ["--runner", self.runner] if self.runner else []
         words += ["--address", self.address] if self.address else []
         words += [] if self.use_cache else ["--no-cache"]

@@ -99,6 +99,13 @@ def test_a_run_without_prefect_was_told_to_go_on_with_it(path):
     assert RunRequest(path).resuming == f"aesi run {path} --resume"
 
 
+def test_a_run_was_told_to_go_on_with_the_password_of_its_store(path):
+    login = "tracking.uri=postgresql://me:secret@host/db?sslmode=require"
+    resuming = RunRequest(path, (login, "seed=1")).resuming
+    shown = "'tracking.uri=postgresql://host/db?sslmode=require'"
+    assert resuming == f"aesi run {path} --set {shown} --set seed=1 --resume"
+
+
 def test_a_run_without_cache_was_told_to_go_on_from_it(path):
     assert RunRequest(path, use_cache=False).resuming == f"aesi run {path} --no-cache --resume"
 
