@@ -11,8 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from aesi.errors import InputError
-from flows.base.console import first_line
+from aesi.errors import InputError, first_line
 from flows.base.databases import limits, with_driver
 from flows.base.store_address import without_login
 

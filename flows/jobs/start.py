@@ -8,8 +8,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
+from aesi.errors import first_line
 from flows.base import environment
-from flows.base.console import Console, first_line
+from flows.base.console import Console
 from flows.jobs.discovery import TrackedUnder, case_and_folder, check_case, run_discovery
 from flows.jobs.experiment import run_experiment
 from flows.jobs.run_request import HandedOver, RunRequest

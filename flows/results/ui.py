@@ -9,9 +9,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from aesi.errors import InputError
+from aesi.errors import InputError, first_line
 from flows.base import environment
-from flows.base.console import first_line
 from flows.base.store_address import PLACE, checked_address, without_login
 from flows.tracking.store import Store
 from flows.tracking.view import TRAINING, VIEW_TAG, view_of

@@ -14,8 +14,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from aesi.errors import first_line
 from aesi.numerics.files.whole import write_whole
-from flows.base.console import first_line
 
 Item = dict[str, Any]
 Deliver = Callable[[Item, bool], None]
