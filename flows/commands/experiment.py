@@ -1,4 +1,4 @@
-"""Commands about experiments: run, worker, tables, ui."""
+"""Commands about experiments: run, worker, tables, compare, candidate, ui."""
 
 from __future__ import annotations
 

@@ -17,8 +17,9 @@ from aesi.errors import InputError
 from aesi.pipeline.report import tables
 from aesi.pipeline.written import FIGURES, REPORT, SUMMARY
 from flows.base.store_address import without_login
-from flows.tracking.experiment_log import CODE, SETTING, UNFITTED
+from flows.tracking.experiment_log import CODE, FALLBACK, SETTING, UNFITTED
 from flows.tracking.store import KIND, Store, is_of_experiment
+from flows.tracking.view import NOTE
 
 RANGED = ("test_mser_pct", "test_mser_recalibrated_pct", "coverage_pct")
 """Figures that tables show with their range over seeds."""
@@ -199,11 +200,11 @@ def _footer(name: str, runs: Sequence[Any], left_out: _LeftOut, format: str) -> 
     text = f"Experiment {name}, tracked run{'s' if len(runs) > 1 else ''} {_ids(runs)}."
     if len(runs) > 1:
         text = f"Mean over {len(runs)} seeds. {text}"
-    about, below, _ = runs[0].data.tags.get("mlflow.note.content", "").partition("\n\n")
+    about, below, _ = runs[0].data.tags.get(NOTE, "").partition("\n\n")
     if about and below:  # without a note what came of that one run stands there alone
         text = f"{text} {about.splitlines()[0].rstrip('.')}."
     for run in runs:
-        told = (run.data.tags.get(tag) for tag in ("aesi.fallback", UNFITTED))
+        told = (run.data.tags.get(tag) for tag in (FALLBACK, UNFITTED))
         text = " ".join((text, *filter(None, told)))
     text += _left_out_words(left_out, runs[0])
     return {"md": text, "tex": f"% {text}", "csv": f"# {text}"}[format]

@@ -18,9 +18,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from aesi.errors import AesiError, InputError
+from aesi.errors import AesiError, InputError, first_line
 from aesi.numerics.files.whole import check_writable
-from flows.base.console import first_line
 from flows.base.databases import limits
 from flows.base.locks import ProcessLock
 from flows.base.store_address import (
