@@ -121,6 +121,16 @@ def test_a_temperature_was_proposed_as_the_time_beside_a_column_of_dates(tmp_pat
     assert f'--column time_s="{stamps}"' in message
 
 
+def test_most_rows_were_to_be_removed_where_a_thermocouple_was_read_less_often(tmp_path):
+    rows = "".join(
+        f"{t},{i},{v},{25 if k % 5 == 0 else ''}\n"
+        for k, (t, i, v) in enumerate(zip(TIME, CURRENT, VOLTAGE, strict=True))
+    )
+    message = refusal(tmp_path, f"{HEADER},temperature_degc\n{rows}")
+    assert "remove" not in message
+    assert "interpolate it to all rows, or leave the column out" in message
+
+
 def test_a_lone_t_is_the_time_where_no_column_has_dates(tmp_path):
     assert '--column time_s="T"' in refusal(tmp_path, "T,current_a,voltage_v\n1,2,3\n2,2,3\n")
     path = tmp_path / "named.csv"
