@@ -85,6 +85,13 @@ def run_discovery(
         return _run_discovery(case, out, run, console, under)
 
 
+def _earlier_sentence(out: Path) -> str:
+    """A sentence on a folder in which an earlier search left its fits and, unless it was stopped, its finding."""
+    replaced = ", and its finding is replaced when this search ends" if (out / FINDING).exists() else ""
+    fits = "fits of the same cell and records by this version are taken up again"
+    return f"{out} holds an earlier search: {fits}{replaced}."
+
+
 def _run_discovery(
     case: Case, out: Path, run: Stages, console: Console, under: TrackedUnder
 ) -> dict[str, Any]:
@@ -92,10 +99,7 @@ def _run_discovery(
 
     started = time.monotonic()
     if (out / ARCHIVE).exists():
-        console.say(
-            f"{out} holds an earlier search: fits of the same cell and records by this version are taken up again, and "
-            "its finding is replaced when this search ends."
-        )
+        console.say(_earlier_sentence(out))
     kept = f"What was fitted is kept in {out}; the same command goes on from there."
     title = ", ".join(m.name for m in case.measurements)
     with tracked_job(_subject(case, under), title, console) as tracker, kept_on_interrupt(kept):

@@ -18,7 +18,7 @@ from aesi.pipeline.report import tables
 from aesi.pipeline.written import FIGURES, REPORT, SUMMARY
 from flows.base.store_address import without_login
 from flows.tracking.experiment_log import CODE, FALLBACK, SETTING, UNFITTED
-from flows.tracking.store import KIND, Store, is_of_experiment
+from flows.tracking.store import KIND, Store, beginning, is_of_experiment
 from flows.tracking.view import NOTE
 
 RANGED = ("test_mser_pct", "test_mser_recalibrated_pct", "coverage_pct")
@@ -179,7 +179,7 @@ def _of_one_setting(asked: Mapping[str, Any]) -> list[Any]:
 
 
 def _by_id(finished: Sequence[Any], run_id: str, name: str) -> Any:
-    found = [run for run in finished if run.info.run_id.startswith(run_id)]
+    found = beginning(finished, run_id)
     if len(found) != 1:
         raise InputError(f"{run_id!r} names {len(found)} finished runs of {name!r}; give a whole run id.")
     return found[0]

@@ -11,6 +11,7 @@ from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.discovery import discover as pipeline
 from aesi.pipeline.discovery.discover import Case
 from aesi.pipeline.product.hybrid import HybridModel
+from aesi.pipeline.written import FINDING
 from aesi.records import Measurement
 
 CELL = Path(__file__).resolve().parents[3] / "experiments" / "cells" / "nmc_30ah.bpx.json"
@@ -38,6 +39,15 @@ class Said:
 
     def __init__(self, lines):
         self.say = lines.append
+
+
+def test_a_search_that_was_stopped_was_said_to_have_a_finding(tmp_path):
+    from flows.jobs.discovery import _earlier_sentence
+
+    replaced = "its finding is replaced when this search ends"
+    assert replaced not in _earlier_sentence(tmp_path)
+    (tmp_path / FINDING).write_text("{}")
+    assert replaced in _earlier_sentence(tmp_path)
 
 
 def test_everything_is_written_and_tracked(tracked, case):

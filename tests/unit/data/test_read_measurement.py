@@ -111,13 +111,47 @@ def test_a_missing_column_names_the_nearest_and_the_option(tmp_path):
     assert '--column current_a="I[A]"' in message
 
 
+@pytest.mark.parametrize("temperature", ["T_amb", "T"])
 @pytest.mark.parametrize("stamps", ["timestamp", "Date_Time", "Datum", "DateTime"])
-def test_a_temperature_was_proposed_as_the_time_beside_a_column_of_dates(tmp_path, stamps):
-    header = f"T_amb,{stamps},current_a,voltage_v"
+def test_a_temperature_was_proposed_as_the_time_beside_a_column_of_dates(tmp_path, stamps, temperature):
+    header = f"{temperature},{stamps},current_a,voltage_v"
     line = "25.0,2024-03-05 09:12:00,1.0,3.7"
     message = refusal(tmp_path, "\n".join([header, line, line]) + "\n")
     assert f"the nearest: '{stamps}'." in message
     assert f'--column time_s="{stamps}"' in message
+
+
+def test_most_rows_were_to_be_removed_where_a_thermocouple_was_read_less_often(tmp_path):
+    rows = "".join(
+        f"{t},{i},{v},{25 if k % 5 == 0 else ''}\n"
+        for k, (t, i, v) in enumerate(zip(TIME, CURRENT, VOLTAGE, strict=True))
+    )
+    message = refusal(tmp_path, f"{HEADER},temperature_degc\n{rows}")
+    assert "remove" not in message
+    assert "interpolate it to all rows, or leave the column out" in message
+
+
+def test_a_lone_t_is_the_time_where_no_column_has_dates(tmp_path):
+    assert '--column time_s="T"' in refusal(tmp_path, "T,current_a,voltage_v\n1,2,3\n2,2,3\n")
+    path = tmp_path / "named.csv"
+    path.write_text("T,current_a,voltage_v\n1,2,3.7\n2,2,3.6\n")
+    assert not any("temperature" in note for note in read(path, Reading({"time_s": "T"})).notes)
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [("T", ""), ("T (K)", "K"), ("T/K", "K"), ("T [C]", ""), ("T_F", "degF")],
+)
+def test_a_temperature_under_its_symbol_was_passed_over_without_a_word(tmp_path, name, unit):
+    path = tmp_path / "drive.csv"
+    path.write_text(f"time_s,current_a,voltage_v,{name}\n1,2,3.7,298\n2,2,3.6,298\n")
+    declared = f" --unit temperature_degc={unit}" if unit else ""
+    assert any(
+        f'is not used; --column temperature_degc="{name}"{declared} takes it' in note
+        for note in read(path, Reading()).notes
+    )
+    message = refusal(tmp_path, f"{name},Zeit,current_a,voltage_v\n298,1,2,3\n298,2,2,3\n")
+    assert '--column time_s="Zeit"' in message
 
 
 def test_a_test_s_time_is_proposed_before_a_date(tmp_path):

@@ -799,6 +799,10 @@ def test_what_was_fitted_beside_a_finding_was_told_with_its_values_as_if_found(m
         )
         for note in said
     )
+    recalibrated = HybridModel(model.cell, (offset,), beside=("voltage_sensor_offset",))
+    simulate_file(recalibrated.save(tmp_path / "refit"), record, tmp_path / "o.csv", say_notes=said.extend)
+    words = ": the saved model includes parameters that were fitted together: voltage_sensor_offset."
+    assert any(note.endswith(words) for note in said)
     lost = export(tmp_path / "found", tmp_path / "o.json").left
     assert lost == ("voltage_sensor_offset, fitted beside what was found: BPX has no field for that.",)
     alone = HybridModel(model.cell, (offset,)).save(tmp_path / "alone")
