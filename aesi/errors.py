@@ -74,6 +74,11 @@ class FitError(AesiError, RuntimeError):
     """An estimation cannot be carried out on these data."""
 
 
+def first_line(error: BaseException, most: int = 200) -> str:
+    """What an exception says, in one line of at most `most` characters; its type where it says nothing."""
+    return (str(error).strip().splitlines() or [type(error).__name__])[0][:most]
+
+
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """End of a sentence about an unknown name: the known name with the most similar spelling, or a full stop."""
     from difflib import get_close_matches

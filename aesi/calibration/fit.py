@@ -239,12 +239,13 @@ def _fitted_twice(
     model = reporting.model
     x = _descend(reporting, evaluations, start)
     plain = written_cell(model, x)
-    found, sentences = with_fitted_heat(plain, case_records(model, x))
-    if found is not plain:
+    found, heat, sentences = with_fitted_heat(plain, case_records(model, x))
+    if heat is not None:
         # The thermal lag of the winding behind its case is part of the file, so that the fit has to include it.
         model.set_thermal_data(found)
         x = _descend(reporting, evaluations, x)
         found = written_cell(model, x)
+        sentences = (heat.by(found, case_records(model, x)).sentence, *sentences)
     return x, found, sentences
 
 

@@ -76,6 +76,12 @@ class HeatFit:
             f"{self.rmse_k:.2f} K RMS; they are in the file."
         )
 
+    def by(self, cell: Cell, records: Sequence[CaseRecord]) -> HeatFit:
+        """The same thermal data with the error that they leave where the cell and what it released are others, as of
+        the end of a fit."""
+        used = [one for one in records if one.name in self.records]
+        return fit_heat(cell, used, self.heat_capacity_j_k, conductance_w_k=self.conductance_w_k)
+
 
 def case_records(model: Model, x: Array) -> tuple[CaseRecord, ...]:
     """The records of a fit that have a temperature, at a working vector."""
@@ -86,21 +92,31 @@ def case_records(model: Model, x: Array) -> tuple[CaseRecord, ...]:
     )
 
 
-def with_fitted_heat(cell: Cell, records: Sequence[CaseRecord]) -> tuple[Cell, tuple[str, ...]]:
-    """(cell with its thermal data fitted, sentences). The same cell object is returned where no record determines the
-    heat, or where the file lacks thermal data; a sentence then says so."""
+def with_fitted_heat(
+    cell: Cell, records: Sequence[CaseRecord]
+) -> tuple[Cell, HeatFit | None, tuple[str, ...]]:
+    """(cell with its thermal data fitted, the fit, sentences on what was not used). The same cell object and no fit are
+    returned where no record determines the heat, or where the file lacks thermal data; a sentence then says so."""
     warming = [r for r in records if float(np.ptp(r.kelvin)) > LEAST_RISE_K]
     declared, lacks = cell.heat_capacity_j_k, _lacking(cell)
     if not warming:
         stays = f"the start file has no {lacks}" if lacks else "they stay as in the start file"
-        return cell, (
-            f"heat: no record has a measured temperature that changes by more than {LEAST_RISE_K:g} K, so that heat "
-            f"capacity and cooling are not fitted; {stays}.",
+        return (
+            cell,
+            None,
+            (
+                f"heat: no record has a measured temperature that changes by more than {LEAST_RISE_K:g} K, so that "
+                f"heat capacity and cooling are not fitted; {stays}.",
+            ),
         )
     if declared is None or cell.specific_heat_j_kg_k is None or lacks:
-        return cell, (
-            f"heat: the start file has no {lacks}, so that the temperature of {', '.join(r.name for r in warming)} "
-            "tells no heat capacity and no cooling.",
+        return (
+            cell,
+            None,
+            (
+                f"heat: the start file has no {lacks}, so that the temperature of {', '.join(r.name for r in warming)} "
+                "tells no heat capacity and no cooling.",
+            ),
         )
     explained = (
         warming if _losses_explain(cell, warming) else [r for r in warming if _losses_explain(cell, [r])]
@@ -114,11 +130,11 @@ def with_fitted_heat(cell: Cell, records: Sequence[CaseRecord]) -> tuple[Cell, t
         else ()
     )
     if not explained:
-        return cell, notes
+        return cell, None, notes
     fit = fit_heat(cell, explained, declared)
     specific = cell.specific_heat_j_kg_k * fit.heat_capacity_j_k / declared
     changed = replace(_with_conductance(cell, fit.conductance_w_k), specific_heat_j_kg_k=specific)
-    return changed, (fit.sentence, *notes)
+    return changed, fit, notes
 
 
 def _lacking(cell: Cell) -> str:
@@ -146,17 +162,28 @@ def _losses_explain(cell: Cell, records: Sequence[CaseRecord]) -> bool:
     return all(low <= found[name] <= high for name, (low, high) in ((n, PARAMETERS[n].bounds) for n in found))
 
 
-def fit_heat(cell: Cell, records: Sequence[CaseRecord], start_j_k: float, *, losses: bool = True) -> HeatFit:
+def fit_heat(
+    cell: Cell,
+    records: Sequence[CaseRecord],
+    start_j_k: float,
+    *,
+    losses: bool = True,
+    conductance_w_k: float | None = None,
+) -> HeatFit:
     """Least-squares fit to all records. Each record counts as one reading, since its errors are correlated.
 
     start_j_k : heat capacity at the start, J/K.  losses : False for a cell that releases no heat and only follows its
-    surroundings.
+    surroundings.  conductance_w_k : W/K, with which both thermal values are known and the surroundings alone are
+    fitted; None fits all.
     """
     driven = [(r, r.watts if losses else np.zeros_like(r.watts)) for r in records]
+    known = np.zeros(0 if conductance_w_k is None else 2)
+    start_w_k = TYPICAL_W_K if conductance_w_k is None else conductance_w_k
 
-    def residual(z: Array) -> Array:
+    def residual(fitted: Array) -> Array:
         # The logarithms of both thermal values, then the surroundings of each record.
-        capacity, conductance = start_j_k * np.exp(z[0]), TYPICAL_W_K * np.exp(z[1])
+        z = np.concatenate([known, fitted])
+        capacity, conductance = start_j_k * np.exp(z[0]), start_w_k * np.exp(z[1])
         through = _with_conductance(cell, conductance).conductance_w_k
         assert through is not None
         share = through / conductance
@@ -168,14 +195,14 @@ def fit_heat(cell: Cell, records: Sequence[CaseRecord], start_j_k: float, *, los
             parts.append((case_k - record.kelvin) / READING_K / len(case_k) ** 0.5)
         return np.concatenate([*parts, SURROUNDINGS_UNIT * z[2:]])
 
-    z = least_squares(residual, np.zeros(2 + len(driven)), loss="soft_l1").x
+    found = least_squares(residual, np.zeros(2 + len(driven) - len(known)), loss="soft_l1").x
     rows = sum(len(watts) for _, watts in driven)
-    errors = residual(z)[:rows]
+    errors, z = residual(found)[:rows], np.concatenate([known, found])
     counts = np.concatenate([np.full(len(w), len(w) ** 0.5) for _, w in driven])
     rmse = rms(errors * counts * READING_K)
     return HeatFit(
         float(start_j_k * np.exp(z[0])),
-        float(TYPICAL_W_K * np.exp(z[1])),
+        float(start_w_k * np.exp(z[1])),
         rmse,
         tuple(r.name for r, _ in driven),
     )

@@ -35,8 +35,7 @@ class Scores:
     """Scores of one replay: shares in [0, 1], widths and score in V.
 
     worst_bin_coverage is NaN where no current and state of charge were given or there are no more than 200
-    samples; low_minutes (the share of minute-long windows with under 70 % coverage) is NaN where the sampling
-    interval is unknown or the record shorter than a minute.
+    samples.
     """
 
     n: int
@@ -44,7 +43,6 @@ class Scores:
     mean_width_v: float
     interval_score_v: float
     worst_bin_coverage: float
-    low_minutes: float
 
 
 def scores_of(
@@ -53,11 +51,10 @@ def scores_of(
     alpha: float,
     current_a: Array | None = None,
     soc: Array | None = None,
-    dt_s: float | None = None,
 ) -> Scores:
-    """All scores of one record: intervals and residuals of the same (n,) samples.
+    """Scores of intervals and residuals of the same (n,) samples.
 
-    current_a : (n,) A and soc : (n,) for the bins.  dt_s : s, for the minute-long windows.
+    current_a : (n,) A and soc : (n,) for the bins.
     """
     seen = np.isfinite(residuals)
     covered = np.where(seen, intervals.covers(residuals), np.nan)
@@ -70,7 +67,6 @@ def scores_of(
         mean_width_v=float(np.mean(intervals.width_v[seen])) if seen.any() else np.nan,
         interval_score_v=interval_score(intervals.lower_v, intervals.upper_v, residuals, alpha),
         worst_bin_coverage=worst,
-        low_minutes=low_minute_share([covered], dt_s) if dt_s is not None else np.nan,
     )
 
 

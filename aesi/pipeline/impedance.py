@@ -57,7 +57,7 @@ def impedance_file(
     model : "espm" or "dfn"; None takes that of a saved model, or that the cell's file was fitted with, else "espm".
     soh : share of the file's capacity that the cell had then, or the day of the test; None takes all of it.
     say_notes : is given a sentence where the model has no double layer, and frequencies at which that shows, and on
-    frequencies too low and too high for it.
+    frequencies that are too low and too high for it, or there more than once.
     """
     given = declared_model(cell)
     declared = given.with_soh(soh)
@@ -76,12 +76,24 @@ def impedance_file(
                 *_missing_effect_sentences(active),
             ]
         )
+        say_notes(_repeated_sentences(hz, soc, temperature_degc))
         if hz.max() > INSTANT_HZ and not _has_double_layer(declared.cell, active):
             say_notes([NO_DOUBLE_LAYER])
         say_notes(
             _frequency_sentences(hz, slowest_diffusion_hz(declared.cell, soc, temperature_degc, active))
         )
     return z
+
+
+def _repeated_sentences(hz: Array, soc: float, temperature_degc: float) -> list[str]:
+    """A sentence where frequencies are there more than once, as in a file of spectra of several states."""
+    different = len(np.unique(hz))
+    if different == len(hz):
+        return []
+    return [
+        f"the file has {len(hz):,} rows and {different:,} different frequencies: if it holds spectra of several "
+        f"states, the impedance of all rows is that at a state of charge of {soc:g} and {temperature_degc:g} degC."
+    ]
 
 
 def _frequency_sentences(hz: Array, slowest_hz: float) -> list[str]:

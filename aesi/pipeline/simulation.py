@@ -44,7 +44,7 @@ from aesi.pipeline.simulation_words import (
     first_error_sentences,
     simulated_record_sentences,
 )
-from aesi.records import Hold, Measurement, Run, assumed_hold, hold_sentence
+from aesi.records import Hold, Measurement, Run, hold_sentence
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -60,8 +60,7 @@ class ProfileRequest:
 
     soc0 : state of charge at the first row; None takes it from the file's voltage, where it has one (see
     `initial_state`), else from the saved model.
-    hold : how the current runs between rows. None takes that of a saved model; for a cell's file, straight lines for a
-    profile without a voltage, and what `assumed_hold` says for a measurement.
+    hold : how the current runs between rows; None takes what `HybridModel.hold_of` says.
     reading : how the file is read.
     self_heating : the cell warms itself, by the thermal data of its file.
     soh : share of the file's capacity that the cell had then, or the day of the test; None takes all of it.
@@ -108,15 +107,8 @@ def simulate_file(
         say(["the saved model's learnt correction is no part of a simulation; `aesi predict` has it."])
         declared = replace(declared, finding="")  # it is of the model with its correction
     say([*other_model_sentences(declared, model), *soh_day_sentences(given.cell, asked.soh)])
-    saved, lone = cell.is_dir(), profile.voltage_v is None
-    assumed = declared.hold if saved else "linear" if lone else assumed_hold(profile.time_s)
-    used = replace(
-        declared,
-        effects=(*declared.effects, *effects),
-        hold=asked.hold or assumed,
-        model=model or declared.model,
-    )
-    profiled = _profiled_model(used, profile, current, asked, say, saved=saved)
+    used = replace(declared, effects=(*declared.effects, *effects), model=model or declared.model)
+    profiled = _profiled_model(used, profile, current, asked, say)
     used = profiled.model
     with _with_start_doubt(profiled.start, say):
         run = simulate(
@@ -126,7 +118,7 @@ def simulate_file(
             profiled.start.soc,
             used.effects,
             profile.temperature_degc,
-            used.hold,
+            used.hold_of(profiled.record),
             on_depletion="clip" if asked.run_on else "raise",
             model=used.model,
         )
@@ -198,8 +190,7 @@ def predict_file(
     given = HybridModel.load(model)
     saved = given.with_soh(asked.soh)
     say(soh_day_sentences(given.cell, asked.soh))
-    used = replace(saved, hold=asked.hold or saved.hold)
-    profiled = _profiled_model(used, profile, current, asked, say, saved=True)
+    profiled = _profiled_model(saved, profile, current, asked, say)
     hybrid, record = profiled.model, profiled.record
     start, soc0_sd = profiled.start, profiled.start.read_sd if asked.soc0_sd is None else asked.soc0_sd
     with _with_start_doubt(start, say):
@@ -237,12 +228,9 @@ def _profiled_model(
     file: Path,
     asked: ProfileRequest,
     say: SayNotes,
-    *,
-    saved: bool,
 ) -> _ProfiledModel:
     """The model as it is asked for, with the profile and its initial state; says what is assumed.
 
-    saved : the model is one of a folder, whose hold it has where none is asked for.
     Raises DataError for a profile that cannot be of its cell.
     """
     cooling: tuple[str, ...] = ()
@@ -253,16 +241,16 @@ def _profiled_model(
         model = replace(model, effects=heated)
     record = _record(profile, file, asked.hold)
     check_belongs(model.cell, [record])
-    start = _start(model, record, asked.soc0)
+    start, hold = _start(model, record, asked.soc0), model.hold_of(record)
     say(
         [
             *model.cell.unread,
             *fitted_record_sentences(model.cell, record, asked.soh, model.effects),
             start.sentence,
-            hold_sentence(record.name, model.hold, asked.hold is not None, saved=saved),
+            hold_sentence(record.name, hold, asked.hold is not None, saved=model.hold is not None),
             temperature_sentence(model.cell, record, model.effects),
             *temperature_range_sentences(model.cell, [record.temperature_degc], model.effects),
-            *contradiction_sentences(model, record, start.soc, model.hold),
+            *contradiction_sentences(model, record, start.soc, hold),
             *effect_sentences(record, model),
             *cooling,
             *([f"when this model was made: {model.finding}"] if model.finding else []),
@@ -300,7 +288,12 @@ def _record(profile: CurrentProfile, file: Path, hold: Hold | None) -> Measureme
 def _start(model: HybridModel, record: Measurement, soc0: float | None) -> InitialState:
     """The state of charge at the first row: as given, from the voltage, or the saved model's."""
     start = partial(
-        initial_state, model.cell, record, hold=model.hold, effects=model.effects, model=model.model
+        initial_state,
+        model.cell,
+        record,
+        hold=model.hold_of(record),
+        effects=model.effects,
+        model=model.model,
     )
     if soc0 is not None or np.isfinite(record.voltage_v[0]) or model.soc0 is None:
         return start(soc0)

@@ -36,7 +36,8 @@ def effect_sentences(record: Measurement, model: HybridModel) -> list[str]:
     beside = [id for id in (acting | held) if id in model.beside]
     said = [f"with {', '.join(told)}"] if told else []
     said += [f"the saved model includes {', '.join(inside)}"] if inside else []
-    said += [f"and other parameters that were fitted together: {', '.join(beside)}"] if beside else []
+    which = "and other" if said else "the saved model includes"
+    said += [f"{which} parameters that were fitted together: {', '.join(beside)}"] if beside else []
     return [f"{record.name}: {'; '.join(said)}."] if said else []
 
 

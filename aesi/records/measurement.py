@@ -81,7 +81,7 @@ class Measurement:
     time_s, current_a, voltage_v : (n,) s (strictly increasing), A (discharge positive), V (NaN where it is unknown).
     temperature_degc : (n,) degC, or None where it was not measured.
     notes : what a reader dropped, mapped or resampled, one sentence each.
-    hold : declared course of the current between rows, or None; `hold_taken` falls back on `assumed_hold`.
+    hold : declared course of the current between rows, or None; `hold_taken` says how it is taken then.
     examined_digest : content hash of the rows that a reader examined; empty where none did.
     """
 
@@ -140,13 +140,15 @@ class Measurement:
 
     @property
     def hold_taken(self) -> Hold:
-        """How the current is taken to run between rows: as declared, else as `assumed_hold` says."""
-        return self.hold or assumed_hold(self.time_s)
+        """How the current is taken to run between rows: as declared, else as `assumed_hold` says; a profile without a
+        voltage, which no logger wrote, in straight lines."""
+        lone = not np.isfinite(self.voltage_v).any()
+        return self.hold or ("linear" if lone else assumed_hold(self.time_s))
 
     @property
     def charge_ah(self) -> float:
-        """Charge taken out over the record, Ah, with the current in straight lines between rows."""
-        return float(np.trapezoid(self.current_a, self.time_s)) / SECONDS_PER_HOUR
+        """Charge taken out over the record, Ah, with the current as `hold_taken` between rows."""
+        return float(self.steps_as(self.hold_taken).sum()) / SECONDS_PER_HOUR
 
     def discharged_ah(self, hold: Hold) -> Array:
         """(n,) Ah, charge taken out since the first row, minus the charge put in.

@@ -95,8 +95,8 @@ class Discovery:
 
     cell, held, model_effects : the written model: its cell, the effects that the cell's values contain, and the effects
     that a cell file cannot hold.
-    soc0, hold : of the first record: fitted state of charge at the first row, in the stoichiometry windows of `cell`,
-    and how the current runs between rows.
+    soc0 : of the first record: fitted state of charge at the first row, in the stoichiometry windows of `cell`.
+    hold : how the current runs between the rows of all records, as they declare; None where they differ or do not.
     written : effects of the written model by id, with their parameters; they differ from the verdict's where these do
     not carry over.  own : model -> the declared parameters that were fitted, and their values.
     candidates : each effect that was simulated, best first.  files : errors by file and part.
@@ -124,7 +124,7 @@ class Discovery:
     after: ResidualStructure
     model_effects: tuple[ActiveEffect, ...]
     soc0: float
-    hold: Hold
+    hold: Hold | None
     effects: Mapping[str, Effect]
     experiments: tuple[tuple[tuple[str, ...], str], ...]
     choice: ModelChoice
@@ -296,7 +296,7 @@ def _discovery_of(
         model_effects=inside.left,
         held=inside.held,
         soc0=soc0,
-        hold=records[0].hold,
+        hold=records[0].data.hold if len({r.data.hold for r in records}) == 1 else None,
         effects=problem.effects,
         experiments=tuple((g, telling_experiment(g, problem.effects)) for g in verdict.groups),
         choice=choice,

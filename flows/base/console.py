@@ -27,14 +27,20 @@ class Console:
         print(message, file=sys.stderr, flush=True)
         _LOG.info(message)
 
-    def progress(self, what: str, done: int, total: int, started_s: float, note: str = "") -> None:
-        """Where a long piece of work stands; `started_s` is time.monotonic() at its start."""
+    def progress(
+        self, what: str, done: int, total: int, started_s: float, note: str = "", known: int = 0
+    ) -> None:
+        """Where a long piece of work stands; `started_s` is time.monotonic() at its start.
+
+        known : how many of those done were known from before, and took no time.
+        """
         now = time.monotonic()
         finished = done >= total
         if not self._moving and not finished and now - self._last_s < self._every_s:
             return
         self._last_s = now
-        line = f"  {what}: {done}/{total}{_left(done, total, now - started_s)}{f', {note}' if note else ''}"
+        left = _left(done, total, now - started_s, known)
+        line = f"  {what}: {done}/{total}{left}{f', {note}' if note else ''}"
         self._show(line)
         if finished:
             self._close()
@@ -63,12 +69,11 @@ class Console:
             self._open_line = False
 
 
-def _left(done: int, total: int, elapsed_s: float) -> str:
-    if done == 0:
-        return ""
+def _left(done: int, total: int, elapsed_s: float, known: int) -> str:
     if done >= total:
         return f" in {duration(elapsed_s)}"
-    return f", about {duration(elapsed_s / done * (total - done))} left"
+    worked = done - known
+    return f", about {duration(elapsed_s / worked * (total - done))} left" if worked > 0 else ""
 
 
 def duration(seconds: float) -> str:
@@ -76,8 +81,3 @@ def duration(seconds: float) -> str:
     if seconds < 90:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.1f} min"
-
-
-def first_line(error: BaseException) -> str:
-    """What an exception says, in one line of at most 200 characters; its type where it says nothing."""
-    return (str(error).strip().splitlines() or [type(error).__name__])[0][:200]

@@ -17,6 +17,11 @@ DATABRICKS = ("databricks", "databricks-uc", "uc")
 """Admissible schemes of an address. Any other is a folder of files for MLflow, which takes no new runs."""
 MEANT_OTHERWISE = re.compile(r"%[0-9A-Fa-f]{2}|[?]")
 """Parts of a path that the address of a database has for other things: the file would be another."""
+SERVER_LOGIN = re.compile(r"^[^/?#]*@")
+DATABASE_LOGIN = re.compile(r"^[^:/]*(:[^@]*)?@([^/?@]*@)*")
+"""The login at the head of what follows `//`: a password may hold `/`, `?` and `#` where SQLAlchemy reads it."""
+LOGIN_OPTION = re.compile(r"[^=]*(user|passw|pwd|odbc_connect)", re.IGNORECASE)
+"""An option behind the `?` of a database's address that holds a part of the login."""
 PLACE = "runs are tracked in the current folder, or in the one that AESI_HOME names"
 """Where runs are to be found that are not in the store that was opened."""
 
@@ -64,6 +69,9 @@ def database_file(uri: str) -> Path:
 
 def without_login(uri: str) -> str:
     """The address without the user and the password that may be in it, as it may be shown and written."""
-    place = re.split("[/?#]", uri.partition("//")[2], maxsplit=1)[0]
-    login, at, _ = place.rpartition("@")
-    return uri.replace(f"{login}{at}", "", 1)
+    scheme, slashes, rest = uri.partition("//")
+    if scheme.startswith(SERVERS):
+        return scheme + slashes + SERVER_LOGIN.sub("", rest)
+    place, _, options = DATABASE_LOGIN.sub("", rest).partition("?")
+    kept = [option for option in options.split("&") if option and not LOGIN_OPTION.match(option)]
+    return f"{scheme}{slashes}{place}{'?' if kept else ''}{'&'.join(kept)}"

@@ -374,16 +374,16 @@ def discover(
     Example: aesi discover --cell cell.bpx.json --data drive.csv --out found
     """
     if out is not None:
-        given = [*([cell] if cell else []), *(data or []), *(test or []), *(good or []), *(effect_file or [])]
-        outputs.check_folder(out, given, discovery_files(out))
+        read = [*([cell] if cell else []), *(data or []), *(test or []), *(good or []), *(effect_file or [])]
+        outputs.check_folder(out, read, discovery_files(out))
     if experiment is not None:
         options.check_unsaid(context, BESIDE_AN_EXPERIMENT)
         _discover_experiment(experiment, list(overrides or []), out, prefect)
         return
     if cell is None or not data or out is None:
-        given = {"--cell": cell, "--data": data, "--out": out}
-        lacking = " and ".join(option for option, value in given.items() if not value)
-        raise InputError(f"give {lacking}{'' if any(given.values()) else ', or an experiment file'}.")
+        needed = {"--cell": cell, "--data": data, "--out": out}
+        lacking = " and ".join(option for option, value in needed.items() if not value)
+        raise InputError(f"give {lacking}{'' if any(needed.values()) else ', or an experiment file'}.")
     if overrides:
         raise InputError(
             "--set changes a key of an experiment file, and none is given; use the options instead."

@@ -1,4 +1,4 @@
-"""Commands about experiments: run, worker, tables, ui."""
+"""Commands about experiments: run, worker, tables, compare, candidate, ui."""
 
 from __future__ import annotations
 
@@ -121,8 +121,8 @@ def compare(
     runs: Annotated[
         list[str],
         typer.Argument(
-            help="Ids of tracked runs, or their beginnings; a name of an experiment takes all its runs, and its "
-            "discoveries in tables of their own."
+            help="Ids of tracked runs, their beginnings, or the folders that they wrote; a name of an experiment takes "
+            "all its runs, and its discoveries in tables of their own."
         ),
     ],
     out: Annotated[Path, typer.Option(help="HTML file to write.")] = Path("compare.html"),

@@ -119,7 +119,7 @@ HOLD_HELP = (
 )
 HoldOption = Annotated[
     Literal["linear", "backward"] | None,
-    typer.Option("--hold", help=HOLD_HELP.format("that of a saved model; else ")),
+    typer.Option("--hold", help=HOLD_HELP.format("that of a saved model, if it has one; else ")),
 ]
 RecordHold = Annotated[
     Literal["linear", "backward"] | None, typer.Option("--hold", help=HOLD_HELP.format(""))

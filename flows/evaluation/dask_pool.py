@@ -62,6 +62,11 @@ def connect(address: str | None, workers: int) -> tuple[Any, Any]:
     try:
         return distributed.Client(cluster or address, timeout=CONNECT_S, set_as_default=False), cluster
     except (OSError, TimeoutError, ValueError) as error:
+        if cluster is not None:
+            cluster.close(timeout=10)
+            raise AesiError(
+                f"the Dask cluster on this machine does not answer ({error}); use the runner local."
+            ) from None
         raise AesiError(
             f"the Dask scheduler {address} does not answer ({error}); start it with `dask scheduler`, or "
             "leave out --address for a cluster on this machine."

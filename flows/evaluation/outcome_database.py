@@ -11,8 +11,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from aesi.errors import InputError
+from aesi.errors import InputError, first_line
 from flows.base.databases import limits, with_driver
+from flows.base.store_address import without_login
 
 
 class DatabaseOutcomes:
@@ -153,14 +154,13 @@ class DatabaseOutcomes:
                 raise self._unusable(error) from None
 
     def _unusable(self, error: Exception) -> InputError:
-        where = self._engine.url.render_as_string(hide_password=True)
+        where = without_login(self._engine.url.render_as_string(hide_password=False))
         return InputError(f"runner.storage {where} cannot be used: {_reason(error)}.")
 
 
 def _reason(error: Exception) -> str:
     """What the driver said, without the statement."""
-    cause = error.__cause__ or error
-    return (str(cause).strip().splitlines() or [type(cause).__name__])[0]
+    return first_line(error.__cause__ or error)
 
 
 def engine_of(url: str) -> Any:
@@ -172,6 +172,8 @@ def engine_of(url: str) -> Any:
 
     try:
         return sa.create_engine(with_driver(url), pool_pre_ping=True, **limits(url))
-    except (ImportError, sa.exc.ArgumentError) as error:
+    except (ImportError, ValueError, sa.exc.ArgumentError) as error:
         advice = "; pip install psycopg2-binary" if isinstance(error, ImportError) else ""
-        raise InputError(f"runner.storage is no database that can be used: {error}{advice}.") from None
+        raise InputError(
+            f"runner.storage is no database that can be used: {first_line(error)}{advice}."
+        ) from None

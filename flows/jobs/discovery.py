@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import time
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from hashlib import sha256
@@ -84,6 +85,13 @@ def run_discovery(
         return _run_discovery(case, out, run, console, under)
 
 
+def _earlier_sentence(out: Path) -> str:
+    """A sentence on a folder in which an earlier search left its fits and, unless it was stopped, its finding."""
+    replaced = ", and its finding is replaced when this search ends" if (out / FINDING).exists() else ""
+    fits = "fits of the same cell and records by this version are taken up again"
+    return f"{out} holds an earlier search: {fits}{replaced}."
+
+
 def _run_discovery(
     case: Case, out: Path, run: Stages, console: Console, under: TrackedUnder
 ) -> dict[str, Any]:
@@ -91,10 +99,7 @@ def _run_discovery(
 
     started = time.monotonic()
     if (out / ARCHIVE).exists():
-        console.say(
-            f"{out} holds an earlier search: fits of the same cell and records by this version are taken up again, and "
-            "its finding is replaced when this search ends."
-        )
+        console.say(_earlier_sentence(out))
     kept = f"What was fitted is kept in {out}; the same command goes on from there."
     title = ", ".join(m.name for m in case.measurements)
     with tracked_job(_subject(case, under), title, console) as tracker, kept_on_interrupt(kept):
@@ -130,6 +135,7 @@ class HypothesisTracker:
     def __init__(self, tracker: Tracker | None, console: Console) -> None:
         self._tracker, self._console = tracker, console
         self._started, self._done = time.monotonic(), 0
+        self._fits: Counter[str] = Counter()
 
     def __call__(self, tried: TriedHypothesis) -> None:
         """One hypothesis: what it says of unseen data, its error and its parameters."""
@@ -148,9 +154,11 @@ class HypothesisTracker:
             "model_error_mv": MV_PER_V * tried.delta_v,
             "simulations": float(tried.simulations),
         }
+        title = f"{name or 'nothing'}, {tried.trust}"
+        self._fits[title] += 1
         self._tracker.nested(
             f"{name}#{self._done}",
-            name or "nothing",
+            title if self._fits[title] == 1 else f"{title}, fit {self._fits[title]}",
             "hypothesis",
             {"hypothesis": name, "trust": tried.trust, **parameters},
             metrics,

@@ -20,9 +20,9 @@ from flows.jobs.temporary_server import as_the_job
 def _experiment_name() -> str:
     """`measured_nmc, seed 0`."""
     given = flow_run.parameters
-    read = given.get("request")
-    config = (read or RunRequest(given["path"], tuple(given.get("overrides") or ()))).config
-    return f"{config.name}, seed {config.seed}"
+    handed = given.get("handed")
+    asked = handed.request if handed else RunRequest(given["path"], tuple(given.get("overrides") or ()))
+    return str(asked.title)
 
 
 def _discovery_name() -> str:
@@ -41,16 +41,17 @@ def experiment(
     address: str | None = None,
     resume: bool = False,
     use_cache: bool = True,
-    request: Any = None,
+    handed: Any = None,
 ) -> Path:
     """The whole job of `aesi run`: data, physics, search, ensembles, intervals, tables, figures, report.
 
-    request : all of the above with the file as it was read, which only a process that has read it can hand over. A
+    handed : all of the above with the file as it was read, which only a process that has read it can hand over. A
     deployment gives none, and the file is read as the flow starts.
     """
     environment.prepare_process()
     console = Console()
-    request = request or RunRequest(path, tuple(overrides or ()), runner, address, resume, use_cache)
+    asked = RunRequest(path, tuple(overrides or ()), runner, address, resume, use_cache)
+    request = handed.request if handed else asked
     limit_s = request.config.runner.stage_timeout_s
     return as_the_job(lambda: run_experiment(request, PrefectStages(console.say, limit_s), console))
 
@@ -63,24 +64,23 @@ def discovery(
     cell: str = "",
     data: list[str] | None = None,
     case: Any = None,
-    request: Any = None,
+    handed: Any = None,
 ) -> dict[str, Any]:
     """The whole job of `aesi discover`.
 
     path : an experiment file that describes the case and how it is tracked, as a deployment gives it.
     case : which only a process that has read the records can hand over: `cell` and `data` then say what it is about.
-    request : `path` and `overrides` with the file as that process has read it, which says how the case is tracked: the
-    address may hold a password, which Prefect would keep and show among the parameters.
+    handed : `path` and `overrides` with the file as that process has read it, which says how the case is tracked.
     """
     environment.prepare_process()
     console = Console()
     folder = Path(out) if out else None
     under = TrackedUnder()
     if case is None:
-        asked = request or RunRequest(str(path), tuple(overrides or ()))
+        asked = handed.request if handed else RunRequest(str(path), tuple(overrides or ()))
         case, folder, under = case_and_folder(asked.config, folder)
-    elif request is not None:
-        under = TrackedUnder.of(request.config)
+    elif handed:
+        under = TrackedUnder.of(handed.request.config)
     assert folder is not None  # `aesi discover` with records asks for one
     stages = PrefectStages(console.say)
     return as_the_job(lambda: run_discovery(case, folder, stages, console, under))

@@ -8,7 +8,17 @@ from functools import cached_property
 from typing import Literal
 
 from aesi.errors import InputError
-from aesi.pipeline.experiment.config import ExperimentConfig, read_experiment
+from aesi.pipeline.experiment.config import (
+    LIMITS,
+    NO_PART,
+    ExperimentConfig,
+    overridden_key,
+    read_experiment,
+)
+from flows.base.store_address import without_login
+
+UNTOLD = ("name", "seed", *NO_PART)
+"""Sections that a title need not tell what was laid over: it does already, or they have no part in the result."""
 
 
 @dataclass(frozen=True)
@@ -44,12 +54,41 @@ class RunRequest:
         return config.model_copy(update={"runner": runner})
 
     @property
+    def title(self) -> str:
+        """What the run is called: `measured_nmc, seed 0`, with what is laid over the file and has a part in the result,
+        `measured_nmc, seed 0: data.dt_s=2`."""
+        keys = {text: overridden_key(text).split(".") for text in self.overrides}
+        told = [
+            text
+            for text, key in keys.items()
+            if key[0] not in UNTOLD and not (key[0] == "search" and key[-1] in LIMITS)
+        ]
+        title = f"{self.config.name}, seed {self.config.seed}"
+        return f"{title}: {', '.join(told)}" if told else title
+
+    @property
+    def shown_overrides(self) -> list[str]:
+        """What is laid over the file, without the logins of the addresses in it."""
+        pairs = (text.partition("=") for text in self.overrides)
+        return [f"{key}{equals}{without_login(value)}" for key, equals, value in pairs]
+
+    @property
     def resuming(self) -> str:
-        """The command line that goes on with what this one began."""
+        """The command line that goes on with what this one began, without the logins of addresses in it."""
         words = ["aesi", "run", self.path]
-        words += [word for text in self.overrides for word in ("--set", text)]
+        words += [word for text in self.shown_overrides for word in ("--set", text)]
         words += ["--runner", self.runner] if self.runner else []
         words += ["--address", self.address] if self.address else []
         words += [] if self.use_cache else ["--no-cache"]
         words += [] if self.use_prefect else ["--no-prefect"]
         return shlex.join([*words, "--resume"])
+
+
+class HandedOver:
+    """A request on its way into a flow. Prefect keeps and shows what it can read of a parameter: nothing of this one,
+    as it has no fields that can be listed."""
+
+    __slots__ = ("request",)
+
+    def __init__(self, request: RunRequest) -> None:
+        self.request = request

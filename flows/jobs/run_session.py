@@ -127,7 +127,7 @@ def _begin(
     deliver_leftovers(store, console.say)
     anew = not request.use_cache
     old = _unfinished(config, store, console, held, anew) if request.resume else None
-    tracker = Tracker(store, config, console.say, old.run_id if old else None)
+    tracker = Tracker(store, config, console.say, old.run_id if old else None, request.title)
     if old:
         record = replace(old, status="running")
     else:

@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from typing import Protocol, TypeVar
 from uuid import UUID
 
-from aesi.errors import AesiError
-from flows.base.console import duration, first_line
+from aesi.errors import AesiError, first_line
+from flows.base.console import duration
 from flows.base.time_limit import Overdue, time_limit
 from flows.jobs.temporary_server import KeptWork, no_answer, of_prefect, stop_sending
 

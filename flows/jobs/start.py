@@ -8,11 +8,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
+from aesi.errors import first_line
 from flows.base import environment
-from flows.base.console import Console, first_line
+from flows.base.console import Console
 from flows.jobs.discovery import TrackedUnder, case_and_folder, check_case, run_discovery
 from flows.jobs.experiment import run_experiment
-from flows.jobs.run_request import RunRequest
+from flows.jobs.run_request import HandedOver, RunRequest
 from flows.jobs.stages import PlainStages, server_in_reach
 from flows.jobs.temporary_server import (
     CURRENT,
@@ -56,12 +57,12 @@ def start(
 
         folder: Path = experiment(
             request.path,
-            list(request.overrides),
+            request.shown_overrides,
             runner=request.runner,
             address=request.address,
             resume=request.resume,
             use_cache=request.use_cache,
-            request=request,
+            handed=HandedOver(request),
         )
         return Path(folder)
 
@@ -96,12 +97,12 @@ def discover(
 
         found: dict[str, Any] = discovery(
             path=request.path if request else None,
-            overrides=list(request.overrides) if request else [],
+            overrides=request.shown_overrides if request else [],
             out=str(out),
             cell=case.cell.name.removesuffix(".json").removesuffix(".bpx"),
             data=[one.name for one in case.measurements],
             case=case,
-            request=request,
+            handed=HandedOver(request) if request else None,
         )
         return found
 

@@ -13,8 +13,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
-from aesi.errors import AesiError
-from flows.base.console import first_line
+from aesi.errors import AesiError, first_line
 from flows.base.interrupt import hearing_signals_again
 from flows.base.time_limit import Overdue, time_limit
 

@@ -43,9 +43,11 @@ from flows.tracking.experiment_log import (
     coefficients,
     reduced,
 )
+from flows.tracking.provenance import COMMIT
 from flows.tracking.store import KIND, PARENT, Store, is_of_experiment
+from flows.tracking.tracker import FAILED
 
-COMMIT, COMMIT_SHOWN = "mlflow.source.git.commit", 10
+COMMIT_SHOWN = 10
 GENES = ("lambda1", "lambda2", "tau", "p_c", "d", "feedback")
 
 
@@ -202,8 +204,8 @@ def _candidate(store: Store, run_id: str) -> Any:
         run = chosen
     if run.data.tags.get(KIND) != "candidate":
         raise InputError(f"run {run_id} is no candidate of a search, nor the run of an experiment.")
-    if "aesi.failed" in run.data.tags:
-        raise InputError(f"candidate {run_id} had failed: {run.data.tags['aesi.failed']}")
+    if FAILED in run.data.tags:
+        raise InputError(f"candidate {run_id} had failed: {run.data.tags[FAILED]}")
     if "terms" not in run.data.params:
         raise InputError(f"candidate {run_id} was tracked without its terms, by an earlier version.")
     return run

@@ -15,6 +15,8 @@ from flows.tracking.experiment_log import OF_A_MODEL
 from flows.tracking.store import Store, beginning, is_of_experiment, job_of
 from flows.tracking.tracker import was_cut
 
+FINISHED = "FINISHED"
+"""MLflow's word for the state of a run that reached its end."""
 OF_THE_RESULT = ("chosen_candidate", "chosen_model")
 """Parameters that are what came of a run, not what was asked for."""
 
@@ -22,8 +24,8 @@ OF_THE_RESULT = ("chosen_candidate", "chosen_model")
 def compare(wanted: Sequence[str], out: Path, uri: str | None = None) -> list[ComparedRun]:
     """Write the page about the runs that are named; returns what it shows.
 
-    wanted : run ids or their beginnings, or names of experiments for all finished runs of the name: also discoveries,
-    batches and benchmarks, which stand in tables of their own.
+    wanted : run ids, their beginnings or the folders that they wrote, or names of experiments for all finished runs of
+    the name: also discoveries, batches and benchmarks, which stand in tables of their own.
     Raises InputError where a name stands for nothing that is tracked, or fewer than two runs are left.
     """
     store = Store.to_read(uri)
@@ -45,7 +47,7 @@ def _chosen(store: Store, wanted: Sequence[str]) -> list[tuple[str, Any]]:
     for name in wanted:
         if name in by_name:
             jobs = store.jobs(by_name[name])
-            matching = [run for run in reversed(jobs) if run.info.status == "FINISHED"]
+            matching = [run for run in reversed(jobs) if run.info.status == FINISHED]
         else:
             known = known if known is not None else store.all_jobs()
             matching = beginning(known, name)
@@ -67,6 +69,7 @@ def _compared(store: Store, experiment: str, run: Any) -> ComparedRun:
         experiment=experiment,
         started=datetime.fromtimestamp(run.info.start_time / 1000, UTC).strftime("%Y-%m-%d %H:%M"),
         job=job_of(run),
+        finished=run.info.status == FINISHED,
         settings={k: v for k, v in run.data.params.items() if k not in OF_THE_RESULT},
         metrics=_metrics(run),
         chosen=run.data.params.get("chosen_model", ""),

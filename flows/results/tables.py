@@ -17,8 +17,9 @@ from aesi.errors import InputError
 from aesi.pipeline.report import tables
 from aesi.pipeline.written import FIGURES, REPORT, SUMMARY
 from flows.base.store_address import without_login
-from flows.tracking.experiment_log import CODE, SETTING, UNFITTED
-from flows.tracking.store import KIND, Store, is_of_experiment
+from flows.tracking.experiment_log import CODE, FALLBACK, SETTING, UNFITTED
+from flows.tracking.store import KIND, Store, beginning, is_of_experiment
+from flows.tracking.view import NOTE
 
 RANGED = ("test_mser_pct", "test_mser_recalibrated_pct", "coverage_pct")
 """Figures that tables show with their range over seeds."""
@@ -178,7 +179,7 @@ def _of_one_setting(asked: Mapping[str, Any]) -> list[Any]:
 
 
 def _by_id(finished: Sequence[Any], run_id: str, name: str) -> Any:
-    found = [run for run in finished if run.info.run_id.startswith(run_id)]
+    found = beginning(finished, run_id)
     if len(found) != 1:
         raise InputError(f"{run_id!r} names {len(found)} finished runs of {name!r}; give a whole run id.")
     return found[0]
@@ -199,11 +200,11 @@ def _footer(name: str, runs: Sequence[Any], left_out: _LeftOut, format: str) -> 
     text = f"Experiment {name}, tracked run{'s' if len(runs) > 1 else ''} {_ids(runs)}."
     if len(runs) > 1:
         text = f"Mean over {len(runs)} seeds. {text}"
-    about, below, _ = runs[0].data.tags.get("mlflow.note.content", "").partition("\n\n")
+    about, below, _ = runs[0].data.tags.get(NOTE, "").partition("\n\n")
     if about and below:  # without a note what came of that one run stands there alone
         text = f"{text} {about.splitlines()[0].rstrip('.')}."
     for run in runs:
-        told = (run.data.tags.get(tag) for tag in ("aesi.fallback", UNFITTED))
+        told = (run.data.tags.get(tag) for tag in (FALLBACK, UNFITTED))
         text = " ".join((text, *filter(None, told)))
     text += _left_out_words(left_out, runs[0])
     return {"md": text, "tex": f"% {text}", "csv": f"# {text}"}[format]

@@ -9,12 +9,11 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from aesi.errors import InputError
+from aesi.errors import InputError, first_line
 from flows.base import environment
-from flows.base.console import first_line
 from flows.base.store_address import PLACE, checked_address, without_login
 from flows.tracking.store import Store
-from flows.tracking.view import TRAINING, VIEW, view_of
+from flows.tracking.view import TRAINING, VIEW_TAG, view_of
 
 if TYPE_CHECKING:
     from optuna.storages import BaseStorage
@@ -39,16 +38,7 @@ def serve(port: int, host: str, uri: str | None) -> None:
     _check_free(host, port)
     # Of the workspace the tables are made, so that its first run can be watched; of a named store they are there.
     store = Store.to_read(uri) if named else Store(uri)
-    command = [
-        sys.executable,
-        "-m",
-        "mlflow",
-        "server",
-        "--backend-store-uri",
-        uri,
-        "--registry-store-uri",
-        uri,
-    ]
+    command = [sys.executable, "-m", "mlflow", "server"]
     command += ["--host", host, "--port", str(port), "--workers", "1"]
     address = f"http://{_shown(host)}:{port}/"
     print(f"MLflow shows the runs at {address}#/experiments?{TRAINING} (Ctrl-C ends it)")
@@ -57,7 +47,9 @@ def serve(port: int, host: str, uri: str | None) -> None:
     if not store.all_jobs():
         print(f"  Nothing is tracked in {without_login(uri)} yet; {PLACE}.")
     sys.stdout.flush()
-    surroundings = _admitted(host, port) | os.environ | QUIETLY
+    # The address may hold a password: everyone on the machine may read a command line, its owner alone these.
+    stores = {"MLFLOW_BACKEND_STORE_URI": uri, "MLFLOW_REGISTRY_STORE_URI": uri}
+    surroundings = _admitted(host, port) | os.environ | QUIETLY | stores
     os.execve(sys.executable, command, surroundings)  # so that whatever ends this process ends the server
 
 
@@ -99,7 +91,7 @@ def _views(store: Store) -> list[tuple[str, str]]:
     return [
         (each.name, view_of(each.experiment_id))
         for each in store.client.search_experiments()
-        if f"mlflow.sharedViewState.{VIEW}" in each.tags
+        if VIEW_TAG in each.tags
     ]
 
 

@@ -19,16 +19,16 @@ from optuna.storages import BaseStorage, JournalStorage, RDBStorage
 from optuna.storages.journal import JournalFileBackend
 from optuna.trial import TrialState, create_trial
 
+from aesi.errors import first_line
 from aesi.pipeline.experiment.candidate import ScoredCandidate
 from aesi.records import Failed
 from aesi.sparse import Genome
 from aesi.sparse.search.genome import GENE_WORDS
 from aesi.sparse.search.genome_space import GenomeSpace
 from flows.base import environment
-from flows.base.console import first_line
 from flows.base.databases import limits, with_driver
 from flows.search.nsga2 import Constraints
-from flows.search.term_sampler import distributions, widened
+from flows.search.term_sampler import distributions
 
 LOSSES = ("loss out of bag", "loss on validation", "terms")
 CANDIDATE = "candidate"
@@ -92,7 +92,7 @@ class PublishedStudy:
     ) -> optuna.trial.FrozenTrial:
         genes: dict[str, tuple[Any, BaseDistribution]] = {
             GENE_WORDS[gene]: (getattr(genome, gene), distribution)
-            for gene, distribution in widened(distributions(self._space), genome).items()
+            for gene, distribution in distributions(self._space, genome).items()
         }
         noted: dict[str, Any] = {CANDIDATE: number, "terms offered": int(genome.mask(self._space.size).sum())}
         common = {

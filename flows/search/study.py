@@ -160,7 +160,8 @@ class _Scores:
         if self._on_generation is not None and (done % self._population == 0 or done == total):
             self._on_generation(done, total)
         told = _best(self.scored, self._constraints)
-        self._console.progress("candidates", done, total, self._started, told)
+        known = self._evaluation.tally.found
+        self._console.progress("candidates", done, total, self._started, told, known)
 
 
 def settings_of(problem: Problem, config: ExperimentConfig) -> SearchSettings:

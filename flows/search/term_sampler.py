@@ -32,9 +32,10 @@ INDEX = "index"
 """The user attributes that hold the mask, and the index of the candidate in the search."""
 
 
-def distributions(space: GenomeSpace) -> dict[str, BaseDistribution]:
-    """The genes that are Optuna parameters."""
-    return {
+def distributions(space: GenomeSpace, genome: Genome) -> dict[str, BaseDistribution]:
+    """The genes that are Optuna parameters, over ranges that hold this genome: a warm start may be from outside of the
+    space, and Optuna refuses it otherwise."""
+    result: dict[str, BaseDistribution] = {
         "lambda1": FloatDistribution(*space.lambda1, log=True),
         "lambda2": FloatDistribution(*space.lambda2, log=True),
         "tau": FloatDistribution(*space.tau),
@@ -42,6 +43,12 @@ def distributions(space: GenomeSpace) -> dict[str, BaseDistribution]:
         "d": IntDistribution(*space.d),
         "feedback": CategoricalDistribution((False, True)),
     }
+    for name, distribution in result.items():
+        value = getattr(genome, name)
+        if isinstance(distribution, FloatDistribution | IntDistribution):
+            distribution.low = min(distribution.low, value)
+            distribution.high = max(distribution.high, value)
+    return result
 
 
 class TermSampler(NSGAIISampler):
@@ -81,26 +88,16 @@ class TermSampler(NSGAIISampler):
 
     def write(self, genome: Genome, index: int, state: TrialState, **contents: Any) -> FrozenTrial:
         """A trial that carries the genome, for `Study.add_trial`: a single write to the storage."""
-        chosen = distributions(self._space)
+        chosen = distributions(self._space, genome)
         noted = contents.pop("user_attrs", {})
         return create_trial(
             state=state,
             params={name: getattr(genome, name) for name in chosen},
-            distributions=widened(chosen, genome),
+            distributions=chosen,
             user_attrs={TERMS: genome.terms, INDEX: index, **noted},
             system_attrs={self._get_generation_key(): index // self.size},
             **contents,
         )
-
-
-def widened(chosen: dict[str, BaseDistribution], genome: Genome) -> dict[str, BaseDistribution]:
-    """Ranges that hold a warm start from outside of the space as well; Optuna refuses it otherwise."""
-    for name, distribution in chosen.items():
-        value = getattr(genome, name)
-        if isinstance(distribution, FloatDistribution | IntDistribution):
-            distribution.low = min(distribution.low, value)
-            distribution.high = max(distribution.high, value)
-    return chosen
 
 
 def _by_index(trials: Sequence[FrozenTrial]) -> list[FrozenTrial]:

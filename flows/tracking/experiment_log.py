@@ -26,7 +26,7 @@ from flows.tracking.provenance import versions
 from flows.tracking.tracker import Tracker, flat
 from flows.tracking.view import HOW_TO_READ, NOTE, RUN_COLUMNS, experiment_tags
 
-CHOSEN, MEMBERS, UNFITTED = "aesi.chosen", "aesi.members", "aesi.unfitted"
+CHOSEN, MEMBERS, UNFITTED, FALLBACK = "aesi.chosen", "aesi.members", "aesi.unfitted", "aesi.fallback"
 SETTING, CODE = "aesi.setting", "aesi.code"
 """What runs share that differ by seed alone: what was run on which data, and the program that ran it."""
 INPUTS, RECORDS, LEFT_OUT, DECLARED = "inputs", "records.bin", "left_out.bin", "declared"
@@ -62,7 +62,7 @@ def track_start(tracker: Tracker, config: ExperimentConfig, loaded: Loaded, fold
     tracker.about(experiment_tags(f"{config.note}\n\n{HOW_TO_READ}".strip(), RUN_COLUMNS))
     tags = {NOTE: config.note, SETTING: loaded.setting, CODE: source_digest()}
     if loaded.fallback:
-        tags["aesi.fallback"] = loaded.fallback
+        tags[FALLBACK] = loaded.fallback
     tracker.parameters(flat(content) | {"versions": versions(), "cell": loaded.cell_name, **held}, tags)
     tracker.json(EXPERIMENT, whole)
     write_whole(folder / INPUTS / RECORDS, codec.dumps(loaded.split))
@@ -152,7 +152,7 @@ def track_result(
     """
     chosen = summary["chosen"]
     for row in summary["models"]:
-        figures = _numbers(row)
+        figures = _flat_metrics(row)
         tracker.nested(f"model:{row['name']}", row["name"], "model", {"model": row["name"]}, figures)
         if row["name"] == chosen:
             tracker.metrics(figures)
@@ -241,7 +241,7 @@ def _inclusion(model: SparseModel) -> dict[str, float]:
     return dict(zip(model.terms, model.inclusion.tolist(), strict=True))
 
 
-def _numbers(row: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
+def _flat_metrics(row: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
     """The numbers of a table row as metrics: free_run/test_mser_pct and so on, what is no headline below tables/."""
     result: dict[str, float] = {}
     for name, value in row.items():
@@ -249,11 +249,9 @@ def _numbers(row: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
             continue
         if isinstance(value, Mapping):
             below = prefix or ("" if name in HEADLINES else "tables/")
-            result |= _numbers(value, f"{below}{WITH_UNIT.get(name, name)}/")
+            result |= _flat_metrics(value, f"{below}{WITH_UNIT.get(name, name)}/")
         elif isinstance(value, int | float) and not isinstance(value, bool):
             result[f"{prefix}{OF_A_MODEL.get(name, name)}"] = float(value)
-            if name.endswith(
-                "_width_v"
-            ):  # what is read is in millivolts; the summary's own name stays beside it
+            if name.endswith("_width_v"):  # read in millivolts; the summary's own name stays beside it
                 result[f"{prefix}{name.removesuffix('v')}mv"] = MV_PER_V * value
     return result

@@ -13,7 +13,7 @@ from flows.tracking.run_records import RunLock, RunTaken
 from flows.tracking.store import Store
 
 
-def deliver_leftovers(store: Store, say: Callable[[str], None], wait_s: float = FLUSH_S) -> None:
+def deliver_leftovers(store: Store, say: Callable[[str], None]) -> None:
     """Deliver what ended runs could not, where no living run does; say what was found when the store was opened."""
     for note in store.notes:
         say(note)
@@ -24,7 +24,7 @@ def deliver_leftovers(store: Store, say: Callable[[str], None], wait_s: float = 
             if not lock.held:
                 continue
             outbox = Outbox(folder, partial(deliver, store), store.away, say)
-            left = outbox.flush(wait_s)
+            left = outbox.flush(FLUSH_S)
             outbox.close()
             if not left:
                 say(f"tracking: what run {folder.name[:8]} had left over is delivered.")

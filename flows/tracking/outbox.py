@@ -14,8 +14,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from aesi.errors import first_line
 from aesi.numerics.files.whole import write_whole
-from flows.base.console import first_line
 
 Item = dict[str, Any]
 Deliver = Callable[[Item, bool], None]
@@ -119,7 +119,7 @@ class Outbox:
             self._sending = True
             try:
                 attempt = 0 if self._send(waiting[0]) else attempt + 1
-            except OSError as error:  # of the disk: the item could not be crossed off or put aside
+            except OSError as error:  # of the disk: the item could not be crossed off
                 attempt += 1
                 self._old.add(waiting[0].name)
                 self._complain(f"{waiting[0]} is delivered and cannot be removed ({first_line(error)})")
@@ -145,10 +145,17 @@ class Outbox:
             if self._tries < TRIES:
                 return False
             self._tries = 0
+            refused = f"the store refused an item ({first_line(error)})"
             aside = self._folder / REFUSED / path.name
-            aside.parent.mkdir(exist_ok=True)
-            path.replace(aside)
-            self._say(f"tracking: the store refused an item ({first_line(error)}); it is kept in {aside}.")
+            try:
+                aside.parent.mkdir(exist_ok=True)
+                path.replace(aside)
+            except OSError as blocked:
+                self._complain(
+                    f"{refused}; {path} cannot be put aside ({first_line(blocked)}) and is tried again"
+                )
+                return False
+            self._say(f"tracking: {refused}; it is kept in {aside}.")
             return True
         self._tries = 0
         path.unlink(missing_ok=True)

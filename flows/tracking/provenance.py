@@ -8,6 +8,7 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
+COMMIT = "mlflow.source.git.commit"
 VERSIONS = ("aesi", "numpy", "scipy", "scikit-learn", "optuna", "mlflow", "prefect", "quantile-forest")
 
 
@@ -47,4 +48,4 @@ def commit_tags(file: Path) -> dict[str, str]:
         dirty = bool(git("status", "--porcelain", "--untracked-files=no"))
     except (OSError, subprocess.SubprocessError):
         return {"aesi.dirty": "unknown"}
-    return {"mlflow.source.git.commit": commit, "aesi.dirty": str(dirty).lower()}
+    return {COMMIT: commit, "aesi.dirty": str(dirty).lower()}

@@ -18,9 +18,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from aesi.errors import AesiError, InputError
+from aesi.errors import AesiError, InputError, first_line
 from aesi.numerics.files.whole import check_writable
-from flows.base.console import first_line
 from flows.base.databases import limits
 from flows.base.locks import ProcessLock
 from flows.base.store_address import (
@@ -51,7 +50,9 @@ PAGE = 1000
 
 
 def beginning(runs: Sequence[Any], begin: str) -> list[Any]:
-    """Those of the runs whose id begins so; none where that is too short to stand for an id."""
+    """Those of the runs whose id begins so, or that wrote the folder of that name; none where that is too short to
+    stand for an id."""
+    begin = Path(begin).name
     return [run for run in runs if run.info.run_id.startswith(begin)] if len(begin) >= SHORTEST_ID else []
 
 

@@ -35,6 +35,8 @@ NAME_LIMIT = 250
 of a run, and with it the run: a discovery is called by all of its records."""
 NAME = re.compile(r"[\w.\- /]+")
 """What the name of a parameter may be made of on every system."""
+FAILED = "aesi.failed"
+"""Tag of a nested run: why it failed."""
 SAMPLE_S = 10.0
 """Time between two readings of memory and processor, s."""
 LOCAL_UI = "http://127.0.0.1:5000"
@@ -153,7 +155,7 @@ class Tracker:
 
     def metrics(self, values: Mapping[str, float], step: int = 0) -> None:
         """Metrics of the parent run."""
-        self._batch(metrics=_numbers(values), step=step)
+        self._batch(metrics=_finite(values), step=step)
 
     def datasets(self, rows: Sequence[Mapping[str, str]]) -> None:
         """Records with name, digest, source, role and profile (a JSON text)."""
@@ -176,7 +178,7 @@ class Tracker:
             return
         self._tracked.add(label)
         end = now_ms()
-        noted = {KIND: kind, **(tags or {})} | ({"aesi.failed": failed[:5000]} if failed else {})
+        noted = {KIND: kind, **(tags or {})} | ({FAILED: failed[:5000]} if failed else {})
         self._outbox.put(
             {
                 "kind": "run",
@@ -186,7 +188,7 @@ class Tracker:
                 "name": _short(name),
                 "tags": noted,
                 "params": _texts(params),
-                "metrics": _numbers(metrics),
+                "metrics": _finite(metrics),
                 "files": {name: json.dumps(content) for name, content in (files or {}).items()},
                 "status": "FAILED" if failed else "FINISHED",
                 "start_ms": end - int(1000 * seconds),
@@ -347,7 +349,7 @@ def was_cut(text: str) -> bool:
     return len(text) == PARAMETER_LIMIT and CUT in text
 
 
-def _numbers(values: Mapping[str, float]) -> dict[str, float]:
+def _finite(values: Mapping[str, float]) -> dict[str, float]:
     """Finite values alone: MLflow turns infinity into 1.8e308, which then draws every plot's scale."""
     return {
         name: float(value) for name, value in values.items() if value is not None and math.isfinite(value)

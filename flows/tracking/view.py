@@ -63,7 +63,8 @@ HOW_TO_READ = (
 HOW_TO_READ_DISCOVERIES = (
     "A run is one `aesi discover`, and the table lists those alone; with the filter "
     "``tags.`aesi.kind` = 'hypothesis'`` it lists the hypotheses, with what each says of unseen data (`gain_nats`), "
-    f"{UNFOLDED}; one that was fitted again stands there again. `finding` is the verdict in a line; the report is "
+    f"{UNFOLDED}. Each is called by its effects and by how far the cell's file was believed (`trust`), fitted again at "
+    "the same trust by the number of the fit, too. `finding` is the verdict in a line; the report is "
     "among the artifacts."
 )
 HOW_TO_READ_BATCHES = (

@@ -204,6 +204,17 @@ def test_every_recorded_benchmark_has_its_place_on_a_page():
     assert {name for name in recorded if pages.count(f"<!-- generated: bench {name} -->") != 1} == set()
 
 
+def test_ratios_of_times_were_recorded_over_milliseconds_that_had_been_rounded():
+    from flows.benchmarks.history import latest, read_history
+
+    newest = latest(read_history(ROOT / "docs" / "benchmarks.json")).values()
+    lines = [line for _, line in newest if line["bench"] == "spci"]
+    assert lines
+    for line in lines:
+        assert line["ours_s"] != round(line["ours_s"], 3), line["method"]
+        assert line["ratio"] == pytest.approx(line["peer_step_s"] * line["n_test"] / line["ours_s"], abs=0.06)
+
+
 def test_a_marker_that_no_generator_knows_stayed_in_its_page():
     known = hook("generate").GENERATORS
     for page in sorted((ROOT / "docs").rglob("*.md")):

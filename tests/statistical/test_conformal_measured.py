@@ -7,7 +7,7 @@ import pytest
 
 import aesi
 from aesi.conformal import METHODS
-from aesi.conformal.scores import scores_of
+from aesi.conformal.scores import low_minute_share, scores_of
 
 PIECE = 1800  # the drive repeats its schedule every 1,800 s
 
@@ -28,12 +28,13 @@ def test_holds_within_bins_and_minutes(pieces, name: str) -> None:
     past, future = pieces[0::2], pieces[1::2]
     calibrated = METHODS[name].fit([p[0] for p in past], current_a=[p[1] for p in past])
     for residual, current, soc in future:
-        scores = scores_of(calibrated.intervals(residual, current), residual, 0.1, current, soc, dt_s=1.0)
+        intervals = calibrated.intervals(residual, current)
+        scores = scores_of(intervals, residual, 0.1, current, soc)
         # 1,800 samples whose misses the adaptive step spaces out: the share scatters by less than a per cent.
         assert 0.88 <= scores.coverage <= 0.925
         # Some eight bins of little more than 200 samples, each of which scatters by 2 %: four of these below 90 %.
         assert scores.worst_bin_coverage >= 0.82
-        assert scores.low_minutes <= 0.01
+        assert low_minute_share([intervals.covers(residual)], 1.0) <= 0.01
 
 
 def test_the_current_narrows_the_band(pieces) -> None:

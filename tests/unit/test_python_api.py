@@ -128,6 +128,7 @@ def test_a_discovery_takes_records_and_gives_table_plot_and_model(cell, record, 
     assert named.low <= 1e-3 <= named.high
     assert {trace.name for trace in found.plot("test").data} >= {"measured", "after", "as declared"}
     assert found.model.cell.contact_resistance_ohm == pytest.approx(1e-3, rel=0.01), "a cell file can hold it"
+    assert found.model.hold is None, "nobody declared one: the rows of the next record tell it"
     folder = found.save(tmp_path / "found")
     assert {path.name for path in folder.iterdir()} == {"discovery.json", "report.html", "model"}
     whole = aesi.discover(cell, record, soc0=SOC0, holdout=0.0, only=["series_resistance"])

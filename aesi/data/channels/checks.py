@@ -78,11 +78,12 @@ def check_finite(columns: Columns, context: Context) -> None:
     row = faults[quantity]
     what = "is empty or NaN" if np.isnan(columns[quantity][row]) else "is infinite"
     also = " or leave the column out (--column temperature_degc=)" if quantity == "temperature_degc" else ""
+    rows = len(columns[quantity])
     count = int(np.sum(~np.isfinite(columns[quantity])))
-    raise DataError(
-        f"{context.at(quantity, row)} {what} (cells like it: {count}): remove or correct these rows"
-        f"{_beside_one_hole(columns, quantity, row)}{also}."
-    )
+    mend = f"remove or correct these rows{_beside_one_hole(columns, quantity, row)}"
+    if quantity == "temperature_degc" and rows / 2 < count < rows:  # without them little would be left
+        mend = "where its sensor was read less often than the others, interpolate it to all rows,"
+    raise DataError(f"{context.at(quantity, row)} {what} (cells like it: {count}): {mend}{also}.")
 
 
 def _beside_one_hole(columns: Columns, quantity: str, row: int) -> str:

@@ -201,8 +201,9 @@ class _Finder:
                     f"A unit was declared for {quantity} ({self._declared[quantity]}), and there is no such column."
                 )
         leave = {"voltage_v": "", "temperature_degc": ", --column temperature_degc= leaves it out"}
+        unused = [name for place, name in enumerate(self._table.header) if place not in seen]
         for quantity in sorted(leave.keys() - self.position.keys() - self.given.keys()):
-            name = headers.nearest(quantity, self._table.header, doubtful=quantity not in REQUIRED)
+            name = headers.likeliest(quantity, unused, doubtful=quantity not in REQUIRED)
             if name is not None:
                 others = self._other_temperatures(name) if quantity == "temperature_degc" else ""
                 also = f"; there is also {others}" if others else ""

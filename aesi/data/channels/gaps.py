@@ -1,9 +1,10 @@
-"""Missing rows: a sparsely logged rest and a single row long before or after the test get a note, any other gap is
-refused."""
+"""Missing rows: a sparsely logged rest or steady current and a single row long before or after the test get a note, any
+other gap is refused."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -12,7 +13,7 @@ from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.channels.checks import Columns, Context
 from aesi.data.channels.load_columns import keep_rows
 from aesi.errors import DataError
-from aesi.numerics.typing import Array
+from aesi.numerics.typing import AnyArray, Array
 from aesi.records.measurement import Hold, assumed_hold
 
 GAP_FLOOR_S = 5.0
@@ -26,30 +27,35 @@ BUNCH_SHARE = 0.25
 and else slowly, every other interval is long. Of 322 measured and virtual records, and of 720 thinned to rows at a
 change of voltage, only two more are refused than with the longest neighbour as limit, both thinned from one record with
 an hour missing."""
-REST_GAP_S = SECONDS_PER_HOUR
 REST_CURRENT_SHARE = 0.02
-"""A gap is a rest where the currents on both sides are at most this share of the largest and the voltage changes by at
-most REST_VOLTAGE_V."""
+"""The cell rests at currents of at most this share of the largest, and currents that differ by no more are the same."""
 REST_VOLTAGE_V = 0.005
+"""How far a voltage that relaxes, or runs on under a steady current, may seem to go the other way."""
 SUMMER_TIME_S = SECONDS_PER_HOUR
 """Step by which clocks are put forward in spring, which looks like a gap."""
 UNTOLD_SHARE = 0.05
 """Largest share of the charge moved, in both directions, that may depend on how the current runs between the rows. It
 is at most 0.003 in 94 measured records and 0.015 in 19 public exports of six makers, but 0.25 where cycles were logged
 only at the ends of their steps, and 0.87 where pulses were."""
-FEW_RESTS = 3
-"""Up to this number, sparsely logged rests get a note each; more get one note together."""
+FEW_STRETCHES = 3
+"""Up to this number, sparsely logged stretches get a note each; more get one note together."""
+RESTED = "the cell rested"
+RAN_ON = "the current before and after them is the same, and is taken to have run on"
 
 
 def without_gaps(data: Columns, context: Context, notes: list[str]) -> tuple[Columns, Context]:
-    """Refuse gaps; keep a sparsely logged rest and drop a single row long before or after the test, with a note."""
+    """Refuse gaps; keep a sparsely logged rest or steady current and drop a single row long before or after the test,
+    with a note."""
     n = len(data["time_s"])
     kept = np.arange(n)
-    rests: list[tuple[float, float]] = []
+    steady: dict[str, list[tuple[float, float]]] = {RESTED: [], RAN_ON: []}
+    currents = _Currents.of(data)
     for k in find_gaps(data):
         seconds = float(data["time_s"][k + 1] - data["time_s"][k])
-        if is_rest(data, k):
-            rests.append((float(data["time_s"][k]), seconds))
+        if currents.rested(k):
+            steady[RESTED].append((float(data["time_s"][k]), seconds))
+        elif currents.ran_on(k):
+            steady[RAN_ON].append((float(data["time_s"][k]), seconds))
         elif k == 0:
             notes.append(
                 f"The first row, {seconds:.6g} s before the one after it, is not of this test and was dropped."
@@ -62,20 +68,20 @@ def without_gaps(data: Columns, context: Context, notes: list[str]) -> tuple[Col
             kept = kept[:-1]
         else:
             raise gap_error(data, k, context)
-    notes += _rest_notes(rests)
+    for words, stretches in steady.items():
+        notes += _stretch_notes(stretches, words)
     return (data, context) if len(kept) == n else keep_rows(data, context, kept)
 
 
-def _rest_notes(rests: Sequence[tuple[float, float]]) -> list[str]:
-    """A note on each of up to FEW_RESTS sparsely logged rests (start s, length s), or one note on more of them."""
-    if len(rests) <= FEW_RESTS:
-        return [
-            f"No rows for {length:.6g} s from {start:.10g} s on; the cell rested." for start, length in rests
-        ]
-    lengths = [length for _, length in rests]
+def _stretch_notes(stretches: Sequence[tuple[float, float]], words: str) -> list[str]:
+    """A note on each of up to FEW_STRETCHES sparsely logged stretches (start s, length s), or one note on more of
+    them.  words : on what the cell did there."""
+    if len(stretches) <= FEW_STRETCHES:
+        return [f"No rows for {length:.6g} s from {start:.10g} s on; {words}." for start, length in stretches]
+    lengths = [length for _, length in stretches]
     return [
-        f"No rows for {min(lengths):.3g} to {max(lengths):.3g} s at {len(rests)} places, the first at "
-        f"{rests[0][0]:.10g} s; the cell rested."
+        f"No rows for {min(lengths):.3g} to {max(lengths):.3g} s at {len(stretches)} places, the first at "
+        f"{stretches[0][0]:.10g} s; {words}."
     ]
 
 
@@ -125,16 +131,49 @@ def ambiguous_charge_notes(columns: Columns) -> list[str]:
     ]
 
 
-def is_rest(columns: Columns, k: int) -> bool:
-    """True where the cell rested between rows k and k + 1, so that missing rows lose nothing."""
-    pair = slice(k, k + 2)
-    current = columns["current_a"]
-    small = REST_CURRENT_SHARE * float(np.max(np.abs(current)))
-    return bool(
-        columns["time_s"][k + 1] - columns["time_s"][k] <= REST_GAP_S
-        and np.all(np.abs(current[pair]) <= small)
-        and np.ptp(columns["voltage_v"][pair]) <= REST_VOLTAGE_V
-    )
+@dataclass(frozen=True, eq=False)
+class _Currents:
+    """What the rows around an interval tell of the current within it, where a logger writes on a change.
+
+    current_a, voltage_v : (n,) A, V.  resting : (n,) True at rest.  changes : (n - 1,) True where the current of the
+    next row is another.  before_load : (n,) the last row at rest before the load of a row or, at rest, before the load
+    that it follows; -1 where none is.
+    """
+
+    current_a: Array
+    voltage_v: Array
+    resting: AnyArray
+    changes: AnyArray
+    before_load: AnyArray
+
+    @classmethod
+    def of(cls, columns: Columns) -> _Currents:
+        current = columns["current_a"]
+        small = REST_CURRENT_SHARE * float(np.max(np.abs(current)))
+        resting, rows = np.abs(current) <= small, np.arange(len(current))
+        rest = np.maximum.accumulate(np.where(resting, rows, -1))
+        load = np.maximum.accumulate(np.where(resting, -1, rows))
+        before = np.where(load >= 0, rest[load], -1)
+        return cls(current, columns["voltage_v"], resting, np.abs(np.diff(current)) > small, before)
+
+    def rested(self, k: int) -> bool:
+        """True where the cell rested after row k, whose load may have ended there, up to row k + 1: at rest in both, or
+        in the last row before a load; and the voltage relaxed at most to where it was before the load."""
+        last = k + 1 < len(self.changes) and not self.resting[k + 2]
+        if not (self.resting[k + 1] and (self.resting[k] or last)):
+            return False
+        earlier = self.before_load[k]
+        ends = self.voltage_v[[k, k if earlier < 0 else earlier]]
+        return bool(np.min(ends) - REST_VOLTAGE_V <= self.voltage_v[k + 1] <= np.max(ends) + REST_VOLTAGE_V)
+
+    def ran_on(self, k: int) -> bool:
+        """True where rows k and k + 1 are the first and the last of a steady current, under which the voltage moved its
+        way."""
+        first_and_last = k > 0 and self.changes[k - 1] and self.changes[k + 1 : k + 2].any()
+        if self.resting[k + 1] or self.changes[k] or not first_and_last:
+            return False
+        moved = float(self.voltage_v[k + 1] - self.voltage_v[k])
+        return bool(np.sign(self.current_a[k]) * moved <= REST_VOLTAGE_V)
 
 
 def gap_error(columns: Columns, k: int, context: Context) -> DataError:
@@ -149,5 +188,7 @@ def gap_error(columns: Columns, k: int, context: Context) -> DataError:
     return DataError(
         f"{context.at('time_s', k + 1)}: a gap of {first - last:.6g} s after {last:.10g} s, "
         f"where rows come every {row_s:.3g} s; what the cell did there is unknown. "
-        f"Split the file there, or read one side of it: --to-s {last:.10g} or --from-s {first:.10g}.{summer}"
+        f"Split the file there, or read one side of it: --to-s {last:.10g} or --from-s {first:.10g}. Where the logger "
+        "writes on a change, and a current ran on there, give its first row as well as its last: the same current in "
+        f"both.{summer}"
     )

@@ -29,6 +29,8 @@ WHOLE_TIME = r"total|test|cumul|elapsed"
 """Pattern of names of the whole test's time; beside such a column, a plain 'Time' restarts with each step."""
 STAMP = r"stamp|date ?time|\bdat(e|um)\b|uhrzeit"
 """Pattern of names of a date and time of day, which tell the time of a test where no other column does."""
+TEMPERATURE = "T"
+"""Symbol of a temperature; without a unit it may be a time, where nothing else in a table is one."""
 NO_TEMPERATURE = r"time|/dt|set\b|limit|circuit"
 """Pattern of names that only look like a temperature."""
 RATE_OR_POWER = r"\bc[-_ ]?rate\b|\bpower\b|\bleistung\b"
@@ -44,20 +46,25 @@ def nearest(quantity: str, header: Sequence[str], doubtful: bool = False) -> str
 
     doubtful : also accept a column that more likely holds a related quantity (a step's time, a limit).
     """
-    likely = [name for name in header if quantity in LIKELY and re.search(LIKELY[quantity], plain(name))]
+    likely = [name for name in header if quantity in LIKELY and _is_like(quantity, name)]
     best = min(likely, key=lambda name: _doubt(quantity, name), default=None)
     return best if best is None or doubtful or not _doubt(quantity, best)[0] else None
 
 
-def likeliest(quantity: str, header: Sequence[str]) -> str | None:
-    """The column to propose for the quantity: the nearest, or for the time one of dates where none else tells it."""
-    stamps = (name for name in header if quantity == "time_s" and re.search(STAMP, plain(name)))
-    return nearest(quantity, header) or next(stamps, None)
+def likeliest(quantity: str, header: Sequence[str], doubtful: bool = False) -> str | None:
+    """The column to propose for the quantity: the nearest, or for the time one of dates where none else tells it, and
+    for a temperature a lone T.  doubtful : as in `nearest`.
+    """
+    found = nearest(quantity, [name for name in header if name != TEMPERATURE], doubtful)
+    if found is None and quantity == "time_s":
+        found = next((name for name in header if re.search(STAMP, plain(name))), None)
+    may_be_t = quantity in {"time_s", "temperature_degc"} and TEMPERATURE in header
+    return TEMPERATURE if found is None and may_be_t else found
 
 
 def temperatures(header: Sequence[str]) -> list[str]:
     """The columns that look like temperatures, of cell or surroundings; the most likely cell temperature first."""
-    like = [name for name in header if re.search(LIKELY["temperature_degc"], plain(name))]
+    like = [name for name in header if _is_like("temperature_degc", name)]
     return sorted(
         (name for name in like if not re.search(NO_TEMPERATURE, plain(name))),
         key=lambda name: _doubt("temperature_degc", name),
@@ -117,3 +124,11 @@ def _doubt(quantity: str, name: str) -> tuple[bool, bool, int]:
     unlikely = bool(re.search(UNLIKELY[quantity], text))
     of_step = quantity == "time_s" and not re.search(WHOLE_TIME, text)
     return unlikely, of_step, 0 if unit == units.SI.get(quantity) else 1 if unit else 2
+
+
+def _is_like(quantity: str, name: str) -> bool:
+    """Whether the name may be that of the quantity. T and a unit of temperature, as T/K, is no time."""
+    symbol = name.strip().startswith(TEMPERATURE) and stem(name) == plain(TEMPERATURE)
+    if symbol and unit_of("temperature_degc", name) is not None:
+        return quantity == "temperature_degc"
+    return re.search(LIKELY[quantity], plain(name)) is not None

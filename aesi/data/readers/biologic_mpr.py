@@ -8,7 +8,7 @@ import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.readers.frame import FrameTable, table_of_columns
-from aesi.errors import DataError
+from aesi.errors import DataError, first_line
 from aesi.numerics.typing import AnyArray
 
 
@@ -25,9 +25,8 @@ def open_mpr(path: Path) -> FrameTable:
         data = BioLogic.MPRfile(str(path)).data
     except Exception as error:
         # It raises many kinds: of numpy, struct and its own.
-        reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise DataError(
-            f"{path.name} cannot be read by galvani: {reason[:200]}; export it as text (.mpt)."
+            f"{path.name} cannot be read by galvani: {first_line(error)}; export it as text (.mpt)."
         ) from None
     columns = {name: data[name] for name in data.dtype.names}
     notes = ["Read by galvani."]

@@ -14,7 +14,7 @@ import numpy as np
 from aesi.data.readers.formats import recognise
 from aesi.data.readers.frame import FrameTable, table_of_columns
 from aesi.data.readers.table import names_listed
-from aesi.errors import DataError
+from aesi.errors import DataError, first_line
 
 NO_STRUCTURE = ""
 """Name of the table of vectors that are in no structure."""
@@ -57,9 +57,8 @@ def _load(path: Path) -> dict[str, Any]:
         ) from None
     except Exception as error:
         # It raises many kinds: of zlib, struct, numpy and its own.
-        reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise DataError(
-            f"{path.name} is damaged or no MATLAB file: {reason[:120]}; save it again, or export it as CSV."
+            f"{path.name} is damaged or no MATLAB file: {first_line(error, 120)}; save it again, or export it as CSV."
         ) from None
     return {str(name): value for name, value in content.items() if not str(name).startswith("__")}
 

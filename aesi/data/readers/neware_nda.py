@@ -9,7 +9,7 @@ import numpy as np
 
 from aesi.data.readers.formats import neware
 from aesi.data.readers.frame import FrameTable, table_of_columns
-from aesi.errors import DataError
+from aesi.errors import DataError, first_line
 from aesi.numerics.typing import AnyArray
 
 
@@ -28,8 +28,7 @@ def open_nda(path: Path) -> FrameTable:
             frame = bdf.read(path, validate=False)
     except Exception as error:
         # Each of its plugins raises its own.
-        reason = (str(error).splitlines() or [type(error).__name__])[0]
-        raise DataError(f"{path.name} cannot be read as a cycler's file: {reason[:200]}") from None
+        raise DataError(f"{path.name} cannot be read as a cycler's file: {first_line(error)}") from None
     columns = {str(name): frame[name].to_numpy() for name in frame.columns}
     notes = ["Read by batterydf, which converted its units and names to BDF."]
     table = table_of_columns(path, _with_test_time(columns, notes), tuple(notes))

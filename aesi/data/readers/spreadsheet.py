@@ -18,7 +18,7 @@ from typing import Any
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.readers.frame import FrameTable
 from aesi.data.readers.heading import LINES_LOOKED_AT, Heading, find_heading, likely_heading
-from aesi.errors import DataError
+from aesi.errors import DataError, first_line
 
 WORKBOOK = "[Content_Types].xml"
 """A member of every Office Open XML archive (ECMA-376, part 2)."""
@@ -44,9 +44,9 @@ def open_sheet(path: Path, wanted: Collection[str] = ()) -> FrameTable:
         book = openpyxl.load_workbook(path, read_only=True, data_only=True)
     except Exception as error:
         # openpyxl raises what zipfile, its XML reader and its own checks raise.
-        reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise DataError(
-            f"{path.name} is a spreadsheet or an archive that cannot be read ({reason[:120]}); save the sheet as CSV."
+            f"{path.name} is a spreadsheet or an archive that cannot be read ({first_line(error, 120)}); save the "
+            "sheet as CSV."
         ) from None
     try:
         return _first_table(path, book, wanted)

@@ -23,7 +23,7 @@ import numpy as np
 
 from aesi.data.readers.heading import NUMBER
 from aesi.data.readers.layout import Layout, decimal_in, decoded, layout_of, with_decimal
-from aesi.errors import DataError
+from aesi.errors import DataError, first_line
 from aesi.numerics.typing import Array
 
 HEAD_BYTES = 1 << 18
@@ -60,8 +60,7 @@ class TextTable:
         except (pa.ArrowException, OSError, ValueError) as error:
             if not self._raise_first_fault(positions):
                 return [np.empty(0) for _ in positions]
-            text = (str(error).splitlines() or [type(error).__name__])[0]
-            raise DataError(f"{self.path.name} cannot be read as a table: {text[:200]}") from None
+            raise DataError(f"{self.path.name} cannot be read as a table: {first_line(error)}") from None
 
     def read_text(self, positions: tuple[int, ...]) -> list[list[str]]:
         """The columns at the given positions as they are written; '' where a row is too short."""

@@ -35,6 +35,10 @@ from aesi.records.horizons import divides
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
+NO_PART = ("note", "tracking", "runner")
+"""Sections without influence on the result. Those of `runner` and `tracking` may hold the password of a server."""
+LIMITS = ("workers", "timeout_s", "memory_mb")
+"""Keys of `search` without influence on the result: what a candidate may take."""
 NO_ROLES = "give `train` and `test` records, or one `record` with `repeats`"
 
 
@@ -181,8 +185,8 @@ class ExperimentConfig(Section):
         return self._hash("seed")
 
     def _hash(self, *without: str) -> str:
-        content = self.model_dump(mode="json", exclude={"note", "tracking", "runner", "base", *without})
-        for key in ("workers", "timeout_s", "memory_mb"):
+        content = self.model_dump(mode="json", exclude={*NO_PART, "base", *without})
+        for key in LIMITS:
             content["search"].pop(key)
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -127,23 +127,16 @@ def discovery_records(
     placed = _files_and_names(_locator(config), (*wanted.fit, *wanted.test, *wanted.good))
     hold = wanted.hold or config.data.declared_hold
 
-    def until(names: Sequence[str], stop_s: Mapping[str, float | None]) -> tuple[Measurement, ...]:
-        read_as = {name: config.data.reading(name) for name in names}
-        ends = {
-            name: [end for end in (read_as[name].stop_s, stop_s.get(name)) if end is not None]
-            for name in names
-        }
-        return tuple(
-            _record(
-                placed[name][0], read_as[name].but(stop_s=min(ends[name], default=None)), placed[name][1]
-            ).held(hold)
-            for name in names
-        )
+    def record(name: str, until_s: float | None) -> Measurement:
+        path, record_name = placed[name]
+        reading = config.data.reading(name)
+        ends_s = [end_s for end_s in (reading.stop_s, until_s) if end_s is not None]
+        return _record(path, reading.but(stop_s=min(ends_s, default=None)), record_name).held(hold)
 
     return (
-        until(wanted.fit, wanted.fit_until_s),
-        until(wanted.test, dict.fromkeys(wanted.test, wanted.until_s)),
-        until(wanted.good, {}),
+        tuple(record(name, wanted.fit_until_s.get(name)) for name in wanted.fit),
+        tuple(record(name, wanted.until_s) for name in wanted.test),
+        tuple(record(name, None) for name in wanted.good),
     )
 
 
@@ -197,15 +190,13 @@ def _files_and_names(where: Callable[[str], Path], names: Sequence[str]) -> dict
 
 
 def _record(path: Path, reading: Reading, record_name: str | None = None) -> Measurement:
-    """The record in a file, with all its rows.
+    """The record in a file, with all its rows: they are averaged once, to the step of the experiment.
 
     record_name : None takes that of the file.
     Raises DataError that names the keys of an experiment file beside the options of a command.
     """
     try:
-        return read(
-            path, reading, None, record_name
-        )  # all rows are read, since they are averaged once, to the step of the experiment
+        return read(path, reading, None, record_name)
     except DataError as error:
         raise DataError(with_keys(str(error))) from None
 

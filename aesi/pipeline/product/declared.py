@@ -40,4 +40,4 @@ def check_of_cell(source: Declared, record: Measurement) -> None:
 
 
 def _alone(cell: Cell) -> HybridModel:
-    return HybridModel(cell, model="dfn" if cell.fitted_with == "dfn" else "espm")
+    return HybridModel(cell, hold=None, model="dfn" if cell.fitted_with == "dfn" else "espm")

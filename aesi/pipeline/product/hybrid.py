@@ -51,7 +51,8 @@ class HybridModel:
     effects : active effects in addition to the cell.  correction : sparse model of the error, or None.
     intervals : intervals one step ahead, or None.  bands : bands of a free run, or None.
     dt_s : step of correction and bands, s; records with other steps are resampled to it and back.
-    hold : how the current runs between rows.  soc0 : default state of charge at the first row, or None.
+    hold : how the current runs between rows of records that do not declare it; None tells it by their rows.
+    soc0 : default state of charge at the first row, or None.
     model : of the physics, "espm" or "dfn".
     held : effects that are contained in values of the cell, in words.  beside : ids of effects, held or active, that
     were fitted together with the found ones and are no finding themselves.
@@ -64,7 +65,7 @@ class HybridModel:
     intervals: Calibrated | None = None
     bands: FreeRunBands | None = None
     dt_s: float = 1.0
-    hold: Hold = "linear"
+    hold: Hold | None = "linear"
     soc0: float | None = None
     model: ModelName = "espm"
     held: tuple[str, ...] = ()
@@ -81,7 +82,8 @@ class HybridModel:
             raise InputError(
                 f"dt_s = {self.dt_s:g} s, but the correction steps by {self.correction.dt_s:g} s; give that as dt_s."
             )
-        check_choice("hold", self.hold, Hold)
+        if self.hold is not None:
+            check_choice("hold", self.hold, Hold)
         object.__setattr__(self, "soc0", checked_soc(self.soc0))
         check_choice("model", self.model, ModelName)
 
@@ -94,6 +96,11 @@ class HybridModel:
     def with_soh(self, soh: Soh | None) -> Self:
         """A copy with the cell at a state of health, see `Cell.with_soh`; unchanged for None."""
         return self if soh is None else replace(self, cell=self.cell.with_soh(soh))
+
+    def hold_of(self, record: Measurement) -> Hold:
+        """How the current of a record runs between its rows: as it declares, else as the model was made, else as
+        `Measurement.hold_taken` says."""
+        return record.hold or self.hold or record.hold_taken
 
     @property
     def visited(self) -> Visited | None:
@@ -165,6 +172,9 @@ class HybridModel:
             raise InputError(
                 f"soc0_sd = {soc0_sd!r} is no standard deviation of a state of charge; give 0 to 1."
             )
+        record = record.held(
+            self.hold_of(record)
+        )  # before rows are averaged and voltages hidden, which tell it
         measured = record.voltage_v
         if one_step and not np.isfinite(measured).all():
             row = int(np.flatnonzero(~np.isfinite(measured))[0])
@@ -242,7 +252,9 @@ class HybridModel:
         """(state of charge at the first row, its standard deviation), from its voltage; without a voltage the model's
         own, and `soc0_sd`."""
         if np.isfinite(record.voltage_v[:1]).any():
-            read = initial_state(self.cell, record, None, self.hold, self.effects, model=self.model)
+            read = initial_state(
+                self.cell, record, None, self.hold_of(record), self.effects, model=self.model
+            )
             return read.soc, read.read_sd
         if self.soc0 is None:
             raise DataError("a free run needs soc0, the state of charge at the first sample; give it.")
@@ -281,7 +293,7 @@ class HybridModel:
                 f"{record.name} lasts {record.time_s[-1] - record.time_s[0]:g} s, and the model steps by "
                 f"{self.dt_s:g} s; give a longer one."
             )
-        return to_even(record, self.dt_s, self.hold)
+        return to_even(record, self.dt_s, self.hold_of(record))
 
     def _series(self, record: Measurement, soc0: float) -> ErrorSeries:
         try:
@@ -292,7 +304,7 @@ class HybridModel:
                 soc0,
                 self.effects,
                 record.temperature_degc,
-                self.hold,
+                self.hold_of(record),
                 model=self.model,
             )
         except SimulationError as error:
@@ -310,14 +322,16 @@ class HybridModel:
             series = replace(series, start_v=self.start_worth_v(record, soc0, soc0_sd, series.model_v))
         if self.bands is None or self.bands.root is None:
             return series
-        slopes = slopes_v(self.cell, self.effects, record, soc0, self.hold, self.model, series.model_v)
+        slopes = slopes_v(
+            self.cell, self.effects, record, soc0, self.hold_of(record), self.model, series.model_v
+        )
         return replace(series, slopes_v=slopes)
 
     def start_worth_v(self, record: Measurement, soc0: float, soc0_sd: float, physics_v: Array) -> Array:
         """(n,) V, >= 0, change of the record's physics_v (n,) where it starts `soc0_sd` away from soc0; see
         `start_v`."""
         physics = PhysicsVariant(self.cell, self.cell, self.effects, model=self.model)
-        return start_v(physics, record, soc0, soc0_sd, self.hold, physics_v)
+        return start_v(physics, record, soc0, soc0_sd, self.hold_of(record), physics_v)
 
     def _free_run(self, series: ErrorSeries, error0_v: float | None) -> Prediction:
         n = len(series)

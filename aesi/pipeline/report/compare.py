@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from aesi.advice import listed
 from aesi.constants import MV_PER_V
 from aesi.pipeline.report.page import write_plain_page
 from aesi.pipeline.report.table_formats import ABSENT
@@ -57,6 +58,7 @@ class ComparedRun:
 
     settings : dotted key -> text.  metrics : by MLflow's names.  chosen : the model that a search ended with.
     judged_on : the same text for runs whose errors are of the same test records at the same step.  job : see JOB_WORDS.
+    finished : whether it ran to its end.
     comparison : see `aesi.pipeline.experiment.comparison`.  discovery : content of discovery.json.
     """
 
@@ -72,6 +74,7 @@ class ComparedRun:
     comparison: Mapping[str, Any] = field(default_factory=dict)
     discovery: Mapping[str, Any] = field(default_factory=dict)
     job: str = "experiment"
+    finished: bool = True
 
     @property
     def label(self) -> str:
@@ -166,8 +169,9 @@ def differing_settings(runs: Sequence[ComparedRun]) -> list[str]:
 
 
 def _finding(runs: Sequence[ComparedRun]) -> str:
-    """A sentence on the runs: which errs least in free run, whether a correction helped, and the verdicts."""
-    sentences = (_least(runs), _worse_than_declared(runs), _verdict_counts(runs))
+    """A sentence on the runs: which errs least in free run, whether a correction helped, the verdicts, and what is not
+    finished."""
+    sentences = (_least(runs), _worse_than_declared(runs), _verdict_counts(runs), _unfinished(runs))
     return " ".join(filter(None, sentences)) or f"{counted_jobs(runs)} compared."
 
 
@@ -194,11 +198,12 @@ def _least(runs: Sequence[ComparedRun]) -> str:
 
 def _worse_than_declared(runs: Sequence[ComparedRun]) -> str:
     """A sentence on how many corrections err by more than the declared model in free run; '' if none does."""
-    known = [run.metrics[FREE_RUN_MSER] for run in runs if FREE_RUN_MSER in run.metrics]
-    worse = sum(value < 0.0 for value in known)
+    known = [(run.metrics[FREE_RUN_MSER], run.label) for run in runs if FREE_RUN_MSER in run.metrics]
+    worse = sum(value < 0.0 for value, _ in known)
     if not worse:
         return ""
-    who = "All" if worse == len(known) else f"{worse} of {len(known)}"
+    all_of_them = known[0][1] if worse == 1 else "All"
+    who = all_of_them if worse == len(known) else f"{worse} of {len(known)}"
     where = "" if _judged_alike(runs) else f" on {'its' if worse == 1 else 'their'} own test records"
     return f"{who} err{'s' if worse == 1 else ''} by more than the declared model alone{where}."
 
@@ -215,6 +220,14 @@ def _verdict_counts(runs: Sequence[ComparedRun]) -> str:
         return ""
     told = ", ".join(f"{count} {verdict}" for verdict, count in verdicts.most_common())
     return f"Of {verdicts.total()} {'discovery' if verdicts.total() == 1 else 'discoveries'}: {told}."
+
+
+def _unfinished(runs: Sequence[ComparedRun]) -> str:
+    """A sentence on the runs that go on or were stopped, whose figures are missing; '' without one."""
+    labels = [run.label for run in runs if not run.finished]
+    if not labels:
+        return ""
+    return f"{listed(labels)} {'has' if len(labels) == 1 else 'have'} not finished."
 
 
 def _settings(runs: Sequence[ComparedRun]) -> PageTable | None:

@@ -7,7 +7,9 @@ in addition to the published schema a row may have
     free_run   {train,valid,test}_{mser_pct,mser_recalibrated_pct,rmse_mv}, diverged (the number of records left behind)
     one_step   {train,valid,test}_rmse_mv, persistence_rmse_mv (test)
     k_step     {"1": mV, "10": mV, ...}: test RMSE by horizon in seconds; likewise k_step_persistence
-    intervals  nominal_pct, coverage_pct, average_width_v, winkler_v, worst_bin_coverage_pct (one step ahead)
+    intervals  nominal_pct, coverage_pct, average_width_v, winkler_v, worst_bin_coverage_pct, low_minutes_pct (one step
+               ahead)
+    intervals_by_method  {method: the same keys, ...}
     free_run_intervals   the same keys, in free run; with inside_coverage_pct, pieces and worst_piece_coverage_pct of
                          the calibration, and start_v, change of the voltage by a standard deviation of the start
     bands_by_horizon     {"1": the same keys, ...}, by the time since the last measurement in seconds

@@ -25,6 +25,7 @@ from aesi.sparse.search.rows import (
     TrainingRows,
     balanced_weights,
     default_block,
+    folds_are_drives,
     left_out_pieces,
     nearness_of_left_out,
     training_rows,
@@ -138,7 +139,7 @@ class Problem(TrainingRows, Factors):
         n = len(rows.target)
         block = _checked_block(options.block, rows.spans)
         folds = _checked_pieces(left_out_pieces(rows.spans, options.fold, options.cuts), options.fold)
-        drives = options.fold is None and len(rows.spans) > 1
+        drives = folds_are_drives(rows.spans, options.fold)
         if not refits_physics_per_fold(drives, options.feedback, len(left_out), len(folds)):
             left_out = ()
         left_out_errors = unseen_errors(left_out, rows.scaling, rows.error, rows.target, folds)
@@ -167,8 +168,8 @@ class Problem(TrainingRows, Factors):
 
     @property
     def folds_are_drives(self) -> bool:
-        """True where folds are whole records or their `Options.cuts` parts, not pieces of `Options.fold` rows."""
-        return self.options.fold is None and len(self.spans) > 1
+        """See `rows.folds_are_drives`."""
+        return folds_are_drives(self.spans, self.options.fold)
 
     @cached_property
     def fold_drives(self) -> IntArray:

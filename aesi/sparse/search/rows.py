@@ -92,9 +92,14 @@ def default_block(n: int) -> int:
     return min(500, max(10, n // 10))
 
 
+def folds_are_drives(spans: Sequence[Span], fold: int | None) -> bool:
+    """True where folds are whole records or their `Options.cuts` parts, not pieces of `fold` rows."""
+    return fold is None and len(spans) > 1
+
+
 def left_out_pieces(spans: Sequence[Span], fold: int | None, cuts: int) -> tuple[Span, ...]:
     """Pieces of about `fold` rows; for None, records cut into `cuts` each, or eighths of a single record."""
-    if fold is None and len(spans) > 1:
+    if folds_are_drives(spans, fold):
         return tuple(piece for a, b in spans for piece in cut_evenly(a, b, cuts))
     return tuple(pieces(spans, fold or max(10, spans[-1][1] // 8)))
 

@@ -230,12 +230,10 @@ def by_owner(
     return out
 
 
-def coordinates_of(
-    free: Sequence[FreeParameter], known: Mapping[tuple[str, str], float], elsewhere: float = 0.0
-) -> Array:
-    """(n_free,) coordinates of known values by (owner, name), `elsewhere` for the others."""
+def coordinates_of(free: Sequence[FreeParameter], known: Mapping[tuple[str, str], float]) -> Array:
+    """(n_free,) coordinates of known values by (owner, name), zero for the others."""
     return np.array(
-        [one.coordinate(known[one.key]) if one.key in known else elsewhere for one in free], dtype=float
+        [one.coordinate(known[one.key]) if one.key in known else 0.0 for one in free], dtype=float
     )
 
 

@@ -169,10 +169,20 @@ def test_the_study_in_postgresql_asked_for_another_driver_than_its_candidates(ad
         study_storage(address)
 
 
-def test_a_database_that_is_not_there_is_one_sentence():
+@pytest.mark.parametrize(
+    "address", ["me:secret@127.0.0.1:9/none", "127.0.0.1:9/none?user=me&password=secret"]
+)
+def test_a_database_that_is_not_there_is_one_sentence(address):
     with pytest.raises(InputError, match=r"runner\.storage .* cannot be used") as caught:
-        DatabaseOutcomes("postgresql://me:secret@127.0.0.1:9/none")
+        DatabaseOutcomes(f"postgresql://{address}")
     assert "secret" not in str(caught.value)
+
+
+@pytest.mark.parametrize("address", ["postgresql://me@127.0.0.1:PORT/none", "sqlite://host/none.db"])
+def test_a_wrong_address_of_a_database_ended_in_an_unexpected_error_or_in_several_lines(address):
+    with pytest.raises(InputError, match=r"runner\.storage is no database that can be used: .*\.$") as caught:
+        DatabaseOutcomes(address)
+    assert "\n" not in str(caught.value)
 
 
 @pytest.fixture

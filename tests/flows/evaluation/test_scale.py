@@ -128,6 +128,31 @@ def test_two_dask_workers_do_at_least_1_6_times_the_work_of_one(tracked):
     assert line["ratio"] >= 1.6, line
 
 
+def test_a_cluster_of_its_own_that_does_not_answer_was_called_the_scheduler_none(monkeypatch):
+    import distributed
+
+    from aesi.errors import AesiError
+    from flows.evaluation.dask_pool import connect
+
+    closed = []
+
+    class Cluster:
+        def __init__(self, **_):
+            pass
+
+        def close(self, timeout):
+            closed.append(self)
+
+    def busy(*_, **__):
+        raise TimeoutError("timed out after 15 s")
+
+    monkeypatch.setattr(distributed, "LocalCluster", Cluster)
+    monkeypatch.setattr(distributed, "Client", busy)
+    with pytest.raises(AesiError, match=r"cluster on this machine does not answer .* use the runner local"):
+        connect(None, 1)
+    assert len(closed) == 1
+
+
 def test_a_dask_worker_that_was_restarted_twice_over_hung_candidates_was_gone_for_good():
     """Two restarts 15 s apart, made one by a limit that the time of one exceeds."""
     import dask

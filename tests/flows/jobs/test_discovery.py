@@ -11,6 +11,7 @@ from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.discovery import discover as pipeline
 from aesi.pipeline.discovery.discover import Case
 from aesi.pipeline.product.hybrid import HybridModel
+from aesi.pipeline.written import FINDING
 from aesi.records import Measurement
 
 CELL = Path(__file__).resolve().parents[3] / "experiments" / "cells" / "nmc_30ah.bpx.json"
@@ -40,6 +41,15 @@ class Said:
         self.say = lines.append
 
 
+def test_a_search_that_was_stopped_was_said_to_have_a_finding(tmp_path):
+    from flows.jobs.discovery import _earlier_sentence
+
+    replaced = "its finding is replaced when this search ends"
+    assert replaced not in _earlier_sentence(tmp_path)
+    (tmp_path / FINDING).write_text("{}")
+    assert replaced in _earlier_sentence(tmp_path)
+
+
 def test_everything_is_written_and_tracked(tracked, case):
     from flows.jobs.start import discover
     from flows.tracking.store import Store
@@ -64,8 +74,11 @@ def test_everything_is_written_and_tracked(tracked, case):
     assert np.sqrt(np.mean((voltage - data.voltage_v) ** 2)) < 1.1e-3
     store = Store()
     runs = list(store.runs(store.find_experiment("discover"), ""))
-    names = {run.info.run_name for run in runs}
-    assert {"drive", "series_resistance", "voltage_sensor_offset"} <= names
+    names = [run.info.run_name for run in runs]
+    assert {"drive", "series_resistance, tight", "series_resistance, tight, fit 2", "nothing, tight"} <= {
+        *names
+    }
+    assert len(names) == len({*names}), "fits of one hypothesis looked like one that was tracked twice"
 
 
 def test_searches_of_other_cells_records_or_options_are_told_apart_by_what_is_tracked(case, tmp_path):

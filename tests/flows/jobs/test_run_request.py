@@ -1,5 +1,8 @@
 """Who evaluates the candidates: by the experiment file, and by what the command line says over it."""
 
+import inspect
+from types import SimpleNamespace
+
 import pytest
 
 from aesi.errors import ConfigError, InputError
@@ -96,6 +99,13 @@ def test_a_run_without_prefect_was_told_to_go_on_with_it(path):
     assert RunRequest(path).resuming == f"aesi run {path} --resume"
 
 
+def test_a_run_was_told_to_go_on_with_the_password_of_its_store(path):
+    login = "tracking.uri=postgresql://me:secret@host/db?sslmode=require"
+    resuming = RunRequest(path, (login, "seed=1")).resuming
+    shown = "'tracking.uri=postgresql://host/db?sslmode=require'"
+    assert resuming == f"aesi run {path} --set {shown} --set seed=1 --resume"
+
+
 def test_a_run_without_cache_was_told_to_go_on_from_it(path):
     assert RunRequest(path, use_cache=False).resuming == f"aesi run {path} --no-cache --resume"
 
@@ -126,3 +136,41 @@ def test_a_file_that_was_edited_after_the_command_had_read_it_was_what_was_run(w
         monkeypatch.setattr(module, "start_server", lambda: None)
     module.start(file, use_prefect=way != "plain")
     assert seen == [1]
+
+
+def test_runs_that_differ_by_what_was_laid_over_their_file_had_one_name(path):
+    assert RunRequest(path).title == "x, seed 0"
+    laid = ("data.dt_s=2", "seed=3", "search.candidates=8", "search.workers=2", "note=again")
+    assert RunRequest(path, laid).title == "x, seed 3: data.dt_s=2, search.candidates=8"
+    secret = ("tracking.uri=http://me:secret@there:5000", "runner.storage=postgresql://me:secret@there/x")
+    assert RunRequest(path, secret).title == "x, seed 0"
+
+
+@pytest.mark.parametrize("job", ["experiment", "discovery"])
+def test_the_password_of_an_address_was_kept_and_shown_by_prefect(workspace, monkeypatch, job):
+    from flows.jobs import prefect_flows
+    from flows.jobs import start as module
+
+    file = workspace / "x.yaml"
+    file.write_text("name: x\ndata: {kind: virtual}\n")
+    flow = getattr(prefect_flows, job)
+    kept = []
+
+    def keeps(*given, **named):
+        parameters = inspect.signature(flow.fn).bind(*given, **named).arguments
+        kept.append(flow.serialize_parameters(parameters | {"case": None}))
+        return workspace
+
+    monkeypatch.setattr(prefect_flows, job, keeps)
+    monkeypatch.setattr(module, "start_server", lambda: None)
+    monkeypatch.setattr("flows.tracking.store.check_reached", lambda uri: None)
+    monkeypatch.setattr(module, "check_case", lambda case: None)
+    overrides = ("tracking.uri=postgresql://me:secret@host/db", "seed=1")
+    if job == "experiment":
+        module.start(file, overrides)
+    else:
+        request = RunRequest(str(file), overrides)
+        case = SimpleNamespace(cell=file, measurements=())
+        module.discover(case, workspace, request=request)
+    assert "secret" not in str(kept)
+    assert kept[0]["overrides"] == ["tracking.uri=postgresql://host/db", "seed=1"]

@@ -87,6 +87,14 @@ def test_the_first_sentence_of_a_page_counted_settings_and_not_what_came_of_them
     )
 
 
+def test_one_run_beside_a_stopped_one_was_called_all(tmp_path):
+    harmed = replace(run_of(1), metrics=run_of(1).metrics | {"free_run/test_mser_pct": -20.0})
+    stopped = replace(run_of(2), metrics={}, chosen="", comparison={}, finished=False)
+    assert heading_of(tmp_path, stopped, harmed) == (
+        f"{harmed.label} errs by more than the declared model alone. {stopped.label} has not finished."
+    )
+
+
 def test_runs_that_were_judged_on_different_records_had_a_winner(tmp_path):
     one = replace(run_of(1), judged_on="abc")
     other = replace(run_of(2), judged_on="def", metrics=run_of(2).metrics | {"free_run/test_mser_pct": -20.0})
@@ -222,6 +230,10 @@ def test_tracked_runs_are_found_by_the_beginning_of_their_id(finished, tmp_path)
     (run,) = store.runs(store.find_experiment("smoke"), f"tags.`{KIND}` = 'run'")
     with pytest.raises(InputError, match="there is 1 run to compare"):
         compare([run.info.run_id[:8], "smoke"], tmp_path / "page.html", uri)
+    folder = f"runs/smoke/{run.info.run_id}/"  # stands for the run that wrote it
+    with pytest.raises(InputError, match="there is 1 run to compare"):
+        compare([folder], tmp_path / "page.html", uri)
+    assert store.run(folder).info.run_id == run.info.run_id
     with pytest.raises(InputError, match="'nowhere' is no tracked run and no experiment"):
         compare(["nowhere"], tmp_path / "page.html", uri)
     content = json.loads(store.artifact(run, "comparison.json").read_text())

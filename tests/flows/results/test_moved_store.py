@@ -81,6 +81,10 @@ def test_what_is_read_of_a_local_store_left_a_copy_in_the_folder_for_temporary_f
     [
         ("https://me:secret@tracking.example:5000/a", "https://tracking.example:5000/a"),
         ("postgresql://me:secret@host/db", "postgresql://host/db"),
+        ("postgresql://me:s/e?c#r@t@host/db", "postgresql://host/db"),
+        ("postgresql://host/db?user=me&password=secret", "postgresql://host/db"),
+        ("postgresql://host/db?sslmode=require&password=secret", "postgresql://host/db?sslmode=require"),
+        ("https://tracking.example:5000/me@a", "https://tracking.example:5000/me@a"),
         ("sqlite:////home/me/a@b.db", "sqlite:////home/me/a@b.db"),
     ],
 )

@@ -43,6 +43,16 @@ def test_the_wrong_folder_was_shown_as_an_empty_page_without_a_word(call, tracke
     assert "Nothing is tracked" not in call("ui", "--port", "5599")[1]
 
 
+def test_the_password_of_the_store_stood_in_the_list_of_processes(call, tracked, monkeypatch):
+    given = []
+    monkeypatch.setattr(os, "execve", lambda *started: given.extend(started[1:]))
+    code, _, _ = call("ui", "--port", "5599")
+    assert code == 0
+    command, environment = given
+    assert not [word for word in command if "mlflow.db" in word]
+    assert environment["MLFLOW_BACKEND_STORE_URI"] == f"sqlite:///{tracked}/mlflow.db"
+
+
 def test_a_store_where_nothing_may_be_written_asks_to_be_copied(tracked, monkeypatch):
     opened = os.open
 

@@ -166,3 +166,18 @@ def test_a_second_refused_item_took_the_place_of_the_first(tmp_path, store, said
         box.close()
     kept = sorted((tmp_path / "box" / "refused").iterdir())
     assert [json.loads(path.read_text())["n"] for path in kept] == [0, 1]
+
+
+def test_a_refused_item_that_could_not_be_put_aside_was_called_delivered(tmp_path, store, said):
+    (tmp_path / "box").mkdir()
+    (tmp_path / "box" / "refused").write_text("no folder")
+    box = opened(tmp_path, store, said)
+    box.put({"n": 0, "bad": True})
+    deadline = time.monotonic() + 10
+    while not said and time.monotonic() < deadline:
+        time.sleep(0.02)
+    box.close()
+    (line,) = said
+    assert "refused an item" in line
+    assert "delivered" not in line
+    assert box.pending == 1

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aesi.calibration.fit import prepared_model
+from aesi.calibration.fit import calibrate, prepared_model
 from aesi.calibration.heat import CaseRecord, case_records, fit_heat, with_fitted_heat
 from aesi.calibration.model import Model
 from aesi.calibration.records.conditions import Conditions
@@ -48,11 +48,12 @@ def test_the_heat_balance_behind_a_temperature_is_found(warming):
 
 
 def test_it_goes_into_the_file_and_comes_back(warming):
-    cell, notes = with_fitted_heat(NMC, seen_by(NMC, warming))
+    cell, fit, _ = with_fitted_heat(NMC, seen_by(NMC, warming))
     again = Cell.from_bpx(cell.to_bpx())
     assert again.conductance_w_k == pytest.approx(TRUE_W_K, rel=0.15)
     assert again.heat_capacity_j_k == pytest.approx(cell.heat_capacity_j_k)
-    assert "W/K" in notes[0]
+    assert fit.conductance_w_k == pytest.approx(cell.conductance_w_k)
+    assert "W/K" in fit.sentence
     assert of_file(again).parameters["heat_transfer_w_k"] == pytest.approx(again.conductance_w_k)
 
 
@@ -81,9 +82,30 @@ def test_a_case_that_lags_its_winding_does_not_make_the_cell_heavier(warming):
     assert as_one_lump.heat_capacity_j_k > 1.2 * cell.heat_capacity_j_k
 
 
+def test_the_error_of_a_temperature_was_told_of_the_descent_before_the_one_that_was_written():
+    """Of two steps each: 0.04 K, where the file leaves 0.07."""
+    cell = replace(NMC, thermal_conductivity_w_m_k=0.1, heat_transfer_w_m2_k=20.0)
+    time = np.arange(0.0, 3000.0, 10.0)
+    current = np.where(time % 900 < 500, 60.0, -20.0)
+    run = simulate(
+        replace(cell, contact_resistance_ohm=5e-4), time, current, 0.9, [of_file(cell)], hold="backward"
+    )
+    outside = 20.0 * cell.surface_area_m2
+    case = 25.0 + (run.series["temperature_k"] - 298.15) / (1.0 + outside * cell.winding_resistance_k_w)
+    record = Measurement(time, current, run.voltage_v, case, "case", hold="backward")
+    start = replace(NMC, thermal_conductivity_w_m_k=1.0)
+    found = calibrate(start, [record], Conditions(soc0=0.9, same_cell=True), evaluations=2)
+    written = found.cell.heat_transfer_w_m2_k * found.cell.surface_area_m2
+    seen = case_records(found.model, found.x)
+    left = fit_heat(found.cell, seen, found.cell.heat_capacity_j_k, conductance_w_k=written)
+    assert left.conductance_w_k == pytest.approx(written)
+    assert left.rmse_k > 0.05
+    assert any(f"of case within {left.rmse_k:.2f} K RMS" in note for note in found.notes)
+
+
 def test_records_that_do_not_warm_leave_the_file_as_it_is(warming):
     flat = replace(warming, temperature_degc=np.full(len(warming), 25.0))
-    cell, notes = with_fitted_heat(NMC, seen_by(NMC, flat))
+    cell, _, notes = with_fitted_heat(NMC, seen_by(NMC, flat))
     assert cell is NMC
     assert "no record has a measured temperature that changes by more than 2 K" in notes[0]
     assert "they stay as in the start file" in notes[0]
@@ -91,7 +113,7 @@ def test_records_that_do_not_warm_leave_the_file_as_it_is(warming):
 
 def test_that_heat_is_not_fitted_where_no_temperature_was_measured_was_said_nowhere(warming):
     bare = replace(warming, temperature_degc=None)
-    cell, notes = with_fitted_heat(NMC, seen_by(NMC, bare))
+    cell, _, notes = with_fitted_heat(NMC, seen_by(NMC, bare))
     assert cell is NMC
     assert notes[0].endswith(
         "so that heat capacity and cooling are not fitted; they stay as in the start file."
@@ -102,7 +124,7 @@ def test_that_heat_is_not_fitted_where_no_temperature_was_measured_was_said_nowh
 def test_a_file_without_a_volume_left_a_measured_temperature_without_a_word(warming, measured):
     lacking = replace(NMC, volume_m3=None, surface_area_m2=None)
     record = warming if measured else replace(warming, temperature_degc=None)
-    cell, notes = with_fitted_heat(lacking, seen_by(lacking, record))
+    cell, _, notes = with_fitted_heat(lacking, seen_by(lacking, record))
     assert cell is lacking
     assert "the start file has no 'Volume [m3]' and no 'External surface area [m2]'" in notes[0]
     assert ("temperature of warming tells no heat capacity" in notes[0]) == measured
@@ -149,7 +171,7 @@ CHAMBERS = {
 @pytest.mark.parametrize("what", CHAMBERS)
 def test_a_chamber_or_a_noisy_sensor_was_written_into_the_file_as_heat(what):
     """Twelve times the heat capacity of noise; of a swing 9e5 W/K, which left all 2.8 K of it."""
-    cell, notes = with_fitted_heat(NMC, seen_by(NMC, in_a_chamber(CHAMBERS[what])))
+    cell, _, notes = with_fitted_heat(NMC, seen_by(NMC, in_a_chamber(CHAMBERS[what])))
     assert cell is NMC
     assert notes == (
         "heat: the losses of the cell do not explain the temperature of chamber; it is not used.",
@@ -157,12 +179,12 @@ def test_a_chamber_or_a_noisy_sensor_was_written_into_the_file_as_heat(what):
 
 
 def test_a_record_in_a_chamber_does_not_take_part_in_what_another_tells_of_heat(warming):
-    alone, of_alone = with_fitted_heat(NMC, seen_by(NMC, warming))
-    both, of_both = with_fitted_heat(NMC, seen_by(NMC, warming, in_a_chamber(CHAMBERS["a ramp down"])))
+    alone, of_alone, _ = with_fitted_heat(NMC, seen_by(NMC, warming))
+    both, of_both, notes = with_fitted_heat(NMC, seen_by(NMC, warming, in_a_chamber(CHAMBERS["a ramp down"])))
     assert both.heat_capacity_j_k == pytest.approx(alone.heat_capacity_j_k, rel=1e-6)
     assert both.conductance_w_k == pytest.approx(alone.conductance_w_k, rel=1e-6)
-    assert of_both[0] == of_alone[0]
-    assert "temperature of chamber" in of_both[1]
+    assert of_both.sentence == of_alone.sentence
+    assert "temperature of chamber" in notes[0]
 
 
 def test_a_file_without_thermal_data_is_told_what_it_lacks():

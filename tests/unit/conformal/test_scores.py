@@ -17,7 +17,6 @@ def test_coverage_width_and_score_of_a_case_worked_by_hand() -> None:
     assert scores.mean_width_v == 2.0
     assert scores.interval_score_v == pytest.approx(7.0)
     assert np.isnan(scores.worst_bin_coverage)
-    assert np.isnan(scores.low_minutes)
 
 
 def test_a_missing_residual_counts_neither_way() -> None:
@@ -27,8 +26,9 @@ def test_a_missing_residual_counts_neither_way() -> None:
 
 
 def test_no_residual_at_all_has_no_score() -> None:
-    scores = scores_of(band([-1], [1]), np.array([np.nan]), 0.1, dt_s=1.0)
-    assert np.isnan([scores.coverage, scores.mean_width_v, scores.interval_score_v, scores.low_minutes]).all()
+    scores = scores_of(band([-1], [1]), np.array([np.nan]), 0.1)
+    assert np.isnan([scores.coverage, scores.mean_width_v, scores.interval_score_v]).all()
+    assert np.isnan(low_minute_share([np.full(60, np.nan)], 1.0))
 
 
 def test_the_true_quantiles_score_best(rng: np.random.Generator) -> None:

@@ -111,13 +111,47 @@ def test_a_missing_column_names_the_nearest_and_the_option(tmp_path):
     assert '--column current_a="I[A]"' in message
 
 
+@pytest.mark.parametrize("temperature", ["T_amb", "T"])
 @pytest.mark.parametrize("stamps", ["timestamp", "Date_Time", "Datum", "DateTime"])
-def test_a_temperature_was_proposed_as_the_time_beside_a_column_of_dates(tmp_path, stamps):
-    header = f"T_amb,{stamps},current_a,voltage_v"
+def test_a_temperature_was_proposed_as_the_time_beside_a_column_of_dates(tmp_path, stamps, temperature):
+    header = f"{temperature},{stamps},current_a,voltage_v"
     line = "25.0,2024-03-05 09:12:00,1.0,3.7"
     message = refusal(tmp_path, "\n".join([header, line, line]) + "\n")
     assert f"the nearest: '{stamps}'." in message
     assert f'--column time_s="{stamps}"' in message
+
+
+def test_most_rows_were_to_be_removed_where_a_thermocouple_was_read_less_often(tmp_path):
+    rows = "".join(
+        f"{t},{i},{v},{25 if k % 5 == 0 else ''}\n"
+        for k, (t, i, v) in enumerate(zip(TIME, CURRENT, VOLTAGE, strict=True))
+    )
+    message = refusal(tmp_path, f"{HEADER},temperature_degc\n{rows}")
+    assert "remove" not in message
+    assert "interpolate it to all rows, or leave the column out" in message
+
+
+def test_a_lone_t_is_the_time_where_no_column_has_dates(tmp_path):
+    assert '--column time_s="T"' in refusal(tmp_path, "T,current_a,voltage_v\n1,2,3\n2,2,3\n")
+    path = tmp_path / "named.csv"
+    path.write_text("T,current_a,voltage_v\n1,2,3.7\n2,2,3.6\n")
+    assert not any("temperature" in note for note in read(path, Reading({"time_s": "T"})).notes)
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [("T", ""), ("T (K)", "K"), ("T/K", "K"), ("T [C]", ""), ("T_F", "degF")],
+)
+def test_a_temperature_under_its_symbol_was_passed_over_without_a_word(tmp_path, name, unit):
+    path = tmp_path / "drive.csv"
+    path.write_text(f"time_s,current_a,voltage_v,{name}\n1,2,3.7,298\n2,2,3.6,298\n")
+    declared = f" --unit temperature_degc={unit}" if unit else ""
+    assert any(
+        f'is not used; --column temperature_degc="{name}"{declared} takes it' in note
+        for note in read(path, Reading()).notes
+    )
+    message = refusal(tmp_path, f"{name},Zeit,current_a,voltage_v\n298,1,2,3\n298,2,2,3\n")
+    assert '--column time_s="Zeit"' in message
 
 
 def test_a_test_s_time_is_proposed_before_a_date(tmp_path):
@@ -304,15 +338,68 @@ def test_a_sparsely_logged_rest_is_no_gap_but_a_note(tmp_path):
     assert any("rested" in note for note in measurement.notes)
 
 
-@pytest.mark.parametrize(
-    ("seconds", "after_v"),
-    [pytest.param(3700.0, 3.7, id="too long"), pytest.param(450.0, 3.69, id="another voltage")],
-)
-def test_hours_without_rows_or_another_voltage_after_them_are_no_rest(tmp_path, seconds, after_v):
-    time = np.concatenate([np.arange(50.0), 49.0 + seconds + np.arange(50.0)])
+def test_another_voltage_after_a_while_without_rows_is_no_rest(tmp_path):
+    time = np.concatenate([np.arange(50.0), 499.0 + np.arange(50.0)])
     current = np.concatenate([np.tile([5.0, -5.0], 20), np.zeros(20), np.tile([5.0, -5.0], 20)])
-    voltage = np.where(time < 50.0, 3.7, after_v) - 0.01 * current
-    assert f"a gap of {seconds:g} s after 49 s" in refusal(tmp_path, text(time, current, voltage))
+    voltage = np.where(time < 50.0, 3.7, 3.69) - 0.01 * current
+    assert "a gap of 450 s after 49 s" in refusal(tmp_path, text(time, current, voltage))
+
+
+def pulses_logged_on_change(begins: bool, charge_a=4.0, rest_s=5400.0):
+    """Rows of three pulses, (n, 3) s, A, V: a row a second in a pulse of 30 s, one at the end of a rest; then a steady
+    current for 600 s with its last row, and a rest alike. `begins`: with the first row of each rest and current too."""
+    rows, now, open_v = [(0.0, 0.0, 3.9)], 0.0, 3.9
+    for _ in range(3):
+        rows += [(now + s, 8.0, open_v - 0.08 - 1e-3 * s) for s in range(1, 31)]
+        now, open_v = now + 30.0, open_v - 0.005
+        rows += [(now + 0.5, 0.0, open_v - 0.03)] * begins + [(now + rest_s, 0.0, open_v)]
+        now += rest_s
+        rows += [(now + 0.5, charge_a, open_v - 0.01 * charge_a)] * begins
+        open_v -= 0.01 * charge_a
+        rows += [(now + 600.0, charge_a, open_v - 0.01 * charge_a)] * begins
+        now += 600.0 * begins
+        rows += [(now + 0.5, 0.0, open_v - 5e-3 * charge_a), (now + 1800.0, 0.0, open_v)] * begins
+        now += 1800.0 * begins
+    return np.array(rows).T
+
+
+@pytest.mark.parametrize("charge_a", [4.0, -4.0])
+def test_a_pulse_test_that_was_logged_on_change_was_refused_for_a_gap(tmp_path, charge_a):
+    table = pulses_logged_on_change(True, charge_a)
+    record = read_measurement(written(tmp_path, text(*table)))
+    assert len(record) == table.shape[1]
+    told = " ".join(record.notes)
+    assert "No rows for 1.8e+03 to 5.4e+03 s at 6 places, the first at 30.5 s; the cell rested." in told
+    assert "No rows for 599.5 s from 5430.5 s on; the current before and after them is the same" in told
+
+
+def test_a_rest_of_which_the_last_row_alone_was_written_was_refused_for_a_gap(tmp_path):
+    table = pulses_logged_on_change(False)
+    record = read_measurement(written(tmp_path, text(*table)))
+    assert record.hold_taken == "backward"
+    assert any("No rows for 5400 s from 30 s on; the cell rested." in note for note in record.notes)
+
+
+@pytest.mark.parametrize(
+    ("row", "change"),
+    [
+        pytest.param(31, (0.0, 0.0, -0.12), id="rest at a lower voltage than under the load"),
+        pytest.param(31, (0.0, 0.0, 0.06), id="rest at a higher voltage than before the load"),
+        pytest.param(31, (0.0, 8.0, 0.0), id="the first row of a load"),
+    ],
+)
+def test_a_row_that_ends_no_rest_does_not_tell_what_the_cell_did_before_it(tmp_path, row, change):
+    table = pulses_logged_on_change(False)
+    table[:, row] += change
+    message = refusal(tmp_path, text(*table))
+    assert "a gap of 5400 s after 30 s" in message
+    assert "give its first row as well as its last" in message
+
+
+def test_a_steady_current_under_which_the_voltage_went_the_other_way_is_a_gap(tmp_path):
+    table = pulses_logged_on_change(True)
+    table[2, 34] += 0.06
+    assert "a gap of 599.5 s after 5430.5 s" in refusal(tmp_path, text(*table))
 
 
 def test_a_lone_row_long_after_the_test_is_dropped_and_that_is_said(tmp_path):

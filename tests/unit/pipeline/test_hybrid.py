@@ -511,6 +511,40 @@ def test_a_saved_model_was_simulated_with_another_hold_than_it_was_predicted_wit
         assert all(any(words in note for note in notes) for notes in said.values())
 
 
+def test_one_record_was_read_otherwise_by_a_model_that_a_discovery_had_written_than_by_its_cell(
+    model, tmp_path
+):
+    """Rows of a second in pulses of a minute and one at the end of a rest of ten: a logger's."""
+    cell, pulse = model.cell, np.arange(1.0, 61.0)
+    time_s = np.concatenate([[0.0], *(660.0 * k + np.append(600.0, 600.0 + pulse) for k in range(4))])
+    current_a = np.concatenate([[0.0], *[np.append(0.0, np.full(60, cell.nominal_capacity_ah))] * 4])
+    voltage_v = aesi.simulate(cell, time_s, current_a, SOC0, hold="backward").voltage_v
+    pulses = aesi.Measurement(time_s, current_a, voltage_v, name="pulses")
+    pulses.to_frame().to_csv(tmp_path / "pulses.csv", index=False)
+    folder = HybridModel(cell, hold=None).save(tmp_path / "model")
+    for todo, source in (
+        (simulate_file, folder / "cell.bpx.json"),
+        (simulate_file, folder),
+        (predict_file, folder),
+    ):
+        said, out = [], tmp_path / "out.csv"
+        todo(source, tmp_path / "pulses.csv", out, ProfileRequest(SOC0), say_notes=said.extend)
+        np.testing.assert_allclose(pd.read_csv(out).voltage_v, voltage_v, atol=1e-6)
+        assert any("constant since the row before, as loggers write" in note for note in said)
+    saved = HybridModel.load(folder)
+    for stepping in (
+        saved,
+        replace(model, hold=None, correction=None, intervals=None),
+    ):  # its bands are of even rows
+        prediction = stepping.predict_record(pulses, SOC0)
+        np.testing.assert_allclose(prediction.physics_v, voltage_v, atol=1e-6)
+    straight = aesi.simulate(cell, time_s, current_a, SOC0, hold="linear").voltage_v
+    lone = saved.predict(time_s, current_a, SOC0)  # a profile without a voltage, which no logger wrote
+    np.testing.assert_allclose(lone.voltage_v, straight, atol=1e-6)
+    declared = replace(saved, hold="backward").predict_record(pulses.held("linear"), SOC0)
+    np.testing.assert_allclose(declared.voltage_v, straight, atol=1e-6)
+
+
 @pytest.mark.parametrize("soc0", [None, 0.2])
 def test_a_start_that_was_read_is_the_first_to_check_where_a_record_runs_empty(model, tmp_path, soc0):
     folder = replace(model, correction=None, intervals=None, bands=None).save(tmp_path / "model")
@@ -765,6 +799,10 @@ def test_what_was_fitted_beside_a_finding_was_told_with_its_values_as_if_found(m
         )
         for note in said
     )
+    recalibrated = HybridModel(model.cell, (offset,), beside=("voltage_sensor_offset",))
+    simulate_file(recalibrated.save(tmp_path / "refit"), record, tmp_path / "o.csv", say_notes=said.extend)
+    words = ": the saved model includes parameters that were fitted together: voltage_sensor_offset."
+    assert any(note.endswith(words) for note in said)
     lost = export(tmp_path / "found", tmp_path / "o.json").left
     assert lost == ("voltage_sensor_offset, fitted beside what was found: BPX has no field for that.",)
     alone = HybridModel(model.cell, (offset,)).save(tmp_path / "alone")

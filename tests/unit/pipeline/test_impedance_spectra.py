@@ -112,6 +112,22 @@ def test_frequencies_at_which_the_model_says_nothing_of_a_cell_were_written_with
     assert said[-1].startswith("1 of the frequencies lies above 100 Hz")
 
 
+def test_spectra_of_several_states_were_computed_at_one_without_a_word(tmp_path):
+    rows = "".join(f"{soc},{hz}\n" for soc in (0.2, 0.8) for hz in (10.0, 1.0, 0.1))
+    (tmp_path / "eis.csv").write_text("soc,frequency_hz\n" + rows)
+    said = []
+    layer = activated([("double_layer", {})])
+    file = CELLS / "lg_m50_chen2020.bpx.json"
+    z = impedance_file(
+        file, 0.5, str(tmp_path / "eis.csv"), tmp_path / "z.csv", effects=layer, say_notes=said.extend
+    )
+    np.testing.assert_array_equal(z[:3], z[3:])
+    assert said == [
+        "the file has 6 rows and 3 different frequencies: if it holds spectra of several states, the impedance of all "
+        "rows is that at a state of charge of 0.5 and 25 degC."
+    ]
+
+
 def test_the_slowest_diffusion_is_that_of_the_larger_of_two_slow_particles(cell):
     """Rate x**2 D/R**2 with the first root x of tan x = x, 4.4934; slower in the cold by an activation energy."""
     slow = cell.with_positive(particle_radius_m=20e-6, diffusivity=Constant(1e-15), diffusivity_ea_j_mol=20e3)

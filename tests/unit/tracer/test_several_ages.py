@@ -102,7 +102,7 @@ def test_errors_were_told_of_a_model_of_several_ages_that_nobody_can_write(cell,
     ]
     for told, record in zip(found.files, records, strict=True):
         soc0 = values["soc0", record.name]
-        run = simulate(cell, record.time_s, record.current_a, soc0, effects, hold=found.hold)
+        run = simulate(cell, record.time_s, record.current_a, soc0, effects, hold=record.hold_taken)
         assert told.voltages["recalibrated"] == pytest.approx(run.voltage_v, abs=1e-6)
 
 
