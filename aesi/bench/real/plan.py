@@ -96,6 +96,8 @@ DRIVES = ("cycle", "us06", "mixed", "la92")
 RESTS_FIRST = {(PANASONIC, "us06"), (PANASONIC, "la92")}
 """(data set, drive) of the archives that begin with an hour or two of rest. They are left out, since only the first
 hour is used."""
+SHORT = ("n10degC_601_us06", "n20degC_610_us06")
+"""Records of the archives that are shorter than an hour, on a clock that began hours before; they are used whole."""
 WARM = ("25degC", "40degC_562")
 """First parts of the names of records near 25 degC, of which withholding the temperature would hide nothing. The
 archive of the HG2 has some of these, measured at 24 degC, under 40 degC."""
@@ -141,6 +143,8 @@ def chosen(
 
 
 def _stop(file: str) -> float | None:
+    if file in SHORT:
+        return None
     return UNTIL_S.get(file) if any(word in file for word in SLOW_OR_PULSES) else WINDOW_S
 
 
