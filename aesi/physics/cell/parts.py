@@ -292,9 +292,10 @@ class CellParameters:
             )
         at = day_of(day)
         if not days[0] <= at <= days[-1]:
+            when = f"on {days[0]} alone" if days[0] == days[-1] else f"from {days[0]} to {days[-1]}"
             raise CellError(
-                f"the state of health of {at}: the file of {self.name} knows its cell from {days[0]} to {days[-1]}; "
-                "give the share of its capacity that was left."
+                f"the state of health of {at}: the file of {self.name} knows its cell {when}; give the share of its "
+                "capacity that was left."
             )
         return float(np.interp(at.toordinal(), [known.toordinal() for known in days], shares))
 

@@ -618,6 +618,13 @@ def test_what_the_file_does_not_know_of_a_day_is_not_made_up(dated, day):
         dated.with_soh(day)
 
 
+def test_a_file_that_knows_one_day_was_told_to_know_it_from_that_day_to_that_day(dated):
+    first, *others = dated.tested_on
+    one = replace(dated, tested_on=(first, *((name, first[1]) for name, _ in others)))
+    with pytest.raises(CellError, match=rf"knows its cell on {first[1]} alone; give the share"):
+        one.with_soh(date(2017, 6, 1))
+
+
 def test_a_file_without_days_says_so(lg_m50):
     with pytest.raises(
         CellError, match=r"2017-03-24: the file of .* knows no day of its cell; give the share"

@@ -360,8 +360,8 @@ def rest_finding(discovery: Mapping[str, Any]) -> str:
     if discovery["structured_mv"] > discovery["tolerance_mv"]:
         return (
             text
-            + "the remaining error exceeds the noise, but no function of the model's variables predicts it on "
-            "unseen data. That points to a fault of an instrument, or to a state that the model lacks."
+            + "the remaining error exceeds the noise, and functions of the model's variables predict little of it. "
+            "That points to a fault of an instrument, or to a state that the model lacks."
         )
     return text + "little systematic error remains for missing physics to explain."
 
