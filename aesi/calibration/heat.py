@@ -101,23 +101,17 @@ def with_fitted_heat(
     declared, lacks = cell.heat_capacity_j_k, _lacking(cell)
     if not warming:
         stays = f"the start file has no {lacks}" if lacks else "they stay as in the start file"
-        return (
-            cell,
-            None,
-            (
-                f"heat: no record has a measured temperature that changes by more than {LEAST_RISE_K:g} K, so that "
-                f"heat capacity and cooling are not fitted; {stays}.",
-            ),
+        sentence = (
+            f"heat: no record has a measured temperature that changes by more than {LEAST_RISE_K:g} K, so that heat "
+            f"capacity and cooling are not fitted; {stays}."
         )
+        return cell, None, (sentence,)
     if declared is None or cell.specific_heat_j_kg_k is None or lacks:
-        return (
-            cell,
-            None,
-            (
-                f"heat: the start file has no {lacks}, so that the temperature of {', '.join(r.name for r in warming)} "
-                "tells no heat capacity and no cooling.",
-            ),
+        sentence = (
+            f"heat: the start file has no {lacks}, so that the temperature of {', '.join(r.name for r in warming)} "
+            "tells no heat capacity and no cooling."
         )
+        return cell, None, (sentence,)
     explained = (
         warming if _losses_explain(cell, warming) else [r for r in warming if _losses_explain(cell, [r])]
     )

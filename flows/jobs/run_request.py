@@ -57,7 +57,7 @@ class RunRequest:
     def title(self) -> str:
         """What the run is called: `measured_nmc, seed 0`, with what is laid over the file and has a part in the result,
         `measured_nmc, seed 0: data.dt_s=2`."""
-        keys = {text: overridden_key(text).split(".") for text in self.overrides}
+        keys = {text: overridden_key(text).split(".") for text in self.shown_overrides}
         told = [
             text
             for text, key in keys.items()

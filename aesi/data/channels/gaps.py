@@ -49,11 +49,14 @@ RAN_ON = "the current before and after them is the same, and is taken to have ru
 def without_gaps(data: Columns, context: Context, notes: list[str]) -> tuple[Columns, Context]:
     """Refuse gaps; keep a sparsely logged rest or steady current and drop a single row long before or after the test,
     with a note."""
+    gaps = find_gaps(data)
+    if not gaps:
+        return data, context
     n = len(data["time_s"])
     kept = np.arange(n)
     steady: dict[str, list[tuple[float, float]]] = {RESTED: [], RAN_ON: []}
     currents = _Currents.of(data)
-    for k in find_gaps(data):
+    for k in gaps:
         seconds = float(data["time_s"][k + 1] - data["time_s"][k])
         stray = k in (0, n - 2) and seconds > STRAY_S
         if currents.rested(k) and not stray:

@@ -172,9 +172,8 @@ class HybridModel:
             raise InputError(
                 f"soc0_sd = {soc0_sd!r} is no standard deviation of a state of charge; give 0 to 1."
             )
-        record = record.held(
-            self.hold_of(record)
-        )  # before rows are averaged and voltages hidden, which tell it
+        # The rows tell it as they are, not once they are averaged or their voltages hidden.
+        record = record.held(self.hold_of(record))
         measured = record.voltage_v
         if one_step and not np.isfinite(measured).all():
             row = int(np.flatnonzero(~np.isfinite(measured))[0])
