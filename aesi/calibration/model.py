@@ -267,15 +267,16 @@ class Model:
         of_spectra = np.zeros((len(off), self.layout.size))
         closed = self._closed
         for j in range(self.layout.shapes.stop):
+            simulated = not closed.start <= j < closed.stop
+            if not (simulated or len(off)):
+                continue
             h = STEP if x[j] + STEP <= self.high[j] else -STEP
             there = x.copy()
             there[j] += h
             changed = cell if j == self.layout.zero else self.cell_at(there)
             if len(off) and j != self.layout.zero:
                 of_spectra[:, j] = (self.spectra.misfits(changed) - off) / h
-            if closed.start <= j < closed.stop:
-                continue
-            for i, record in enumerate(self.records):
+            for i, record in enumerate(self.records if simulated else ()):
                 if j != self.layout.zero or record.slow:
                     blocks[i][:, j] = (self.run(i, changed, there)[0] - voltages_v[i]) / h
         return blocks, of_spectra

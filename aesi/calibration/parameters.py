@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -308,11 +309,18 @@ def _electrode(electrode: Electrode, side: str, values: Mapping[str, float]) -> 
 
 def _course(electrode: Electrode, side: str, what: str, values: Mapping[str, float]) -> LookupTable | None:
     """Factor over stoichiometry, its logarithm a cubic spline through the knots; constant beyond the window."""
-    logs = np.log([values.get(knot_name(side, what, k), 1.0) for k in range(len(PLACES))])
+    factors = tuple(values.get(knot_name(side, what, k), 1.0) for k in range(len(PLACES)))
+    return _splined(electrode.theta_min, electrode.theta_max, factors)
+
+
+@lru_cache(maxsize=64)
+def _splined(theta_min: float, theta_max: float, factors: tuple[float, ...]) -> LookupTable | None:
+    """`_course` of the factors at the knots of a window. Cached: a finite difference changes one course of six."""
+    logs = np.log(factors)
     if not logs.any():
         return None
-    places = electrode.theta_min + (electrode.theta_max - electrode.theta_min) * np.array(PLACES)
-    x = np.linspace(electrode.theta_min, electrode.theta_max, COURSE_POINTS)
+    places = theta_min + (theta_max - theta_min) * np.array(PLACES)
+    x = np.linspace(theta_min, theta_max, COURSE_POINTS)
     y = np.exp(CubicSpline(places, logs, bc_type="natural")(x))
     return LookupTable(tuple(map(float, x)), tuple(map(float, y)))
 
