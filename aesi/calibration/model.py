@@ -219,10 +219,6 @@ class Model:
             "fitted": (self.cell_at(x), x),
         }
 
-    def errors(self, x: Array) -> list[Array]:
-        """(rows,) V of each record, measured - model."""
-        return self.errors_of(self.cell_at(x), x)
-
     def errors_of(self, cell: Cell, x: Array) -> list[Array]:
         """(rows,) V of each record, measured - simulated with `cell` and the record's part of the working vector."""
         return [r.rows.voltage_v - self.run(i, cell, x)[0] for i, r in enumerate(self.records)]

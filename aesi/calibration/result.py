@@ -235,8 +235,8 @@ def information_weights(model: Model, x: Array) -> Array:
     optimum. Of twelve drives of virtual cells with 1 mV of noise, which the fit counts 15 times less than that, 95 %
     intervals of the full weight missed the true diffusivity of the electrolyte eight times, those of the fit's none.
     """
-    out = []
-    for record, error, weight in zip(model.records, model.errors(x), model.weights, strict=True):
+    out, cell = [], model.cell_at(x)
+    for record, error, weight in zip(model.records, model.errors_of(cell, x), model.weights, strict=True):
         seen = error[record.trusted]
         scale = max(rms(seen), 1e-6)
         centred = seen - seen.mean()
@@ -244,8 +244,7 @@ def information_weights(model: Model, x: Array) -> Array:
         share = (1.0 - np.clip(rho, 0.0, 0.999)) / (1.0 + np.clip(rho, 0.0, 0.999))
         own = np.sqrt(share) / scale / np.where(weight > 0.0, weight, 1.0)
         out.append(np.minimum(own, 1.0))
-    of_spectra = model.spectra.information_weights(model.cell_at(x))
-    return np.concatenate([*out, of_spectra, np.ones(model.layout.size)])
+    return np.concatenate([*out, model.spectra.information_weights(cell), np.ones(model.layout.size)])
 
 
 def intervals(model: Model, x: Array, covariance: Array) -> dict[str, Interval]:

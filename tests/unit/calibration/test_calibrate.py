@@ -346,7 +346,7 @@ def test_a_record_of_little_noise_counted_for_more_in_its_intervals_than_in_the_
     error = noise_v * np.random.default_rng(0).standard_normal(400)
     model = SimpleNamespace(
         records=[SimpleNamespace(trusted=np.ones(400, dtype=bool))],
-        errors=lambda x: [error],
+        errors_of=lambda cell, x: [error],
         weights=[np.full(400, 1.0 / (ERROR_V * REPEATS**0.5))],
         spectra=SimpleNamespace(information_weights=lambda cell: np.zeros(0)),
         cell_at=lambda x: None,
