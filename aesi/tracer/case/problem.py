@@ -225,7 +225,7 @@ class InverseProblem:
     def failure_reason(self, hypothesis: Sequence[str]) -> str:
         """Why a hypothesis cannot be simulated at its typical values: one sentence."""
         try:
-            effects = tuple(self.effects[name].activate() for name in hypothesis)
+            effects = (*self.fixed, *(self.effects[name].activate() for name in hypothesis))
             self.run(self.fit_parts[0], self.records[0].soc0, effects, self.records[0].thin_hold)
         except AesiError as error:
             return str(error)

@@ -6,10 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from aesi.errors import FitError
+from aesi.errors import FitError, SimulationError
 from aesi.numerics.metrics import rms
 from aesi.numerics.noise.discrepancy import CORRELATION_LENGTHS_S, whiten
 from aesi.physics import simulate
+from aesi.physics.effect import Effect
 from aesi.physics.effects import CATALOGUE
 from aesi.records import Measurement
 from aesi.tracer.case.blocks import Blocks, blocks_of
@@ -122,6 +123,15 @@ def test_a_voltage_of_no_cell_is_no_prediction(cell, few, make, monkeypatch):
         far = SimpleNamespace(voltage_v=np.full(len(problem.measured), beyond))
         monkeypatch.setattr(InverseProblem, "run", lambda self, *a, far=far, **k: far)
         assert problem.predict(values) is None
+
+
+def test_why_an_effect_was_not_tried_was_asked_of_a_cell_without_its_own_effects(cell, few, make):
+    def refusing(model):
+        raise SimulationError("the cell is at no temperature.")
+
+    given = Effect("given", "physics", "An effect that no simulation of the cell gets by.", on_model=refusing)
+    problem = InverseProblem(cell, prepare_all(cell, [make()], 0.9, 0.3), few, fixed=(given.activate(),))
+    assert problem.failure_reason(("series_resistance",)) == "the cell is at no temperature."
 
 
 @pytest.mark.parametrize("bounds", [(-1.0, 1.0), (-1.0, 0.0)])
