@@ -262,7 +262,7 @@ def _noise_by_lag_v(data: Measurement, capacity_ah: float) -> dict[int, float]:
     adds a part that grows as the cube of the lag: the lags end before one at which the noise grows by a larger factor
     than the lag, or which has fewer than `FEWEST_SPANS` spans that do not overlap.
     """
-    typical = float(np.median(np.diff(data.time_s))) if len(data) > 1 else np.inf
+    typical = float(np.median(np.diff(data.time_s)))
     settled = max(int(np.ceil(SETTLED_S / typical)), 1)
     out: dict[int, float] = {}
     for lag in (one for one in SMOOTH_LAGS if one == 1 or one * typical <= LONGEST_SMOOTH_S):
@@ -292,24 +292,6 @@ def _steady_spans(data: Measurement, span: int, longest_s: float, most_a: float)
     return calm & (moves <= np.quantile(moves[calm], STEADIEST_SHARE)) if calm.any() else calm
 
 
-def prepare(
-    cell: Cell,
-    data: Measurement,
-    soc0: float | None,
-    holdout: float,
-    *,
-    given: Sequence[ActiveEffect] = (),
-    shared: bool = False,
-) -> PreparedRecord:
-    """A record with its noise, its initial state of charge and its fit part.
-
-    holdout : share of the time, at the end, that fits may not see (0 for none).  given : effects that the declared
-    model has.  shared : True where `soc0` was given for several records.
-    Raises DataError where the record is too short or its initial state cannot be known.
-    """
-    return _prepared(cell, thinned_record(cell, data), soc0, holdout, given, shared)
-
-
 def _prepared(
     cell: Cell,
     record: ThinnedRecord,
@@ -318,6 +300,12 @@ def _prepared(
     given: Sequence[ActiveEffect],
     shared: bool,
 ) -> PreparedRecord:
+    """A record with its noise, its initial state of charge and its fit part.
+
+    holdout : share of the time, at the end, that fits may not see (0 for none).  given : effects that the declared
+    model has.  shared : True where `soc0` was given for several records.
+    Raises DataError where its initial state cannot be known.
+    """
     data = record.whole
     start = initial_state(cell, data, soc0, record.hold, given, shared=shared, potentials_v=GOOD_READING_V)
     lost = thinning_error_v(cell, record, start.soc, given)
@@ -426,10 +414,11 @@ def prepare_test(
     are judged. The notes then say so, in place of a state of charge read from the first row.
     """
     led = leading_record(data, seen)
+    whole = data if led is None else led[1]
+    prepared = _prepared(cell, thinned_record(cell, whole), soc0, 0.0, given, shared=True)
     if led is None:
-        return prepare(cell, data, soc0, 0.0, given=given, shared=True)
-    index, whole = led
-    prepared = prepare(cell, whole, soc0, 0.0, given=given, shared=True)
+        return prepared
+    index = led[0]
     lead_note = (
         f"{data.name} is judged from {stamp(float(whole.time_s[len(seen[index])]))} s on, after the rows of "
         f"{seen[index].name} that were fitted; the model is run from {stamp(float(whole.time_s[0]))} s to get there."
@@ -458,10 +447,13 @@ def prepare_all(
     given: Sequence[ActiveEffect] = (),
     good: Sequence[Measurement] = (),
 ) -> tuple[PreparedRecord, ...]:
-    """The prepared records of several measurements, thinned together (`thinned_together`).
+    """The prepared records of one or several measurements, thinned together (`thinned_together`).
 
+    soc0 : state of charge at the first row of each, None to read it.  holdout : share of the time of each, at its end,
+    that fits may not see (0 for none).  given : effects that the declared model has.
     good : measurements that are known to be good. Their records come last, are fitted whole, and take the initial state
     of charge from their voltage.
+    Raises DataError where an initial state cannot be known.
     """
     rows = thinned_together(cell, (*measurements, *good))
     shared = len(measurements) > 1

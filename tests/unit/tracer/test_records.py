@@ -10,7 +10,7 @@ from aesi.data.thinning import averaged_over
 from aesi.physics import simulate
 from aesi.records import Measurement
 from aesi.tracer.case.checks import check_record
-from aesi.tracer.case.records import leading_record, noise_floor_v, noise_of, prepare, prepare_test
+from aesi.tracer.case.records import leading_record, noise_floor_v, noise_of, prepare_all, prepare_test
 from aesi.tracer.case.thinned import thinned_record, thinned_together
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.model_state import ModelState
@@ -76,7 +76,7 @@ def test_a_thinned_record_of_the_declared_cell_leaves_nothing(cell, rng):
     jumps = np.repeat(rng.normal(5.0, 60.0, 180), 50)
     drive = Measurement(time, jumps, simulate(cell, time, jumps, 0.8).voltage_v, name="drive")
     plain = averaged_over(drive, 1.0)
-    record = prepare(cell, drive, 0.8, 0.0)
+    record = prepare_all(cell, [drive], 0.8, 0.0)[0]
     assert len(record.thin) == len(plain) < len(time) / 9
     thin_v = simulate(cell, plain.time_s, plain.current_a, 0.8, hold="linear").voltage_v
     assert np.max(np.abs(plain.voltage_v - thin_v)) > 2e-3  # kinetics are no linear function of the current
@@ -95,7 +95,7 @@ def pulses(amplitude_a):
 
 def test_pulses_logged_unevenly_keep_their_charge_and_their_height(cell):
     time, current = pulses(60.0)
-    record = prepare(cell, measured(cell, time, current), None, 0.0)
+    record = prepare_all(cell, [measured(cell, time, current)], None, 0.0)[0]
     thin = record.thin
     assert record.thin_hold == "backward"
     assert len(thin) < len(time) / 3
@@ -131,7 +131,7 @@ def test_records_that_are_too_many_rows_together_are_thinned_further(cell, rng):
 
 def test_a_long_discharge_needs_few_rows(cell):
     time = np.arange(0.0, 36_000.0)
-    record = prepare(cell, measured(cell, time, np.where(time > 10, 3.0, 0.0)), None, 0.0)
+    record = prepare_all(cell, [measured(cell, time, np.where(time > 10, 3.0, 0.0))], None, 0.0)[0]
     assert 500 < len(record.thin) < 800
     assert np.diff(record.thin.time_s).max() < 100.0
 
@@ -140,7 +140,7 @@ def test_averages_are_not_noisier_than_the_rows_of_a_drive_that_never_rests(cell
     time = np.arange(0.0, 900.0, 0.1)
     current = 10.0 + np.convolve(rng.normal(0.0, 30.0, len(time)), np.ones(15) / 15, mode="same")
     voltage = simulate(cell, time, current, soc0=0.8).voltage_v + 1e-3 * rng.normal(size=len(time))
-    record = prepare(cell, Measurement(time, current, voltage, name="restless"), 0.8, 0.0)
+    record = prepare_all(cell, [Measurement(time, current, voltage, name="restless")], 0.8, 0.0)[0]
     assert record.noise_full_v == pytest.approx(1e-3, rel=0.05)
     assert 1e-3 / np.sqrt(10.0) < record.noise_v < record.noise_full_v
 
@@ -172,7 +172,7 @@ def test_the_resolution_of_a_voltage_was_averaged_away_as_white_noise(cell):
     current = np.where((time > 600) & (time < 3000), 3.0, 0.0)
     voltage = simulate(cell, time, current, soc0=0.8).voltage_v
     data = Measurement(time, current, 5e-3 * np.round(voltage / 5e-3), name="coarse")
-    record = prepare(cell, data, 0.8, 0.0)
+    record = prepare_all(cell, [data], 0.8, 0.0)[0]
     assert len(record.thin) < 1000
     assert record.white_v.min() > 0.99 * 5e-3 / np.sqrt(12.0)
     last = (record.thin.time_s > 3000.0) & (np.abs(record.thin.voltage_v - data.voltage_v[-1]) < 1e-3)
@@ -204,7 +204,7 @@ def test_the_noise_of_a_filtered_or_held_channel_was_told_from_neighbouring_rows
     channel = replace(data, voltage_v=clean + 1e-3 * noise)
     assert noise_of(channel, 30.0).sd_v == pytest.approx(1e-3, rel=0.15)
     assert noise_of(channel, 30.0).rows > 2
-    record = prepare(cell, channel, 0.9, 0.0)
+    record = prepare_all(cell, [channel], 0.9, 0.0)[0]
     assert record.noise_v == pytest.approx(1e-3, rel=0.15)
     assert record.equivalent_white_v.min() > 1.4 * record.white_v.max()
 
