@@ -55,11 +55,6 @@ class Size(NamedTuple):
     fast_v: float = 0.0
 
 
-def replace_fast(size: Size, by: Size) -> Size:
-    """`size` with the `fast_v` of `by`."""
-    return Size(size.delta_v, by.fast_v)
-
-
 @dataclass(frozen=True)
 class SizePrior:
     """Log-normal prior of the size of the model error.

@@ -57,9 +57,9 @@ def ranking(
     """A row for every effect that could be simulated, best first. An effect of the verdict is shown in the chosen
     hypothesis, any other in its best one, each with its gain at the trust that it was fitted at."""
     chosen, search = path.chosen, path.search or path
-    rows = []
+    tried, rows = search.explanations(), []
     for effect in path.problem.effects.values():
-        held = [e for e in search.explanations() if effect.id in e.hypothesis]
+        held = [e for e in tried if effect.id in e.hypothesis]
         if not held:
             continue
         is_chosen = effect.id in chosen.hypothesis

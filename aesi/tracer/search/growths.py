@@ -11,7 +11,7 @@ from aesi.numerics.typing import Array
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.trust import MEASURED_CELL
 from aesi.tracer.likelihood.growth import EffectGrowth, Grown, Parent, expected_score
-from aesi.tracer.likelihood.model_error import PRIORS, Size, replace_fast
+from aesi.tracer.likelihood.model_error import PRIORS, Size
 from aesi.tracer.search.archive import Archive, fit_name
 
 PROMISING = 12
@@ -183,4 +183,4 @@ def _growth_size(parent: Parent) -> Size:
     prior = PRIORS[parent.problem.trust]
     if parent.problem.trust == "loose":
         return prior.nearest(Size(0.5 * parent.fit.score.delta_v))
-    return prior.nearest(replace_fast(prior.median, parent.fit.score.size))
+    return prior.nearest(prior.median._replace(fast_v=parent.fit.score.size.fast_v))

@@ -13,7 +13,7 @@ from aesi.tracer.case.free_parameter import FreeParameter, coordinates_of, value
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.fit import FittedHypothesis, HypothesisFitter
 from aesi.tracer.likelihood.growth import Explanation
-from aesi.tracer.likelihood.model_error import PRIORS, Size, SizePrior, replace_fast
+from aesi.tracer.likelihood.model_error import PRIORS, Size, SizePrior
 from aesi.tracer.search.archive import Archive, fit_name
 
 FIT_ROUNDS = 8
@@ -86,7 +86,7 @@ def _from_the_middle(fitter: HypothesisFitter, prior: SizePrior) -> Array:
     there = fitter.finished(x) if prior.fast is not None else None
     if there is None or there.score.size.fast_v <= prior.median.fast_v:
         return x
-    return fitter.descend(x, replace_fast(prior.median, there.score.size), FIT_ROUNDS)
+    return fitter.descend(x, prior.median._replace(fast_v=there.score.size.fast_v), FIT_ROUNDS)
 
 
 def _from_near(fitter: HypothesisFitter, near: Explanation, size: Size) -> Array:
