@@ -14,8 +14,8 @@ from sparse_records import make_record
 from aesi.errors import DataError
 from aesi.records import Split
 from aesi.sparse import Candidate, Genome, Options, Problem, evaluate
+from aesi.sparse.bare import Bare
 from aesi.sparse.baselines import BASELINES, Tuning
-from aesi.sparse.yardsticks import Bare
 
 NAMES = ("AESI I", "AESI II", "ESPM", *BASELINES)
 

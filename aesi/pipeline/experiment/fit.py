@@ -20,8 +20,8 @@ from aesi.pipeline.experiment.load import Loaded
 from aesi.pipeline.experiment.physics_models import PHYSICS_NAMES
 from aesi.records import ErrorModel
 from aesi.sparse import Candidate, Options, Problem
+from aesi.sparse.bare import Bare
 from aesi.sparse.baselines import BASELINES, Judge, Tuning
-from aesi.sparse.yardsticks import Bare
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,8 +37,8 @@ from aesi.records import ErrorSeries, FreeRun, Hold, Measurement
 from aesi.records.checked import checked_dt, is_finite_number, numbers, row_words
 from aesi.records.steps import after_gap, next_stamp
 from aesi.sparse import SparseModel
+from aesi.sparse.bare import Bare
 from aesi.sparse.terms.inputs import same_step
-from aesi.sparse.yardsticks import Bare
 
 END_BEFORE = ", or end the record before that (--to-s on the command line)."
 """End of a sentence on a record in which the cell runs out: correction and bands are meaningless from there on."""

@@ -14,7 +14,7 @@ import numpy as np
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.records import ErrorModel, ErrorSeries
 from aesi.records.steps import after_gap, rows_until
-from aesi.sparse.yardsticks import Bare
+from aesi.sparse.bare import Bare
 
 LEAST_ROWS = 100
 """Fewest rows that figures of test records are given of. Of as many independent rows a coverage of 90 % is uncertain by

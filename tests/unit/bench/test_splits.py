@@ -13,7 +13,7 @@ from aesi.errors import InputError
 from aesi.pipeline.experiment.config import read_experiment
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.records import ErrorSeries
-from aesi.sparse.yardsticks import Bare
+from aesi.sparse.bare import Bare
 
 EXPERIMENT_FILES = Path(__file__).resolve().parents[3] / "experiments"
 

@@ -9,7 +9,7 @@ from aesi.conformal import WHOLE_DRIVE
 from aesi.errors import FitError
 from aesi.pipeline.experiment.intervals.bands import ALL_BUT_FIRST, OutOfSampleErrors, bands_of_horizons
 from aesi.records import ErrorSeries, FreeRun
-from aesi.sparse.yardsticks import Bare
+from aesi.sparse.bare import Bare
 
 N, DT = 400, 1.0
 

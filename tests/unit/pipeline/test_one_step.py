@@ -11,7 +11,7 @@ from aesi.pipeline.experiment.judging.evaluate import evaluate_models
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.product.one_step import rows_ahead
 from aesi.records import ErrorSeries
-from aesi.sparse.yardsticks import Bare
+from aesi.sparse.bare import Bare
 
 NOISE_V = 10e-3
 FEW_ROWS = 0.05

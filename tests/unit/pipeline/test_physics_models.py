@@ -23,7 +23,7 @@ from aesi.pipeline.product.deviations import PhysicsVariant
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Measurement
 from aesi.sparse import Candidate, Genome, evaluate
-from aesi.sparse.yardsticks import Bare
+from aesi.sparse.bare import Bare
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ from aesi.pipeline.experiment.recalibrate import MEMORY_S, MODEL_ERROR_V
 from aesi.pipeline.product.deviations import ENERGIES_J_MOL, PRIORS
 from aesi.records import ErrorModel, ErrorSeries, FreeRun
 from aesi.sparse import SparseModel
-from aesi.sparse.yardsticks import Bare
+from aesi.sparse.bare import Bare
 
 Unseen = tuple[ErrorModel, ErrorSeries, slice]
 """(model, error series of a record, rows of it that the model was not fitted to)."""

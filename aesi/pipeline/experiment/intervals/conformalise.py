@@ -26,8 +26,8 @@ from aesi.pipeline.product.one_step import rows_ahead
 from aesi.records import ErrorModel, LeftOutDrives
 from aesi.records.horizons import in_whole_steps
 from aesi.sparse import ENSEMBLES, Candidate, Problem, SparseModel
+from aesi.sparse.bare import Bare
 from aesi.sparse.search.fold_models import fold_models, with_leverage
-from aesi.sparse.yardsticks import Bare
 
 
 def conformalise(
