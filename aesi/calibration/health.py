@@ -29,7 +29,7 @@ class Health:
 
     resistance_mohm : of contacts and films at half charge, mohm, without electrolyte and electrodes.
     inventory_ah : cyclable lithium in both electrodes, Ah.  negative_ah, positive_ah : capacity of the active material
-    of each electrode, Ah.
+    of each electrode, Ah.  capacity_ah : between full and empty, Ah.
     """
 
     resistance_mohm: float

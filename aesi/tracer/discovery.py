@@ -53,10 +53,10 @@ class TriedHypothesis:
     """One hypothesis that was tried.
 
     effects : ids, in the order in which they were added.  trust : in the declared parameters, see `case.trust.Trust`.
-    gain_nats : gain in log predictive density of unseen data over what it was compared with: the best parent of its
-    step or, where it has an effect less than the chosen hypothesis, that one.  rmse_v : RMS residual on fitted rows,
-    V.  delta_v : size of the model error at which its score is highest, V.  values : owner -> name -> value of each
-    moved parameter.  simulations : number spent on it.
+    gain_nats : gain in log predictive density of unseen data over what it was compared with: the hypothesis chosen
+    before its step or, where it has an effect less than the chosen one, that one.  rmse_v : RMS residual on fitted
+    rows, V.  delta_v : size of the model error at which its score is highest, V.  values : owner -> name -> value of
+    each moved parameter.  simulations : number spent on it.
     """
 
     effects: tuple[str, ...]

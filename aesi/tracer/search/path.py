@@ -81,7 +81,7 @@ def _best(tried: Sequence[Explanation]) -> dict[frozenset[str], Explanation]:
 
 Report = Callable[[InverseProblem, Explanation, float], None]
 """Called for each hypothesis tried, with the problem, the hypothesis, and its gain in nats over what it was compared
-with: the best parent of its step or, for one with an effect less, the chosen hypothesis."""
+with: the hypothesis chosen before its step or, for one with an effect less, the chosen hypothesis."""
 
 
 def unseen_rmse_v(blocks: Blocks, one: Explanation) -> float:

@@ -24,7 +24,8 @@ differences between blocks: one-sided 95 % of a normal distribution."""
 
 
 def score_lag(better: Explanation, other: Explanation) -> tuple[float, float]:
-    """(difference of the scores on unseen data `better` - `other`, its standard deviation over blocks), nats."""
+    """(difference of the scores on unseen data `better` - `other`, standard deviation of the sum of the differences on
+    all left-out blocks, if blocks are independent), nats."""
     difference = better.score.log_density["block"] - other.score.log_density["block"]
     deviation = float(np.std(difference, ddof=1) * np.sqrt(len(difference))) if len(difference) > 1 else 0.0
     return better.score.total - other.score.total, deviation
@@ -43,7 +44,8 @@ def alike(better: Explanation, other: Explanation, sds: float = ALIKE_SDS, nats:
 
 
 def plausibility(fit: FittedHypothesis, competing: int) -> float:
-    """Log marginal likelihood minus log(competing) for each named effect, nats.
+    """Log marginal likelihood minus log(competing) for each named effect, nats: the log posterior probability of the
+    hypothesis, up to a constant, if any effect is as likely as any other.
 
     competing : number of effects that could be named.
     """
