@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import combinations
+from itertools import chain, combinations
 
 from aesi.physics.effect import Effect
 
@@ -17,13 +17,12 @@ def telling_experiment(names: Sequence[str], effects: Mapping[str, Effect]) -> s
     names : ids of the group.  effects : id -> effect, all that was tried.
     """
     group = [effects[name] for name in names]
-    pairs = [
-        text
+    by_pair = [
+        [text for text in (a.told_apart.get(b.id), b.told_apart.get(a.id)) if text is not None]
         for a, b in combinations(group, 2)
-        for text in (a.told_apart.get(b.id), b.told_apart.get(a.id))
-        if text is not None
     ]
-    if len(pairs) >= len(group) - 1:
+    pairs = list(chain.from_iterable(by_pair))
+    if sum(map(bool, by_pair)) >= len(group) - 1:
         return "; ".join(dict.fromkeys(pairs))
     named = [f"for {effect.id}: {effect.experiment}" for effect in group if effect.experiment]
     if any(effect.kind == "instrument" for effect in group):
