@@ -132,8 +132,7 @@ def effect_parameters(
 
 def _effect_parameter(effect: str, name: str, p: Parameter, capacity_ah: float) -> FreeParameter:
     low, high = p.bounds
-    inside = p.neutral is not None and low <= p.neutral <= high
-    centre = float(p.neutral) if inside and p.neutral is not None else p.default
+    centre = p.default if p.neutral is None or not low <= p.neutral <= high else float(p.neutral)
     log = p.log and centre > 0
     scale = np.log if log else np.square if p.even else float
     reach = max(scale(high) - scale(centre), scale(centre) - scale(low))
@@ -160,8 +159,8 @@ def _effect_prior_sd(p: Parameter, capacity_ah: float) -> float | None:
     logarithm; None where none is known. For what every cell file declares, it is the scatter between files of cells of
     one make.
     """
-    declared = p.log and p.neutral is not None and p.spread is not None and p.spread.tight is not None
-    sd = p.spread.loose if declared and p.spread is not None else p.expected
+    spread = p.spread if p.log and p.neutral is not None else None
+    sd = p.expected if spread is None or spread.tight is None else spread.loose
     return None if sd is None else sd * capacity_ah**p.capacity_power
 
 
