@@ -14,7 +14,7 @@ from aesi.sparse import Candidate, Genome, Options, Problem, SparseModel, evalua
 from aesi.sparse.baselines.dmd_c import dmd_with_control
 from aesi.sparse.baselines.pysindy_ensemble import pysindy_ensemble
 from aesi.sparse.fade import DOUBT, shrunken_slope
-from aesi.sparse.search.pick.nested import nested_shares
+from aesi.sparse.search.pick.nested import nested_shares, picked
 
 OPTIONS = Options(p_c=2, d=2, special=False, mixed=False, resamples=20, block=60, fade=True)
 
@@ -87,6 +87,18 @@ def test_an_error_that_no_other_drive_has_is_left_to_the_physics():
     fresh = make_record(300, seed=9)
     np.testing.assert_allclose(candidate.bagging.free_run(fresh, 0.0).error_v, 0.0, atol=1e-12)
     np.testing.assert_allclose(nested_shares(problem, [candidate], 0), 1.0)
+
+
+def test_a_correction_that_feeds_back_was_shrunk_where_it_was_judged_by_folds_apart_and_not_where_it_is_used():
+    records = tuple(replace(make_record(600, seed=s, feedback=0.8), name=f"drive {s}") for s in range(4))
+    problem = Problem.build(Split(records, (), ()), OPTIONS)
+    candidate = evaluate(problem, Genome.whole(problem.library, 1e-1, 1e-3, 0.5, p_c=2, d=2))
+    assert candidate.bagging.fade is None
+    every = np.ones(len(problem.folds), dtype=bool)
+    assert picked(problem, [candidate], 0, every).amplitude == 1.0
+    squared, crossed, own = candidate.fold_sums[0].T
+    shares = nested_shares(problem, [candidate], 0)
+    np.testing.assert_allclose(shares, (squared - 2.0 * crossed + own) / squared)
 
 
 def test_far_outside_the_range_little_of_the_correction_is_left():

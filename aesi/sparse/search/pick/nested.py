@@ -22,7 +22,7 @@ from aesi.sparse.search.problem import Problem
 
 @dataclass(frozen=True, eq=False)
 class NestedPick:
-    """The choice of some folds: a candidate, and the amplitude of its correction."""
+    """The choice of some folds: a candidate, and the amplitude of its correction, 1 where that does not fade."""
 
     candidate: Candidate
     amplitude: float
@@ -41,7 +41,10 @@ def picked(
     weights = np.array([problem.row_weights[a] for a, _ in problem.folds])
     sums = [(weights[:, None] * c.fold_sums[ensemble])[folds] for c in known]
     drives = problem.fold_drives[folds]
-    amplitudes = [shrunken_slope(each, drives) if problem.options.fade else 1.0 for each in sums]
+    amplitudes = [
+        1.0 if c.ensembles[ensemble].fade is None else shrunken_slope(each, drives)
+        for c, each in zip(known, sums, strict=True)
+    ]
     squared_errors = [_squared_error(each, a).sum() for each, a in zip(sums, amplitudes, strict=True)]
     best = int(np.argmin(squared_errors))
     return NestedPick(known[best], amplitudes[best])
