@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from datetime import date
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -125,7 +126,7 @@ def calibrate(
     ends = _fit_ends(start_model, starts, seed, evaluations, on_step)
     model, x, found = ends[0].model, ends[0].x, ends[0].cell
     states = model.states(cell, x)
-    scaled = model.jacobian(x) * information_weights(model, x)[:, None]
+    scaled = ends[0].jacobian * information_weights(model, x)[:, None]
     covariance: Array = np.asarray(np.linalg.inv(scaled.T @ scaled), dtype=float)
     shares = capacities(model, x)
     begun = {record.name: start_soc(model, x, i) for i, record in enumerate(model.records)}
@@ -189,20 +190,30 @@ class _ReportingModel:
         return self.model.jacobian(x)
 
 
+class _Descent(NamedTuple):
+    """The end of one descent: working vector, jacobian of the model there, and half the sum of squares, which is minus
+    the logarithm of the posterior density, up to a constant, nats."""
+
+    x: Array
+    jacobian: Array
+    cost: float
+
+
 @dataclass(frozen=True, eq=False)
 class _FitEnd:
     """The end of the descents from one start.
 
-    model : with the thermal data that it was fitted with.  cell : fitted.  heat_sentences : on its thermal data.
-    cost : minus the logarithm of the posterior density, up to a constant, nats.  from_file : True where the start file
-    is where it began, not a cell drawn from the priors.
+    model : with the thermal data that it was fitted with.  x, jacobian, cost : as of a `_Descent`.  cell : fitted.
+    heat_sentences : on its thermal data.  from_file : True where the start file is where it began, not a cell drawn
+    from the priors.
     """
 
     model: Model
     x: Array
+    jacobian: Array
+    cost: float
     cell: Cell
     heat_sentences: tuple[str, ...]
-    cost: float
     from_file: bool
 
 
@@ -218,35 +229,33 @@ def _fit_ends(
     for start in (np.zeros(model.layout.size), *np.clip(drawn, model.low, model.high)):
         one = copy(model)  # which takes thermal data of its own
         try:
-            x, cell, sentences = _fitted_twice(_ReportingModel(one, on_step), evaluations, start)
+            end, cell, sentences = _fitted_twice(_ReportingModel(one, on_step), evaluations, start)
         except FitError:
             if not ends:
                 raise
             continue
-        residual = one.residual(x)
-        ends.append(_FitEnd(one, x, cell, sentences, 0.5 * float(residual @ residual), from_file=not ends))
+        ends.append(_FitEnd(one, *end, cell, sentences, from_file=not ends))
     return sorted(ends, key=lambda end: end.cost)
 
 
 def _fitted_twice(
     reporting: _ReportingModel, evaluations: int, start: Array
-) -> tuple[Array, Cell, tuple[str, ...]]:
-    """(working vector at the end of the descents, cell there with the heat fitted to its temperatures, sentences on
-    that).
+) -> tuple[_Descent, Cell, tuple[str, ...]]:
+    """(end of the last descent, cell there with the heat fitted to its temperatures, sentences on that).
 
     The second descent is skipped where no record determines the heat, since nothing would change.
     """
     model = reporting.model
-    x = _descend(reporting, evaluations, start)
-    plain = written_cell(model, x)
-    found, heat, sentences = with_fitted_heat(plain, case_records(model, x))
+    end = _descend(reporting, evaluations, start)
+    plain = written_cell(model, end.x)
+    found, heat, sentences = with_fitted_heat(plain, case_records(model, end.x))
     if heat is not None:
         # The thermal lag of the winding behind its case is part of the file, so that the fit has to include it.
         model.set_thermal_data(found)
-        x = _descend(reporting, evaluations, x)
-        found = written_cell(model, x)
-        sentences = (heat.by(found, case_records(model, x)).sentence, *sentences)
-    return x, found, sentences
+        end = _descend(reporting, evaluations, end.x)
+        found = written_cell(model, end.x)
+        sentences = (heat.by(found, case_records(model, end.x)).sentence, *sentences)
+    return end, found, sentences
 
 
 def _with_provenance(
@@ -395,8 +404,8 @@ def _small_span_sentences(span_k: float, n_records: int) -> tuple[str, ...]:
     return (f"{apart}: activation energies and entropy stay as they are.",)
 
 
-def _descend(reporting: _ReportingModel, evaluations: int, x0: Array) -> Array:
-    """Working vector at which bounded least squares ends.
+def _descend(reporting: _ReportingModel, evaluations: int, x0: Array) -> _Descent:
+    """Where bounded least squares ends.
 
     Raises FitError where the model cannot be simulated at x0.
     """
@@ -410,7 +419,7 @@ def _descend(reporting: _ReportingModel, evaluations: int, x0: Array) -> Array:
         reporting.residual, x0, reporting.jacobian, (model.low, model.high), ftol=GAIN, xtol=1e-5, gtol=1e-8,
         max_nfev=evaluations,
     )  # fmt: skip
-    return np.asarray(found.x, dtype=float)
+    return _Descent(found.x, found.jac, float(found.cost))
 
 
 STATE_WORDS: dict[FitState, str] = {
