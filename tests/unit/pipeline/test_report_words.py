@@ -90,6 +90,56 @@ def test_a_refit_that_errs_more_on_its_own_records_was_laid_to_the_validation_on
     )
 
 
+def test_a_refit_was_called_worse_beside_two_equal_figures(views):
+    """4.2411 and 4.2413 mV were told as "errs by 4.241 mV and the ESPM by 4.241 mV"."""
+    view = views.run_view(200)
+
+    def of(declared, refitted):
+        rows = (
+            {"name": name, "free_run": {"train_rmse_mv": error, "valid_rmse_mv": error}}
+            for name, error in (("ESPM", declared), ("ESPM recalibrated", refitted))
+        )
+        return replace(view, models=tuple(rows), corrected="ESPM recalibrated")
+
+    assert runs.validation_finding(of(4.2411, 4.2413)) == ""
+    assert "errs by 4.25 mV and the ESPM by 4.24 mV" in runs.validation_finding(of(4.2411, 4.2461))
+
+
+@pytest.mark.parametrize(
+    ("declared", "recalibrated", "corrected", "said"),
+    [
+        (5.0, None, 5.0004, "the error stays at 5.00 mV. Use the ESPM alone."),
+        (5.0, None, 4.9996, "the error stays at 5.00 mV. Use the ESPM alone."),
+        (9.0, 4.1001, 4.1004, "does not help: ESPM + AESI I leaves 4.10 mV."),
+        (9.0, 4.1004, 4.1001, "does not help: ESPM + AESI I leaves 4.10 mV."),
+    ],
+)
+def test_a_correction_was_said_to_help_or_to_harm_beside_two_equal_figures(
+    views, declared, recalibrated, corrected, said
+):
+    view = views.run_view(200)
+    errors = {"ESPM": declared, "ESPM recalibrated": recalibrated, "ESPM + AESI I": corrected}
+    rows = tuple(
+        {
+            "name": name,
+            "free_run": {"test_rmse_mv": error, "test_mser_pct": 100.0 * (1.0 - (error / declared) ** 2)},
+        }
+        for name, error in errors.items()
+        if error is not None
+    )
+    basis = "ESPM" if recalibrated is None else "ESPM recalibrated"
+    assert runs.run_finding(replace(view, models=rows, corrected=basis)).endswith(said)
+
+
+def test_an_equal_correction_was_told_as_one_with_a_lower_error(views):
+    view = views.run_view(200)
+    rows = [
+        {"name": name, "free_run": {"test_rmse_mv": error}}
+        for name, error in (("ESPM + AESI I", 4.1004), ("ESPM + ridge", 4.1001))
+    ]
+    assert runs.others_finding(replace(view, models=(view.models[0], *rows))) == ""
+
+
 def test_what_a_mere_refit_and_a_constant_leave_stands_beside_the_gain(views):
     view = views.run_view(200)
     assert runs.constant_finding(view) == ""
