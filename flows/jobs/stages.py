@@ -11,7 +11,7 @@ from uuid import UUID
 
 from aesi.errors import AesiError, first_line
 from flows.base.console import duration
-from flows.base.time_limit import Overdue, time_limit
+from flows.base.time_limit import time_limit
 from flows.jobs.temporary_server import KeptWork, no_answer, of_prefect, stop_sending
 
 T = TypeVar("T")
@@ -62,15 +62,15 @@ class PlainStages:
         return self._once(name, work)
 
     def _once(self, name: str, work: Callable[[], T]) -> T:
-        started = time.monotonic()
-        try:
-            with time_limit(self._timeout_s):
-                result = work()
-        except Overdue:
-            raise StageOverdue(
+        def late() -> StageOverdue:
+            return StageOverdue(
                 f"the stage {name!r} took longer than {self._timeout_s:g} s (runner.stage_timeout_s); "
                 "what is finished is kept: allow more, and go on with --resume."
-            ) from None
+            )
+
+        started = time.monotonic()
+        with time_limit(self._timeout_s, late):
+            result = work()
         self._say(f"{name}: done in {duration(time.monotonic() - started)}")
         return result
 
