@@ -10,6 +10,7 @@ from typing import Protocol, TypeVar
 from uuid import UUID
 
 from aesi.errors import AesiError, first_line
+from aesi.logins import without_login
 from flows.base.console import duration
 from flows.base.time_limit import time_limit
 from flows.jobs.temporary_server import KeptWork, no_answer, of_prefect, stop_sending
@@ -172,7 +173,8 @@ def server_in_reach() -> Iterator[None]:
     except RuntimeError as error:
         if "Failed to reach API" not in str(error):
             raise
+        place = without_login(os.environ.get("PREFECT_API_URL", "of the active profile"))
         raise ServerAway(
-            f"the Prefect server {os.environ.get('PREFECT_API_URL', 'of the active profile')} does not answer; "
-            "start it, or unset PREFECT_API_URL to run the stages without it."
+            f"the Prefect server {place} does not answer; start it, or unset PREFECT_API_URL to run the stages without "
+            "it."
         ) from None

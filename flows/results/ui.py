@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aesi.errors import InputError, first_line
+from aesi.logins import login_left_out, without_login
 from flows.base import environment
-from flows.base.store_address import PLACE, checked_address, without_login
+from flows.base.store_address import PLACE, checked_address
 from flows.tracking.store import Store
 from flows.tracking.view import TRAINING, VIEW_TAG, view_of
 
@@ -125,7 +126,8 @@ def _there(url: str) -> BaseStorage:
         return study_storage(url)
     except Exception as error:
         raise InputError(
-            f"--storage {without_login(url)} cannot be shown ({first_line(error)}); give the address that "
+            f"--storage {without_login(url)} cannot be shown ({login_left_out(first_line(error), url)}); give the "
+            "address that "
             "runner.storage of the experiment's file has."
         ) from None
 
