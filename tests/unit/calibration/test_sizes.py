@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,9 @@ from aesi.errors import DataError
 from aesi.physics import Cell
 from aesi.pipeline.calibrate import start_at_size
 from aesi.pipeline.discovery.discover import Case
+from aesi.pipeline.experiment.config import parse_experiment
+from aesi.pipeline.experiment.load import _on_grid
+from aesi.pipeline.product.declared import declared_model
 from aesi.records import Measurement
 
 FILE = Path(__file__).resolve().parents[3] / "experiments" / "cells" / "lg_m50_chen2020.bpx.json"
@@ -95,3 +99,17 @@ def test_a_smaller_cell_beside_another_was_told_as_other_electrode_materials(m50
     _, said = prepared_model(m50, [large, small], Conditions())
     assert not [sentence for sentence in said if "electrode materials" in sentence]
     assert [sentence for sentence in said if sentence.startswith("small: a full discharge takes 2.3 Ah")]
+
+
+def test_an_experiment_took_a_record_of_another_cell_without_a_word(m50):
+    config = parse_experiment(
+        {"name": "x", "data": {"kind": "virtual", "dt_s": 180.0}, "cell": {"bpx": str(FILE), "soc0": 1.0}}
+    )
+    small = discharge(m50, "small", 2.75, 0.05, n=401)
+    sources = SimpleNamespace(
+        records={"small": (small, None)}, roles={"train": ["small"], "valid": [], "test": []}
+    )
+    _, _, notes = _on_grid(config, declared_model(FILE), sources)
+    assert [
+        note for note in notes if note.startswith("small: a full discharge takes 2.75 Ah, and the file of")
+    ]
