@@ -108,7 +108,9 @@ def serve_studies(port: int, host: str, url: str | None) -> None:
         )
     _check_free(host, port)
     storage = _there(url) if url else study_storage()
-    print(f"Optuna's dashboard shows the searches at http://{host}:{port}/ (Ctrl-C ends it)", flush=True)
+    print(
+        f"Optuna's dashboard shows the searches at http://{_shown(host)}:{port}/ (Ctrl-C ends it)", flush=True
+    )
     run_server(storage, host=host, port=port)
 
 
@@ -137,10 +139,13 @@ def serve_flows(port: int, host: str) -> None:
     _check_free(host, port)
     environment.prepare_process()
     environment.make_prefect_home()
-    print(f"Prefect shows the flow runs at http://{host}:{port}/runs (Ctrl-C ends it)", flush=True)
+    address = f"http://{_shown(host)}:{port}"
+    print(f"Prefect shows the flow runs at {address}/runs (Ctrl-C ends it)", flush=True)
     command = [sys.executable, "-m", "prefect", "server", "start", "--host", host, "--port", str(port)]
-    api = {"PREFECT_UI_API_URL": f"http://{host}:{port}/api"}
-    os.execve(sys.executable, command, os.environ | api)
+    api = {
+        "PREFECT_UI_API_URL": f"{address}/api"
+    }  # which a browser asks, from whatever machine it shows the page on
+    os.execve(sys.executable, command, api | os.environ)
 
 
 def _check_free(host: str, port: int) -> None:
