@@ -220,6 +220,11 @@ def read_experiment(path: str | Path, overrides: Sequence[str] = ()) -> Experime
         key = overridden_key(override)
         if key in seen:  # otherwise the last one would count without a message
             raise ConfigError(f"{path}: {key!r} is overridden twice; give it once.")
+        lost = next((other for other in sorted(seen) if other.startswith(f"{key}.")), None)
+        if lost is not None:
+            raise ConfigError(
+                f"{path}: {key!r} replaces {lost!r}, which is overridden before it; give {key!r} first."
+            )
         seen.add(key)
         _override(content, override)
     return parse_experiment(content, base=path.resolve().parent, where=str(path))
