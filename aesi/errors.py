@@ -10,6 +10,8 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from aesi.logins import without_logins
+
 
 class AesiError(Exception):
     """Root of all errors raised on purpose; `exit_code` is what the command line returns."""
@@ -75,8 +77,9 @@ class FitError(AesiError, RuntimeError):
 
 
 def first_line(error: BaseException, most: int = 200) -> str:
-    """What an exception says, in one line of at most `most` characters; its type where it says nothing."""
-    return (str(error).strip().splitlines() or [type(error).__name__])[0][:most]
+    """What an exception says, in one line of at most `most` characters, without logins in addresses; its type where it
+    says nothing."""
+    return without_logins((str(error).strip().splitlines() or [type(error).__name__])[0])[:most]
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

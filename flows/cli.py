@@ -15,6 +15,7 @@ try:
     import typer
 
     from aesi.errors import AesiError, OwnEffectError
+    from aesi.logins import without_logins
     from aesi.numerics.files.first_use import on_first_compilation
     from flows.base import environment
     from flows.base.interrupt import INTERRUPTED, ending_soon_on_interrupt, tell_interrupted
@@ -147,7 +148,7 @@ def _first_line(error: Exception) -> str:
 
 
 def _fail(message: str, code: int) -> NoReturn:
-    print(f"aesi: {message}", file=sys.stderr)
+    print(f"aesi: {without_logins(message)}", file=sys.stderr)
     raise SystemExit(code)
 
 

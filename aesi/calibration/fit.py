@@ -30,6 +30,7 @@ from aesi.calibration.records.prepared import (
     prepared,
     with_temperatures,
 )
+from aesi.calibration.records.sizes import other_sizes, sizes_sentence
 from aesi.calibration.records.spectra import degc_of, fitted_spectra
 from aesi.calibration.records.temperature import against_temperature
 from aesi.calibration.records.zero import Zero, zero_of
@@ -299,7 +300,11 @@ def prepared_model(
     )
     declared, start = start, with_activation(start)
     full_discharges = () if conditions.same_cell else full_discharge_numbers(cell, records)
-    potential_sentences = filter(None, (other_materials_sentence(start, records[i]) for i in full_discharges))
+    smaller = other_sizes(
+        cell, records
+    )  # whose capacity is not the one that the largest full discharge shows
+    of_size = (records[i] for i in full_discharges if records[i].name not in smaller)
+    potential_sentences = filter(None, (other_materials_sentence(start, record) for record in of_size))
     cut_names = [
         r.name for r, whole in zip(at_temperatures, records, strict=True) if r.time_s[0] > whole.time_s[0]
     ]
@@ -328,6 +333,7 @@ def prepared_model(
     )
     return model, (
         *size_sentences,
+        *filter(None, [sizes_sentence(cell, records)]),
         *potential_sentences,
         *zero.sentences,
         *(sentence for _, branch_sentences in branches for sentence in branch_sentences),

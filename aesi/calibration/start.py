@@ -78,7 +78,7 @@ def full_discharge_numbers(cell: Cell, measurements: Sequence[Measurement]) -> t
 
 def _full_discharges_ah(cell: Cell, measurements: Sequence[Measurement]) -> list[float | None]:
     """Charge of the largest full discharge of each measurement, Ah; None for one without."""
-    return [_full_discharge_ah(cell, m) for m in measurements]
+    return [full_discharge_ah(cell, m) for m in measurements]
 
 
 def size_assumed(cell: Cell, measurements: Sequence[Measurement]) -> str:
@@ -195,7 +195,7 @@ def _run_numbers(flags: BoolArray) -> Array:
     return np.cumsum(np.diff(flags.astype(int), prepend=int(flags[0])) != 0)
 
 
-def _full_discharge_ah(cell: Cell, data: Measurement) -> float | None:
+def full_discharge_ah(cell: Cell, data: Measurement) -> float | None:
     """The largest charge from full to empty in a stretch of the record, Ah; None where there is none. A stretch begins
     where the cell is full, and ends where it has been charged to full again."""
     full = data.voltage_v >= cell.upper_voltage_v - FULL_WINDOW_V

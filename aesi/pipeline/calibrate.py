@@ -16,6 +16,7 @@ from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.parameters import check_names
 from aesi.calibration.posterior import PosteriorSamples, check_posterior, sample_posterior
 from aesi.calibration.records.prepared import with_temperatures
+from aesi.calibration.records.sizes import sizes_sentence
 from aesi.calibration.records.spectra import BAND_HZ, check_spectra
 from aesi.calibration.result import RecordError
 from aesi.calibration.start import full_discharge_numbers, scaled_to_discharge
@@ -242,7 +243,13 @@ def start_at_size(
     """
     start = scaled_to_discharge(declared, measurements)[0]
     placed = with_temperatures(start, measurements, temperatures_degc or {})[0]
-    check_measured(start, placed, full_discharge_numbers(declared, measurements))
+    try:
+        check_measured(start, placed, full_discharge_numbers(declared, measurements))
+    except DataError as error:
+        if not (sizes := sizes_sentence(declared, measurements)):
+            raise
+        # Else a record is refused for the size that another one gave the cell, as if its file had it.
+        raise DataError(f"{sizes.removesuffix('.')}; calibrate them by themselves.") from error
     return start
 
 

@@ -1,4 +1,4 @@
-"""The address of the tracking store: which one is meant, whether it can be one, and how it may be shown."""
+"""The address of the tracking store: which one is meant, and whether it can be one."""
 
 from __future__ import annotations
 
@@ -8,20 +8,17 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from aesi.errors import InputError
+from aesi.logins import SERVERS, without_login
 from flows.base import environment
 from flows.base.databases import with_driver
 
 SQLITE = "sqlite:///"
-SERVERS, DATABASES = ("http", "https"), ("sqlite", "postgresql", "mysql", "mssql")
+DATABASES = ("sqlite", "postgresql", "mysql", "mssql")
 DATABRICKS = ("databricks", "databricks-uc", "uc")
-"""Admissible schemes of an address. Any other is a folder of files for MLflow, which takes no new runs."""
+"""Admissible schemes of an address, beside those of a server. Any other is a folder of files for MLflow, which takes no
+new runs."""
 MEANT_OTHERWISE = re.compile(r"%[0-9A-Fa-f]{2}|[?]")
 """Parts of a path that the address of a database has for other things: the file would be another."""
-SERVER_LOGIN = re.compile(r"^[^/?#]*@")
-DATABASE_LOGIN = re.compile(r"^[^:/]*(:[^@]*)?@([^/?@]*@)*")
-"""The login at the head of what follows `//`: a password may hold `/`, `?` and `#` where SQLAlchemy reads it."""
-LOGIN_OPTION = re.compile(r"[^=]*(user|passw|pwd|odbc_connect)", re.IGNORECASE)
-"""An option behind the `?` of a database's address that holds a part of the login."""
 PLACE = "runs are tracked in the current folder, or in the one that AESI_HOME names"
 """Where runs are to be found that are not in the store that was opened."""
 
@@ -65,13 +62,3 @@ def _has_host(uri: str) -> bool:
 def database_file(uri: str) -> Path:
     """The file of a SQLite store."""
     return Path(uri.removeprefix(SQLITE)).expanduser().resolve()
-
-
-def without_login(uri: str) -> str:
-    """The address without the user and the password that may be in it, as it may be shown and written."""
-    scheme, slashes, rest = uri.partition("//")
-    if scheme.startswith(SERVERS):
-        return scheme + slashes + SERVER_LOGIN.sub("", rest)
-    place, _, options = DATABASE_LOGIN.sub("", rest).partition("?")
-    kept = [option for option in options.split("&") if option and not LOGIN_OPTION.match(option)]
-    return f"{scheme}{slashes}{place}{'?' if kept else ''}{'&'.join(kept)}"

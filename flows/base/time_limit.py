@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+AT_ONCE_S = 1e-6
+"""Shortest time of a timer, which 0 would stop."""
+
 
 class Overdue(BaseException):
-    """The time is over. It names no reason: whoever set the limit knows what took too long, and catches it.
+    """The time of a limit is over, on its way out of the block that has it, where it becomes an error with a reason.
 
     No Exception, since work that goes on without what fails (a study's copy, a candidate, an artifact) would take it
     for such a failure and go on without a limit.
@@ -18,9 +22,11 @@ class Overdue(BaseException):
 
 
 @contextmanager
-def time_limit(seconds: float | None) -> Iterator[None]:
-    """Raise Overdue within the block after so many seconds; compiled code is interrupted when it returns.
+def time_limit(seconds: float | None, late: Callable[[], Exception]) -> Iterator[None]:
+    """Interrupt the block after so many seconds, and raise `late()` then; compiled code is interrupted when it returns.
 
+    Limits nest: within an inner block the outer time runs on, and what ends it is raised through the inner one, which
+    gives no reason of its own.
     There is no limit where `seconds` is None, none outside the main thread, which alone gets signals, and none on
     Windows, which has no such signal.
     """
@@ -29,13 +35,41 @@ def time_limit(seconds: float | None) -> Iterator[None]:
         yield
         return
 
-    def overdue(number: int, frame: FrameType | None) -> None:
-        raise Overdue
+    ours, due, over = Overdue(), time.monotonic() + seconds, False
+    outer = signal.getsignal(signal.SIGALRM)
+    outer_s = signal.getitimer(signal.ITIMER_REAL)[0]
+    outer_due = time.monotonic() + outer_s if outer_s > 0.0 else float("inf")
 
-    before = signal.signal(signal.SIGALRM, overdue)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    def overdue(number: int, frame: FrameType | None) -> None:
+        nonlocal outer_due
+        if over:  # it rang while the block was left: the outer time, if it was that, is set again behind
+            return
+        if outer_due < due:
+            outer_due = float("inf")
+            _set_timer(due)
+            if callable(outer):
+                outer(number, frame)
+            return
+        raise ours
+
     try:
-        yield
+        try:
+            signal.signal(signal.SIGALRM, overdue)
+            _set_timer(min(due, outer_due))
+            yield
+        finally:
+            over = True
+    except Overdue as one:
+        if one is not ours:
+            raise
+        raise late() from None
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
+        signal.signal(signal.SIGALRM, outer)
+        if outer_due < float("inf"):
+            _set_timer(outer_due)
+
+
+def _set_timer(due: float) -> None:
+    """Let the alarm ring at a time of `time.monotonic`, at once where that has passed."""
+    signal.setitimer(signal.ITIMER_REAL, max(due - time.monotonic(), AT_ONCE_S))

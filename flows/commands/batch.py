@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 from aesi.errors import InputError
+from aesi.logins import without_login
 from aesi.pipeline.written import batch_files
 from flows.commands import options, outputs, record_options
 
@@ -68,7 +69,7 @@ def batch(
     outputs.check_beside(out, source)
     if address is not None and runner != "dask":
         raise InputError(
-            f"--address {address} names a Dask scheduler; give --runner dask beside it, or leave it out."
+            f"--address {without_login(address)} names a Dask scheduler; give --runner dask beside it, or leave it out."
         )
     record_options.say_reading([source])
     from aesi.pipeline.batch.job import Settings

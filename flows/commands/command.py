@@ -32,7 +32,11 @@ class Command(TyperCommand):
         if (
             not ctx.resilient_parsing
         ):  # set while a shell asks for completions, where a line may be incomplete
-            _, _, given = self.make_parser(ctx).parse_args(list(args))
+            _, left, given = self.make_parser(ctx).parse_args(list(args))
+            if left:
+                raise InputError(
+                    f"{' '.join(left)}: nothing is taken in this place; see {ctx.command_path} -h."
+                )
             for parameter, times in Counter(given).items():
                 if times > 1 and not (parameter.multiple or parameter.is_eager):
                     option = "/".join((*parameter.opts, *parameter.secondary_opts))

@@ -14,6 +14,7 @@ from queue import Empty, Queue
 from typing import Any
 
 from aesi.errors import AesiError, InputError
+from aesi.logins import login_left_out, without_login
 from aesi.records import Failed
 from flows.base import codec
 from flows.evaluation.pool import MemoryOfThreads, guarded
@@ -67,9 +68,10 @@ def connect(address: str | None, workers: int) -> tuple[Any, Any]:
             raise AesiError(
                 f"the Dask cluster on this machine does not answer ({error}); use the runner local."
             ) from None
+        reason = login_left_out(str(error), address or "")
         raise AesiError(
-            f"the Dask scheduler {address} does not answer ({error}); start it with `dask scheduler`, or "
-            "leave out --address for a cluster on this machine."
+            f"the Dask scheduler {without_login(address or '')} does not answer ({reason}); start it with `dask "
+            "scheduler`, or leave out --address for a cluster on this machine."
         ) from None
 
 
@@ -104,8 +106,10 @@ def _check_form(address: str) -> None:
     try:
         parse_host_port(parse_address(address)[1])
     except ValueError as error:
+        shown = without_login(address)
+        reason = f" ({error})" if shown == address else ", which takes no login"
         raise InputError(
-            f"{address!r} is no address of a Dask scheduler ({error}); give it as tcp://HOST:PORT."
+            f"{shown!r} is no address of a Dask scheduler{reason}; give it as tcp://HOST:PORT."
         ) from None
 
 

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from aesi.pipeline.experiment.candidate import scorer
-from aesi.pipeline.experiment.config import ExperimentConfig
+from aesi.pipeline.experiment.config import NO_PART, ExperimentConfig
 from aesi.sparse import Problem
 from flows.evaluation.local_pool import LocalPool
 from flows.evaluation.pool import Pool
@@ -16,7 +16,7 @@ from flows.evaluation.scorer_recipe import build_scorer
 
 def open_pool(problem: Problem, config: ExperimentConfig, study: str) -> Pool:
     """Who evaluates the candidates of the experiment; study : its content key."""
-    content = config.model_dump_json()
+    content = config.model_dump_json(exclude=set(NO_PART))  # no password goes to workers, who need none
     search = config.search
     if config.runner.kind == "dask":
         from flows.evaluation.dask_pool import DaskPool

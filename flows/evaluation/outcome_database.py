@@ -12,8 +12,8 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from aesi.errors import InputError, first_line
+from aesi.logins import login_left_out, without_login
 from flows.base.databases import limits, with_driver
-from flows.base.store_address import without_login
 
 
 class DatabaseOutcomes:
@@ -154,8 +154,9 @@ class DatabaseOutcomes:
                 raise self._unusable(error) from None
 
     def _unusable(self, error: Exception) -> InputError:
-        where = without_login(self._engine.url.render_as_string(hide_password=False))
-        return InputError(f"runner.storage {where} cannot be used: {_reason(error)}.")
+        url = self._engine.url.render_as_string(hide_password=False)
+        reason = login_left_out(_reason(error), url)
+        return InputError(f"runner.storage {without_login(url)} cannot be used: {reason}.")
 
 
 def _reason(error: Exception) -> str:
@@ -175,5 +176,5 @@ def engine_of(url: str) -> Any:
     except (ImportError, ValueError, sa.exc.ArgumentError) as error:
         advice = "; pip install psycopg2-binary" if isinstance(error, ImportError) else ""
         raise InputError(
-            f"runner.storage is no database that can be used: {first_line(error)}{advice}."
+            f"runner.storage is no database that can be used: {login_left_out(first_line(error), url)}{advice}."
         ) from None

@@ -14,6 +14,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from aesi.logins import without_login
 from aesi.pipeline.written import REPORT
 from flows.base.console import Console, duration
 from flows.jobs.run_request import RunRequest
@@ -45,8 +46,6 @@ def run_experiment(request: RunRequest, run: Stages, console: Console) -> Path:
 
 def _uri_option(uri: str | None) -> str:
     """What finds the store of an experiment that names one, as a shell takes it; without the login in it."""
-    from flows.base.store_address import without_login
-
     return f" --uri {shlex.quote(without_login(uri))}" if uri else ""
 
 

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Literal
 
 from aesi.errors import InputError
+from aesi.logins import without_login, without_logins
 from aesi.pipeline.experiment.config import (
     LIMITS,
     NO_PART,
@@ -15,7 +16,6 @@ from aesi.pipeline.experiment.config import (
     overridden_key,
     read_experiment,
 )
-from flows.base.store_address import without_login
 
 UNTOLD = ("name", "seed", *NO_PART)
 """Sections that a title need not tell what was laid over: it does already, or they have no part in the result."""
@@ -48,7 +48,7 @@ class RunRequest:
             advice = (
                 "leave one of the two out" if self.runner else "give --runner dask beside it, or leave it out"
             )
-            raise InputError(f"--address {self.address} names a Dask scheduler{uses_none}; {advice}.")
+            raise InputError(f"--address {self.shown_address} names a Dask scheduler{uses_none}; {advice}.")
         address = (self.address or config.runner.address) if kind == "dask" else None
         runner = config.runner.model_copy(update={"kind": kind, "address": address})
         return config.model_copy(update={"runner": runner})
@@ -69,8 +69,12 @@ class RunRequest:
     @property
     def shown_overrides(self) -> list[str]:
         """What is laid over the file, without the logins of the addresses in it."""
-        pairs = (text.partition("=") for text in self.overrides)
-        return [f"{key}{equals}{without_login(value)}" for key, equals, value in pairs]
+        return [without_logins(text) for text in self.overrides]
+
+    @property
+    def shown_address(self) -> str | None:
+        """The address of the scheduler, without the login in it."""
+        return None if self.address is None else without_login(self.address)
 
     @property
     def resuming(self) -> str:
@@ -78,7 +82,7 @@ class RunRequest:
         words = ["aesi", "run", self.path]
         words += [word for text in self.shown_overrides for word in ("--set", text)]
         words += ["--runner", self.runner] if self.runner else []
-        words += ["--address", self.address] if self.address else []
+        words += ["--address", self.shown_address] if self.shown_address else []
         words += [] if self.use_cache else ["--no-cache"]
         words += [] if self.use_prefect else ["--no-prefect"]
         return shlex.join([*words, "--resume"])

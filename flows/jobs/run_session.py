@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from aesi.errors import AesiError, InputError
+from aesi.logins import without_login
 from aesi.numerics.files.source_digest import source_digest
 from aesi.numerics.files.whole import check_writable
 from aesi.pipeline.experiment.config import ExperimentConfig
@@ -109,8 +110,6 @@ def _ended_as_it_ends(record: RunRecord, tracker: Tracker, console: Console) -> 
     left = tracker.end("FINISHED")
     replace(record, status="finished").write()
     if left:
-        from flows.base.store_address import without_login
-
         place = without_login(tracker.store.uri)
         console.say(f"tracking: {left} items could not be delivered to {place}; the next run delivers them.")
 

@@ -10,8 +10,9 @@ from typing import Protocol, TypeVar
 from uuid import UUID
 
 from aesi.errors import AesiError, first_line
+from aesi.logins import without_login
 from flows.base.console import duration
-from flows.base.time_limit import Overdue, time_limit
+from flows.base.time_limit import time_limit
 from flows.jobs.temporary_server import KeptWork, no_answer, of_prefect, stop_sending
 
 T = TypeVar("T")
@@ -62,15 +63,15 @@ class PlainStages:
         return self._once(name, work)
 
     def _once(self, name: str, work: Callable[[], T]) -> T:
-        started = time.monotonic()
-        try:
-            with time_limit(self._timeout_s):
-                result = work()
-        except Overdue:
-            raise StageOverdue(
+        def late() -> StageOverdue:
+            return StageOverdue(
                 f"the stage {name!r} took longer than {self._timeout_s:g} s (runner.stage_timeout_s); "
                 "what is finished is kept: allow more, and go on with --resume."
-            ) from None
+            )
+
+        started = time.monotonic()
+        with time_limit(self._timeout_s, late):
+            result = work()
         self._say(f"{name}: done in {duration(time.monotonic() - started)}")
         return result
 
@@ -172,7 +173,8 @@ def server_in_reach() -> Iterator[None]:
     except RuntimeError as error:
         if "Failed to reach API" not in str(error):
             raise
+        place = without_login(os.environ.get("PREFECT_API_URL", "of the active profile"))
         raise ServerAway(
-            f"the Prefect server {os.environ.get('PREFECT_API_URL', 'of the active profile')} does not answer; "
-            "start it, or unset PREFECT_API_URL to run the stages without it."
+            f"the Prefect server {place} does not answer; start it, or unset PREFECT_API_URL to run the stages without "
+            "it."
         ) from None

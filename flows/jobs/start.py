@@ -59,7 +59,7 @@ def start(
             request.path,
             request.shown_overrides,
             runner=request.runner,
-            address=request.address,
+            address=request.shown_address,
             resume=request.resume,
             use_cache=request.use_cache,
             handed=HandedOver(request),

@@ -15,7 +15,7 @@ from typing import Any, Generic, TypeVar
 
 from aesi.errors import AesiError, first_line
 from flows.base.interrupt import hearing_signals_again
-from flows.base.time_limit import Overdue, time_limit
+from flows.base.time_limit import time_limit
 
 T = TypeVar("T")
 START_S = 60.0
@@ -36,13 +36,11 @@ def start_server(limit_s: float = START_S) -> None:
         return
     server = SubprocessASGIServer()
     try:
-        with time_limit(limit_s):
+        with time_limit(limit_s, lambda: TimeoutError(f"it does not answer after {limit_s:g} s")):
             server.start()
-    except (Exception, Overdue) as error:
+    except Exception as error:
         server.stop()
-        late = isinstance(error, Overdue)
-        reason = f"it does not answer after {limit_s:g} s" if late else first_line(error)
-        raise ServerNotStarted(reason) from error
+        raise ServerNotStarted(first_line(error)) from error
 
 
 def of_prefect(error: Exception) -> bool:

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from aesi.errors import AesiError, FitError, InputError
+from aesi.logins import without_login
 from aesi.numerics.files.whole import write_whole
 from aesi.pipeline.experiment.candidate import weights
 from aesi.pipeline.experiment.config import ExperimentConfig, parse_experiment
@@ -32,7 +33,6 @@ from aesi.pipeline.written import CANDIDATE, EXPERIMENT, MODEL
 from aesi.records import Failed, LeftOutDrives
 from aesi.sparse import Candidate, Genome, Problem, evaluate
 from flows.base import codec
-from flows.base.store_address import without_login
 from flows.tracking.experiment_log import (
     DECLARED,
     INPUTS,

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 from aesi.errors import InputError
+from aesi.logins import without_login
 from aesi.pipeline.report import tables
 from aesi.pipeline.written import FIGURES, REPORT, SUMMARY
-from flows.base.store_address import without_login
 from flows.tracking.experiment_log import CODE, FALLBACK, SETTING, UNFITTED
 from flows.tracking.store import KIND, Store, beginning, is_of_experiment
 from flows.tracking.view import NOTE

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aesi.errors import InputError, first_line
+from aesi.logins import login_left_out, without_login
 from flows.base import environment
-from flows.base.store_address import PLACE, checked_address, without_login
+from flows.base.store_address import PLACE, checked_address
 from flows.tracking.store import Store
 from flows.tracking.view import TRAINING, VIEW_TAG, view_of
 
@@ -107,7 +108,9 @@ def serve_studies(port: int, host: str, url: str | None) -> None:
         )
     _check_free(host, port)
     storage = _there(url) if url else study_storage()
-    print(f"Optuna's dashboard shows the searches at http://{host}:{port}/ (Ctrl-C ends it)", flush=True)
+    print(
+        f"Optuna's dashboard shows the searches at http://{_shown(host)}:{port}/ (Ctrl-C ends it)", flush=True
+    )
     run_server(storage, host=host, port=port)
 
 
@@ -125,7 +128,8 @@ def _there(url: str) -> BaseStorage:
         return study_storage(url)
     except Exception as error:
         raise InputError(
-            f"--storage {without_login(url)} cannot be shown ({first_line(error)}); give the address that "
+            f"--storage {without_login(url)} cannot be shown ({login_left_out(first_line(error), url)}); give the "
+            "address that "
             "runner.storage of the experiment's file has."
         ) from None
 
@@ -135,10 +139,13 @@ def serve_flows(port: int, host: str) -> None:
     _check_free(host, port)
     environment.prepare_process()
     environment.make_prefect_home()
-    print(f"Prefect shows the flow runs at http://{host}:{port}/runs (Ctrl-C ends it)", flush=True)
+    address = f"http://{_shown(host)}:{port}"
+    print(f"Prefect shows the flow runs at {address}/runs (Ctrl-C ends it)", flush=True)
     command = [sys.executable, "-m", "prefect", "server", "start", "--host", host, "--port", str(port)]
-    api = {"PREFECT_UI_API_URL": f"http://{host}:{port}/api"}
-    os.execve(sys.executable, command, os.environ | api)
+    api = {
+        "PREFECT_UI_API_URL": f"{address}/api"
+    }  # which a browser asks, from whatever machine it shows the page on
+    os.execve(sys.executable, command, api | os.environ)
 
 
 def _check_free(host: str, port: int) -> None:

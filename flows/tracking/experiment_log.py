@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from aesi.constants import MV_PER_V
+from aesi.logins import without_login
 from aesi.numerics.files.source_digest import source_digest
 from aesi.numerics.files.whole import write_whole
 from aesi.pipeline.experiment.candidate import ScoredCandidate
@@ -21,7 +22,6 @@ from aesi.pipeline.written import COEFFICIENTS, EXPERIMENT, FIGURES, MODEL, REPO
 from aesi.records import ROLES, Failed
 from aesi.sparse import Candidate, Genome, Problem, SparseModel
 from flows.base import codec
-from flows.base.store_address import without_login
 from flows.tracking.provenance import versions
 from flows.tracking.tracker import Tracker, flat
 from flows.tracking.view import HOW_TO_READ, NOTE, RUN_COLUMNS, experiment_tags

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from aesi.errors import AesiError, InputError, first_line
+from aesi.logins import login_left_out, without_login
 from aesi.numerics.files.whole import check_writable
 from flows.base.databases import limits
 from flows.base.locks import ProcessLock
@@ -28,7 +29,6 @@ from flows.base.store_address import (
     SQLITE,
     checked_address,
     database_file,
-    without_login,
 )
 from flows.tracking.relocation import artifact_folder, follow
 from flows.tracking.whole_run import read_runs
@@ -336,7 +336,8 @@ def _reach_database(uri: str) -> None:
         engine = sa.create_engine(uri, **limits(uri))
     except ImportError as error:
         package = "psycopg2-binary" if "psycopg2" in str(error) else "the driver that its address names"
-        raise InputError(f"the tracking store {without_login(uri)} needs {package}: {error}.") from None
+        reason = login_left_out(str(error), uri)
+        raise InputError(f"the tracking store {without_login(uri)} needs {package}: {reason}.") from None
     except (sa.exc.ArgumentError, ValueError) as error:
         raise _unusable(uri, error) from None
     try:
@@ -348,7 +349,7 @@ def _reach_database(uri: str) -> None:
 
 
 def _unusable(uri: str, error: BaseException) -> StoreAway:
-    reason = first_line(error)
+    reason = login_left_out(first_line(error), uri)
     if uri.startswith("http"):
         advice = (
             "start the server, or leave out tracking.uri and MLFLOW_TRACKING_URI to track in the workspace's own "

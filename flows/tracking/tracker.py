@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import Any, Literal, Protocol
 
 from aesi.errors import AesiError
+from aesi.logins import without_login
 from aesi.pipeline.experiment.sections import TrackingConfig
 from flows.base import environment
-from flows.base.store_address import without_login
 from flows.tracking.delivery import deliver
 from flows.tracking.outbox import FLUSH_S, Outbox
 from flows.tracking.provenance import source_tags

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from aesi.advice import Reader, told
+from aesi.calibration.records.sizes import sizes_sentence
 from aesi.constants import MILLI, MV_PER_V, ZERO_CELSIUS_K
 from aesi.numerics.files.whole import write_whole
 from aesi.physics.cell import Soh
@@ -130,6 +131,7 @@ class Case:
         temperatures = [temperature_sentence(given.cell, m, given.effects) for m in untold]
         return (
             *given.cell.unread,
+            *filter(None, [sizes_sentence(given.cell, self.records, given.cell.capacity_ah)]),
             *soh_day_sentences(declared_model(self.cell).cell, self.soh),
             *temperature_range_sentences(
                 given.cell, (m.temperature_degc for m in self.records), given.effects

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 from pydantic import BaseModel, Field, ValidationError, field_validator, model_validator
 
 from aesi.errors import ConfigError, wanted
+from aesi.logins import without_logins
 from aesi.pipeline.experiment.sections import (
     SHORT_FOR,
     CellConfig,
@@ -219,6 +220,11 @@ def read_experiment(path: str | Path, overrides: Sequence[str] = ()) -> Experime
         key = overridden_key(override)
         if key in seen:  # otherwise the last one would count without a message
             raise ConfigError(f"{path}: {key!r} is overridden twice; give it once.")
+        lost = next((other for other in sorted(seen) if other.startswith(f"{key}.")), None)
+        if lost is not None:
+            raise ConfigError(
+                f"{path}: {key!r} replaces {lost!r}, which is overridden before it; give {key!r} first."
+            )
         seen.add(key)
         _override(content, override)
     return parse_experiment(content, base=path.resolve().parent, where=str(path))
@@ -264,19 +270,20 @@ def _override(content: dict[str, Any], override: str) -> None:
     import yaml
 
     key, equals, text = override.partition("=")
+    told = f"--set {without_logins(override)}"
     parts = [part.strip() for part in key.split(".")]
     if not equals or not all(parts):
-        raise ConfigError(f"--set {override}: has to read key=value, for instance search.candidates=50.")
+        raise ConfigError(f"{told}: has to read key=value, for instance search.candidates=50.")
     try:
         value = yaml.safe_load(text)
     except yaml.YAMLError:
-        raise ConfigError(f"--set {override}: {text!r} is not a YAML value.") from None
+        raise ConfigError(f"{told}: {without_logins(text)!r} is not a YAML value.") from None
     for depth, part in enumerate(parts[:-1]):
         child = content.setdefault(part, {})
         if isinstance(child, str) and part in SHORT_FOR:
             child = content[part] = {SHORT_FOR[part]: child}
         if not isinstance(child, dict):
-            raise ConfigError(f"--set {override}: {'.'.join(parts[: depth + 1])} is a value and has no keys.")
+            raise ConfigError(f"{told}: {'.'.join(parts[: depth + 1])} is a value and has no keys.")
         content = child
     content[parts[-1]] = value
 
@@ -298,10 +305,10 @@ def _sentence(detail: ErrorDetails) -> str:
     if detail["type"] == "value_error":
         said = str(detail["ctx"]["error"]).rstrip(".")
         return f"{key}: {said}." if key else f"{said}."
-    found = detail["input"]
+    found = without_logins(repr(detail["input"]))
     if detail["type"] in ("model_type", "model_attributes_type"):
-        return f"{key} = {found!r} is not admissible: it takes keys: {', '.join(_keys_at(location))}."
-    return f"{key} = {found!r} is not admissible: it {wanted(detail)}."
+        return f"{key} = {found} is not admissible: it takes keys: {', '.join(_keys_at(location))}."
+    return f"{key} = {found} is not admissible: it {wanted(detail)}."
 
 
 def _keys_at(location: Sequence[str]) -> list[str]:

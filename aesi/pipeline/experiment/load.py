@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from aesi.advice import with_keys
+from aesi.calibration.records.sizes import sizes_sentence
 from aesi.data.resample import DENSE, is_sparse, off_rows, to_even
 from aesi.data.virtual import DEFAULT_MIX
 from aesi.errors import ConfigError, DataAway, DataError, InputError, SimulationError
@@ -306,6 +307,8 @@ def _on_grid(
             *map(with_keys, even.notes),
         ]
         records[name] = no_rows(even, start.soc, start.read_sd, state_source)
+    measured = [measurement for measurement, _ in sources.records.values()]
+    notes += filter(None, [sizes_sentence(cell, measured, cell.capacity_ah)])
     notes += temperature_range_sentences(
         cell, (m.temperature_degc for m, _ in sources.records.values()), given.effects
     )

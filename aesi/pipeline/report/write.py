@@ -81,6 +81,7 @@ def write_discovery_report(path: str | Path, view: DiscoveryView) -> Path:
         view=view,
         discovery=view.discovery,
         states=discoveries.states_of(view.discovery),
+        digits={part: discoveries.error_digits(view.discovery, part) for part in ("fit", "test")},
         written=discoveries.discovery_consequence(view),
         finding=discoveries.discovery_finding(view),
         sentences=[

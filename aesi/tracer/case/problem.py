@@ -8,8 +8,9 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
+from aesi.advice import listed
 from aesi.constants import SECONDS_PER_HOUR
-from aesi.errors import AesiError
+from aesi.errors import AesiError, first_line
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, BoolArray
 from aesi.physics.cell import Cell
@@ -64,6 +65,9 @@ one whose exponents end at their limits at up to 1e152 V. A convention."""
 CACHED_VOLTAGES = 64
 """Number of simulated voltages of good records in the cache: enough for a dozen hypotheses that grow in parallel."""
 
+ARITHMETIC = (FloatingPointError, ZeroDivisionError, OverflowError)
+"""Errors of a simulation whose numbers left their range."""
+
 ValuesByOwner = Mapping[str, Mapping[str, float]]
 """owner -> name -> value."""
 
@@ -71,6 +75,11 @@ ValuesByOwner = Mapping[str, Mapping[str, float]]
 def record_capacity_share(values: ValuesByOwner, record: int) -> float:
     """Capacity of the cell during a record (its number), as a share of the file's; 1 where it is not fitted."""
     return values.get(CAPACITY_SHARE, {}).get(str(record), 1.0)
+
+
+def _is_of_a_cell(voltage_v: Array) -> bool:
+    """Whether each of these voltages (n,) V, may be a cell's; NaN is not."""
+    return bool((np.abs(voltage_v) < NO_CELLS_V).all())
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,11 +203,10 @@ class InverseProblem:
                         i, values[STATE_OF_CHARGE][str(i)], acting[good], record_capacity_share(values, i)
                     )
                 )
-        except (AesiError, FloatingPointError, ZeroDivisionError, OverflowError):
+        except (AesiError, *ARITHMETIC):
             return None
         joined = np.concatenate(out)
-        possible = np.abs(joined) < NO_CELLS_V  # False for NaN, too
-        return joined if possible.all() else None
+        return joined if _is_of_a_cell(joined) else None
 
     def _voltage_v(self, i: int, soc0: float, effects: tuple[ActiveEffect, ...], share: float = 1.0) -> Array:
         return self.run(self.fit_parts[i], soc0, effects, self.records[i].thin_hold, share=share).voltage_v
@@ -223,13 +231,29 @@ class InverseProblem:
         return fit_simulation(cell, data, soc0, effects, hold, self.model, rest_voltage_v)
 
     def failure_reason(self, hypothesis: Sequence[str]) -> str:
-        """Why a hypothesis cannot be simulated at its typical values: one sentence."""
+        """Why a hypothesis cannot be simulated at its typical values: one sentence, with the names of the records where
+        others, or another reason, are beside them."""
+        records: dict[str, list[str]] = {}
+        for i, record in enumerate(self.records):
+            if reason := self._failure_on(i, hypothesis):
+                records.setdefault(reason, []).append(record.name)
+        if not records:
+            return "no start of the fit could be simulated."
+        reason, names = next(iter(records.items()))
+        return reason if len(names) == len(self.records) else f"on {listed(names)}: {reason}"
+
+    def _failure_on(self, i: int, hypothesis: Sequence[str]) -> str:
+        """Why a hypothesis cannot be simulated at its typical values on one record, a sentence; '' where it can be."""
+        record = self.records[i]
+        tested = () if record.good else hypothesis
         try:
-            effects = (*self.fixed, *(self.effects[name].activate() for name in hypothesis))
-            self.run(self.fit_parts[0], self.records[0].soc0, effects, self.records[0].thin_hold)
+            effects = (*self.fixed, *(self.effects[name].activate() for name in tested))
+            voltage_v = self._voltage_v(i, record.soc0, effects)
         except AesiError as error:
             return str(error)
-        return "no start of the fit could be simulated."
+        except ARITHMETIC as error:
+            return f"the simulation fails ({first_line(error)})."
+        return "" if _is_of_a_cell(voltage_v) else "the simulated voltage is no cell's."
 
     @cached_property
     def fit_parts(self) -> tuple[Measurement, ...]:

@@ -218,9 +218,10 @@ def partly_explained(path: Path, verdict: Verdict, thresholds: Thresholds) -> Ve
     groups, margin = look_alikes(path, thresholds, max(left, MEASURED_V))
     reason = (
         f"{' + '.join(path.chosen.hypothesis)} reduces the error on unseen data from {1e3 * before:.1f} to "
-        f"{1e3 * left:.1f} mV beyond the noise, by more than the usual error of models of measured cells; no effect "
-        "that was tried explains the rest"
+        f"{1e3 * left:.1f} mV beyond the noise, by more than the usual error of models of measured cells"
     )
+    if left > verdict.tolerance_v:
+        reason += "; no effect that was tried explains the rest"
     return replace(
         verdict,
         effects=path.chosen.hypothesis,

@@ -64,7 +64,7 @@ def forward_search(
     base = base_of(problem, blocks, archive)
     if base is None:
         raise DataError(
-            f"the model of {problem.cell.name} cannot be simulated on {problem.records[0].name}; check the cell file."
+            f"the model of {problem.cell.name} cannot be simulated; check the cell file: {problem.failure_reason(())}"
         )
     if shallower is not None and shallower.beyond_reach_v is not None:
         return shallower

@@ -106,6 +106,15 @@ def test_a_run_was_told_to_go_on_with_the_password_of_its_store(path):
     assert resuming == f"aesi run {path} --set {shown} --set seed=1 --resume"
 
 
+def test_the_password_of_the_second_of_two_addresses_was_shown(path):
+    laid = (
+        'runner={"storage":"postgresql://me:secret@host/db","address":"tcp://me:secret@host:1","kind":"dask"}'
+    )
+    request = RunRequest(path, (laid,), address="tcp://me:secret@host:2")
+    assert "secret" not in request.resuming
+    assert "--address tcp://host:2" in request.resuming
+
+
 def test_a_run_without_cache_was_told_to_go_on_from_it(path):
     assert RunRequest(path, use_cache=False).resuming == f"aesi run {path} --no-cache --resume"
 
@@ -164,10 +173,11 @@ def test_the_password_of_an_address_was_kept_and_shown_by_prefect(workspace, mon
     monkeypatch.setattr(prefect_flows, job, keeps)
     monkeypatch.setattr(module, "start_server", lambda: None)
     monkeypatch.setattr("flows.tracking.store.check_reached", lambda uri: None)
+    monkeypatch.setattr("flows.evaluation.in_reach.check_in_reach", lambda runner: None)
     monkeypatch.setattr(module, "check_case", lambda case: None)
     overrides = ("tracking.uri=postgresql://me:secret@host/db", "seed=1")
     if job == "experiment":
-        module.start(file, overrides)
+        module.start(file, overrides, "dask", "tcp://me:secret@host:1")
     else:
         request = RunRequest(str(file), overrides)
         case = SimpleNamespace(cell=file, measurements=())

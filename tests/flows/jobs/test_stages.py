@@ -115,6 +115,15 @@ def test_bad_input_and_a_limit_are_not_tried_again(said):
     assert said == []
 
 
+def test_the_password_of_a_server_that_is_away_was_shown(monkeypatch):
+    monkeypatch.setenv("PREFECT_API_URL", "http://me:secret@127.0.0.1:9/api")
+    with (
+        pytest.raises(ServerAway, match=r"the Prefect server http://127\.0\.0\.1:9/api does not answer"),
+        server_in_reach(),
+    ):
+        raise RuntimeError("Failed to reach API at http://me:secret@127.0.0.1:9/api")
+
+
 def test_a_server_that_is_away_is_one_sentence(monkeypatch):
     monkeypatch.setenv("PREFECT_API_URL", "http://127.0.0.1:9/api")
     with (

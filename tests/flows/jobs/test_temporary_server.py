@@ -7,7 +7,6 @@ import httpx
 import pytest
 
 from aesi.errors import DataError
-from flows.base.time_limit import Overdue, time_limit
 from flows.jobs import start
 from flows.jobs.temporary_server import CURRENT, KeptWork, ServerNotStarted, as_the_job, start_server
 
@@ -109,16 +108,3 @@ def test_a_job_that_was_tried_again_counts_as_its_last_try():
     assert job.do(lambda: 3) == 3
     assert job.outcome(lambda: pytest.fail("again")) == 3
     assert KeptWork().outcome(lambda: "first") == "first"
-
-
-def test_time_is_limited_within_the_block_alone():
-    with pytest.raises(Overdue), time_limit(0.1):
-        time.sleep(10)
-    with time_limit(None):
-        time.sleep(0.01)
-
-
-def test_where_no_signal_tells_the_time_a_limit_is_none(monkeypatch):
-    monkeypatch.delattr("signal.SIGALRM")  # as on Windows
-    with time_limit(0.01):
-        time.sleep(0.05)

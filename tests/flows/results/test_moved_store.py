@@ -2,9 +2,6 @@
 
 import shutil
 
-import pytest
-
-from flows.base.store_address import without_login
 from flows.results.tables import tables_of
 from flows.tracking.store import KIND, Store
 
@@ -74,22 +71,6 @@ def test_what_is_read_of_a_local_store_left_a_copy_in_the_folder_for_temporary_f
     (tmp_path / "temporary").mkdir()
     assert tables_of("smoke", uri=f"sqlite:///{here / 'mlflow.db'}")
     assert not list((tmp_path / "temporary").iterdir())
-
-
-@pytest.mark.parametrize(
-    ("uri", "shown"),
-    [
-        ("https://me:secret@tracking.example:5000/a", "https://tracking.example:5000/a"),
-        ("postgresql://me:secret@host/db", "postgresql://host/db"),
-        ("postgresql://me:s/e?c#r@t@host/db", "postgresql://host/db"),
-        ("postgresql://host/db?user=me&password=secret", "postgresql://host/db"),
-        ("postgresql://host/db?sslmode=require&password=secret", "postgresql://host/db?sslmode=require"),
-        ("https://tracking.example:5000/me@a", "https://tracking.example:5000/me@a"),
-        ("sqlite:////home/me/a@b.db", "sqlite:////home/me/a@b.db"),
-    ],
-)
-def test_the_password_of_a_server_stood_in_reports(uri, shown):
-    assert without_login(uri) == shown
 
 
 def test_artifacts_go_beside_the_database(tmp_path, empty_store, monkeypatch):

@@ -105,6 +105,31 @@ def test_who_came_from_another_machine_was_refused(call, tracked, monkeypatch):
     assert "MLFLOW_SERVER_CORS_ALLOWED_ORIGINS" not in given[2]
 
 
+@pytest.mark.parametrize(
+    ("host", "there"), [("0.0.0.0", "http://labserver:5599"), ("::1", "http://[::1]:5599")]
+)
+def test_the_page_of_flow_runs_asked_for_its_figures_at_an_address_that_is_none(
+    call, workspace, monkeypatch, host, there
+):
+    """`http://0.0.0.0:4200/api` is the browser's own machine, and `http://::1:4200/api` nothing."""
+    given = []
+    monkeypatch.setattr(os, "execve", lambda program, command, environment: given.append(environment))
+    monkeypatch.setattr(socket, "gethostname", lambda: "labserver")
+    monkeypatch.setattr(ui, "_check_free", lambda host, port: None)
+    monkeypatch.delenv("PREFECT_UI_API_URL", raising=False)
+    _, out, _ = call("ui", "--prefect", "--port", "5599", "--host", host)
+    assert f"at {there}/runs" in out
+    assert given[0]["PREFECT_UI_API_URL"] == f"{there}/api"
+    monkeypatch.setenv("PREFECT_UI_API_URL", "https://proxy/api")  # what a person has set stays
+    call("ui", "--prefect", "--port", "5599", "--host", host)
+    assert given[1]["PREFECT_UI_API_URL"] == "https://proxy/api"
+    monkeypatch.setattr("optuna_dashboard.run_server", lambda *_, **__: None)
+    monkeypatch.setattr("flows.search.published_study.study_storage", lambda *_: None)
+    monkeypatch.setattr("flows.search.published_study.journal", lambda: workspace)
+    _, out, _ = call("ui", "--optuna", "--port", "5599", "--host", host)
+    assert f"searches at {there}/" in out
+
+
 def test_a_host_that_is_not_here_was_told_as_a_port_that_is_taken():
     with pytest.raises(InputError, match=r"nothing can be served at 192\.0\.2\.1, port 5599"):
         ui.serve_flows(5599, "192.0.2.1")

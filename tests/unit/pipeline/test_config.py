@@ -228,6 +228,17 @@ def test_of_two_overrides_of_one_key_the_last_counted_and_nobody_was_told(tmp_pa
         read_experiment(path, ["seed=1", "seed =2"])
 
 
+def test_an_override_was_lost_to_one_of_the_section_that_followed(tmp_path):
+    path = tmp_path / "x.yaml"
+    path.write_text("name: x\ndata: {kind: files, train: [a.csv], test: [b.csv]}\n")
+    with pytest.raises(
+        ConfigError, match=r"'cell' replaces 'cell\.soc0', which is overridden before it; give 'cell' f"
+    ):
+        read_experiment(path, ["cell.soc0=0.8", "cell=my_cell.bpx.json"])
+    cell = read_experiment(path, ["cell=my_cell.bpx.json", "cell.soc0=0.8"]).cell
+    assert (cell.bpx, cell.soc0) == ("my_cell.bpx.json", 0.8)
+
+
 @pytest.mark.parametrize(
     "override", ["seed", "=3", "seed.x=1", "search..x=1", "search.candidates=[", "seed=one"]
 )

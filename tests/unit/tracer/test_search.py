@@ -6,7 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from aesi.errors import CellError
 from aesi.numerics.metrics import rms
+from aesi.physics.effect import Effect
 from aesi.physics.effects import CATALOGUE
 from aesi.tracer.case.blocks import blocks_of
 from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, coordinates_of, effect_parameters
@@ -65,6 +67,34 @@ def test_a_hypothesis_that_moved_nothing_far_is_grown_where_it_is(cell, few, mak
     problem = inverse_problem(cell, [make()], 0.9, effects=few)
     blocks = blocks_of(problem)
     assert linearised_as_declared(problem, blocks, base_of(problem, blocks, Archive(None, ""))) is None
+
+
+def test_why_an_effect_could_not_be_tried_was_asked_of_the_first_record_alone(cell, make):
+    """Beside a record that could be simulated the reason was none: "no start of the fit could be simulated"."""
+    reason = "a record this long is refused."
+
+    def shorter(record):
+        if record.time_s[-1] > 2500.0:
+            raise CellError(reason)
+        return record
+
+    refusing = Effect("refusing", "instrument", "Refuses.", on_record=shorter)
+    records = [
+        replace(make(n=n), name=name) for name, n in (("short", 2400), ("long", 2700), ("longer", 2800))
+    ]
+    problem = inverse_problem(cell, records, 0.9, holdout=0.0, effects={"refusing": refusing})
+    told = f"on long and longer: {reason}"
+    assert problem.failure_reason(("refusing",)) == told
+    found = forward_search(problem, 1, Archive(None, ""))
+    assert found.notes == (f"refusing: not tried; {told}",)
+    alone = inverse_problem(cell, records[1:], 0.9, holdout=0.0, effects={"refusing": refusing})
+    assert alone.failure_reason(("refusing",)) == reason  # of no record more than of another
+    given = replace(problem, effects={}, fixed=(refusing.activate(),))
+    assert given.failure_reason(()) == told
+    good = inverse_problem(
+        cell, records[:1], 0.9, holdout=0.0, effects={"refusing": refusing}, good=records[1:]
+    )
+    assert good.failure_reason(("refusing",)) == "no start of the fit could be simulated."
 
 
 def said(total, evidence, names=1):

@@ -16,12 +16,14 @@ from aesi.pipeline.report.words.sizes import (
     capitalised,
     explain_part,
     finding_line,
+    fit_explains,
     refit_does_as_well,
     unexplained_by,
     what_good_records_lack,
     with_size,
 )
 from aesi.tracer.decide.model_to_write import AS_GOOD
+from aesi.tracer.decide.verdict import Thresholds, beyond_noise
 from aesi.tracer.likelihood.model_error import MEASURED_V
 
 LARGE_SHARE = 0.5
@@ -110,6 +112,12 @@ def _left_mv(discovery: Mapping[str, Any], part: str) -> dict[str, float]:
     return {state: round(row["rmse_mv"], 2) for state, row in rows.items() if row.get("rmse_mv") is not None}
 
 
+def error_digits(discovery: Mapping[str, Any], part: str) -> int:
+    """Decimals of the errors on a part, mV: one, or two where objections tell apart what one would show as equal."""
+    left = set(_left_mv(discovery, part).values())
+    return 1 if len({f"{error:.1f}" for error in left}) == len(left) else 2
+
+
 def _verdict(view: DiscoveryView) -> str:
     verdict, effects = view.discovery["verdict"], view.discovery["effects"]
     if verdict == "none":
@@ -120,7 +128,8 @@ def _verdict(view: DiscoveryView) -> str:
         if not effects:
             return f'The declared model of "{view.cell}" has a systematic error{rest}.'
         names = [with_size(effect, view.discovery, _title(view.titles, effect)) for effect in effects]
-        return f"{capitalised(listed(names))} {explain_part(names)}. A systematic error remains{rest}."
+        explained = f"{capitalised(listed(names))} {explain_part(names, view.discovery)}."
+        return explained if fit_explains(view.discovery) else f"{explained} A systematic error remains{rest}."
     confidence = name_confidence(view.discovery, view.titles)
     if refit_does_as_well(view.discovery):
         return (
@@ -207,7 +216,7 @@ def reason_finding(discovery: Mapping[str, Any]) -> str:
         return f"Why: {amount}. The noise and the accuracy of any such model account for up to {allowed:.2f} mV{so}"
     if discovery["verdict"] == "found":
         return f"Why: with the finding added, {amount}; up to {allowed:.2f} mV count as explained."
-    if left > allowed:
+    if left > allowed and not discovery.get("of_another_age"):
         found = "with the finding added, " if discovery["effects"] else ""
         why = f"Why: {found}{amount}; only up to {allowed:.2f} mV would count as explained."
         return f"{why} {OF_MEASURED}" if _tried(discovery) and not discovery.get("good") else why
@@ -299,7 +308,8 @@ def discovery_consequence(view: DiscoveryView) -> str:
     where = {"test": "on held-out data", "fit": "on the fitted data"}[part]
     words = states_of(discovery)
     errors = {state: (discovery.get(state) or {}).get(part, {}).get("rmse_mv") for state in words}
-    told = [f"{error:.1f} mV {words[state]}" for state, error in errors.items() if error is not None]
+    digits = error_digits(discovery, part)
+    told = [f"{error:.{digits}f} mV {words[state]}" for state, error in errors.items() if error is not None]
     holds = written_finding(discovery)
     if not told:
         return holds
@@ -347,23 +357,61 @@ def closest_finding(view: DiscoveryView) -> str:
 
 
 def rest_finding(discovery: Mapping[str, Any]) -> str:
-    """A sentence on what a data-driven correction could still explain of the fitted data, from which it is learnt."""
-    rest, after = discovery["explainable_mv"], discovery.get("after", {}).get("fit", {}).get("rmse_mv")
+    """A sentence on the error that the written model leaves of the fitted data: how much of it a correction, learnt
+    from it, could still explain, and what that says beside the verdict."""
+    rest, left = discovery["explainable_mv"], discovery.get("after", {}).get("fit", {}).get("rmse_mv")
     if rest is None:
         return "How much a flexible correction could still explain is not known: these data are too few to learn one."
-    text = f"A flexible correction, learnt from the remaining error, could still explain {rest:.1f} mV"
-    if not after:
-        return text + "."
-    text += f" of the {after:.1f} mV on the fitted data: "
-    if rest > LARGE_SHARE * after:
-        return text + "much of the remaining error is systematic, and missing physics may explain it."
-    if discovery["structured_mv"] > discovery["tolerance_mv"]:
+    text = f"A flexible correction, learnt from the error of the model in model/, could still explain {rest:.1f} mV"
+    if not left:
+        return f"{text}."
+    text += f" of its {left:.1f} mV on the fitted data: "
+    noise, allowed = discovery["noise_floor_mv"], discovery["tolerance_mv"]
+    beyond, systematic = beyond_noise(left, noise), rest > LARGE_SHARE * left
+    exceeds = beyond > max(allowed, Thresholds().noise_share * noise)
+    if discovery["verdict"] == "unknown":
+        return text + _rest_of_unknown(systematic, exceeds)
+    return text + _rest_of_explained(discovery, systematic, beyond if exceeds else None)
+
+
+def _rest_of_unknown(systematic: bool, exceeds: bool) -> str:
+    """A clause on the error of the written model where nothing to be relied on explains the data.
+
+    systematic : whether a correction could explain most of it.  exceeds : whether it exceeds the noise.
+    """
+    if systematic:
+        return "much of it is systematic, and missing physics may explain it."
+    if exceeds:
         return (
-            text
-            + "the remaining error exceeds the noise, and functions of the model's variables predict little of it. "
-            "That points to a fault of an instrument, or to a state that the model lacks."
+            "it exceeds the noise, and functions of the model's variables predict little of it. That points to a fault "
+            "of an instrument, or to a state that the model lacks."
         )
-    return text + "little systematic error remains for missing physics to explain."
+    return "little systematic error is left where it was fitted, which does not show that it holds elsewhere."
+
+
+def _rest_of_explained(discovery: Mapping[str, Any], systematic: bool, beyond: float | None) -> str:
+    """The same where the data are explained: what is left of them then is no news, or is not what the verdict is about.
+
+    beyond : error beyond the noise, mV, where that is more than a right model leaves; else None.
+    """
+    begin = (
+        "much of it is systematic"
+        if systematic
+        else "functions of the model's variables predict little of it"
+    )
+    if discovery.get("not_adopted"):
+        lacks = "the finding" if discovery["effects"] else "the fit"
+        return f"{begin}; what explains the data is {lacks}, which model/ does not hold."
+    if beyond is not None:
+        return (
+            f"{begin}; beyond the noise it is {beyond:.2f} mV, more than the {discovery['structured_mv']:.2f} mV in "
+            "cross-validation that the verdict rests on."
+        )
+    if discovery.get("good"):
+        return f"{begin}; beside the known-good records up to {discovery['tolerance_mv']:.2f} mV count as explained."
+    if systematic:
+        return f"{begin}, but no more than the noise and the accuracy of any such model account for."
+    return "little systematic error remains for missing physics to explain."
 
 
 def _title(titles: Mapping[str, str], effect: str) -> str:

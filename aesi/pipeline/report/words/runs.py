@@ -12,9 +12,7 @@ from aesi.pipeline.report.views import Row, RunView
 NEARLY = 0.98
 """A one-step error above this share of persistence's is called no better than it."""
 HUNDREDTHS = 2
-"""Decimals of a mV to which an error has to be less to be called less."""
-MOST_DIGITS = 3
-"""Most decimals of an error in mV."""
+"""Most decimals of an error in mV, to which it has to be less to be called less."""
 ON_TEST = "On held-out test records, in free run, the RMSE"
 """Beginning of the headline."""
 
@@ -29,7 +27,7 @@ def _refit_better(view: RunView) -> str:
     """Clause, from '; ' on, that the physics with its own parameters refitted errs less, where the correction is not
     on that; '' where it does not."""
     ours, refitted = _figure(view.model(view.chosen), "free_run", "test_rmse_mv"), _refitted_mv(view)
-    if ours is None or refitted is None or round(refitted, HUNDREDTHS) >= round(ours, HUNDREDTHS):
+    if ours is None or refitted is None or not _is_less(refitted, ours):
         return ""
     return (
         f"; with its own parameters refitted to the training records, and nothing learnt, the {view.physics} errs less "
@@ -92,17 +90,18 @@ def _gain_sentence(view: RunView) -> str:
             f"mV RMSE on the test records{declared}."
         )
     corrected = _figure(view.model(view.corrected), "free_run", "test_rmse_mv")
-    if corrected is not None and view.corrected != view.chosen and corrected < min(before, after):
+    if corrected is not None and _is_less(corrected, before) and not _is_less(after, corrected):
         between, last = _distinct_mv(corrected, after)
         return (
             f"{ON_TEST} is {between} mV with the {view.corrected} and {before:.1f} mV with the {view.physics} as "
             f"declared. The correction learnt on top of it does not help: {view.chosen} leaves {last} mV."
         )
     first, last = _distinct_mv(before, after)
-    if reduction <= 0:
+    if not _is_less(after, before):
+        error = f"grows from {first} mV to {last} mV" if _is_less(before, after) else f"stays at {last} mV"
         return (
             "The data-driven correction does not help here: in free run on the test records the error "
-            f"grows from {first} mV to {last} mV. Use the {view.physics} alone."
+            f"{error}. Use the {view.physics} alone."
         )
     share = own_share(view)
     if share is None or corrected is None or view.corrected == view.physics:
@@ -173,7 +172,7 @@ def _worse_refitted(view: RunView, figure: str) -> tuple[str, str] | None:
     declared, refitted = (
         _figure(view.model(name), "free_run", figure) for name in (view.physics, view.corrected)
     )
-    if declared is None or refitted is None or refitted <= declared:
+    if declared is None or refitted is None or not _is_less(declared, refitted):
         return None
     return _distinct_mv(declared, refitted)
 
@@ -200,7 +199,9 @@ def others_finding(view: RunView) -> str:
         for row in view.models
         if row["name"] != view.chosen and row["name"].startswith(tuple(f"{name} + " for name in physics))
     }
-    better = {name: error for name, error in left.items() if error is not None and ours and error < ours}
+    better = {
+        name: error for name, error in left.items() if error is not None and ours and _is_less(error, ours)
+    }
     if not better or ours is None:
         return ""
     best = min(better, key=lambda name: better[name])
@@ -272,9 +273,14 @@ def interval_finding(model: Row) -> str:
     )
 
 
+def _is_less(first: float, other: float) -> bool:
+    """Whether an error, mV, is less than another one, as far as `_distinct_mv` shows them."""
+    return round(first, HUNDREDTHS) < round(other, HUNDREDTHS)
+
+
 def _distinct_mv(first: float, other: float) -> tuple[str, str]:
-    """Two errors, mV, as text: to a tenth, or to as many decimals as tell them apart."""
-    for digits in range(1, MOST_DIGITS + 1):
+    """Two errors, mV, as text: to a tenth, or to a hundredth where that tells them apart."""
+    for digits in range(1, HUNDREDTHS + 1):
         if f"{first:.{digits}f}" != f"{other:.{digits}f}":
             break
     return f"{first:.{digits}f}", f"{other:.{digits}f}"

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from math import floor, log10
 from typing import Any
 
+import numpy as np
+
 from aesi.advice import listed
 from aesi.parameters import Parameter
 from aesi.physics.effects import CATALOGUE
@@ -158,28 +160,41 @@ def finding_line(discovery: Mapping[str, Any]) -> str:
         beside = what_good_records_lack(discovery)
         return f"none: these data show {beside or 'nothing that the declared model lacks'}"
     if verdict == "unknown":
-        remains = "a systematic error remains"
-        named = f"{', '.join(effects)} {explain_part(effects)}; " if effects else ""
-        return f"unknown: {named}{remains}{unexplained_by(discovery)}"
+        named = f"{', '.join(effects)} {explain_part(effects, discovery)}" if effects else ""
+        if effects and fit_explains(discovery):
+            return f"unknown: {named}"
+        return f"unknown: {named}{'; ' if named else ''}a systematic error remains{unexplained_by(discovery)}"
     if refit_does_as_well(discovery):
         return f"one of two explanations: {', '.join(effects)}; or the model's own parameters, whose refit fits as well"
     return f"found: {', '.join(effects)}"
 
 
-def explain_part(names: Sequence[str]) -> str:
+def fit_explains(discovery: Mapping[str, Any]) -> bool:
+    """Whether a fit leaves no more of data that were left out of it than a right model may; an `unknown` then says that
+    this fit is not to be relied on."""
+    return bool(discovery.get("structured_mv", np.inf) <= discovery.get("tolerance_mv", 0.0))
+
+
+def explain_part(names: Sequence[str], discovery: Mapping[str, Any]) -> str:
     """The predicate of effects that are named with an `unknown`."""
-    return f"{'explains' if len(names) == 1 else 'explain'} a part of the error"
+    explain = "explains" if len(names) == 1 else "explain"
+    if fit_explains(discovery):
+        return f"{explain} the error, but these data do not show that nothing else does"
+    return f"{explain} a part of the error"
 
 
 def unexplained_by(discovery: Mapping[str, Any]) -> str:
     """Words after 'a systematic error remains': ' that no effect of the catalogue explains', or which of them were
-    tried, or that the good records beside the others seem to be of another age."""
+    tried, that what explains it is not to be relied on, or that the good records beside the others seem to be of
+    another age."""
     aged = discovery.get("of_another_age", ())
     if aged:
         return f" that {aged[0].replace('_', ' ')} explains if the good records are of another age"
     tried = discovery.get("tried", CATALOGUE)
     if not tried:
         return "; no effect was tried"
+    if fit_explains(discovery):
+        return " that a fit explains, but not one to be relied on"
     if set(tried) >= {name for name, effect in CATALOGUE.items() if effect.refines is None}:
         return " that no effect of the catalogue explains"
     if len(tried) == 1:

@@ -1,0 +1,115 @@
+"""Records of two cells in one run are told by what a full discharge takes, and those of one cell never."""
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from aesi.calibration import Conditions
+from aesi.calibration.fit import prepared_model
+from aesi.calibration.records.sizes import capacity_test_ah, other_sizes, sizes_sentence
+from aesi.errors import DataError
+from aesi.physics import Cell
+from aesi.pipeline.calibrate import start_at_size
+from aesi.pipeline.discovery.discover import Case
+from aesi.pipeline.experiment.config import parse_experiment
+from aesi.pipeline.experiment.load import _on_grid
+from aesi.pipeline.product.declared import declared_model
+from aesi.records import Measurement
+
+FILE = Path(__file__).resolve().parents[3] / "experiments" / "cells" / "lg_m50_chen2020.bpx.json"
+
+
+@pytest.fixture(scope="module")
+def m50():
+    return Cell.from_bpx(FILE)
+
+
+def discharge(cell, name, charge_ah, c_rate, degc=None, n=400):
+    """A full discharge along the open-circuit voltage, from full to empty."""
+    time_s = np.linspace(0.0, 3600.0 / c_rate, n)
+    soc = np.linspace(1.0, 0.0, n)
+    current_a = np.full(n, charge_ah * c_rate)
+    voltage_v = cell.rest_voltage_v(soc) - 0.02 * c_rate
+    measured = None if degc is None else np.full(n, degc)
+    return Measurement(time_s, current_a, voltage_v, measured, name)
+
+
+def test_a_cell_of_half_the_size_beside_another_passed_without_a_word(m50):
+    large = discharge(m50, "large", 4.9, 0.05)
+    small = discharge(m50, "small", 2.75, 1.0, 24.0)
+    assert sizes_sentence(m50, [large, small]) == (
+        "small: a full discharge takes 2.75 Ah, and one in large takes 4.9: the record is of another cell, or the cell "
+        "had lost 44 % of its capacity by then."
+    )
+    case = Case(FILE, (small, discharge(m50, "smaller", 2.7, 0.05)))
+    told = [note for note in case.assumed if "full discharge" in note]
+    assert told == [
+        f"small and smaller: a full discharge takes 2.75 and 2.7 Ah, and the file of {m50.name} has 5.15: the records "
+        "are of another cell, or the cell had lost 48 % of its capacity by then."
+    ]
+    assert not [
+        note for note in replace(case, soh=0.55).assumed if "full discharge" in note
+    ]  # as was declared
+
+
+@pytest.mark.parametrize(
+    ("c_rate", "degc", "counts"),
+    [
+        (0.05, None, True),
+        (0.05, 23.0, True),
+        (1.0, 23.0, True),
+        (1.0, None, False),  # it may have been cold
+        (1.0, -10.0, False),
+        (0.05, -10.0, False),
+        (3.0, 23.0, False),  # its load ends it early
+    ],
+)
+def test_a_discharge_in_the_cold_or_under_a_high_load_tells_no_size(m50, c_rate, degc, counts):
+    record = discharge(m50, "one", 2.7, c_rate, degc)
+    charge_ah = capacity_test_ah(m50, record)
+    assert (charge_ah is not None) == counts
+    if counts:
+        assert charge_ah == pytest.approx(2.7, rel=0.02)
+    assert bool(other_sizes(m50, [record], m50.capacity_ah)) == counts
+
+
+def test_a_part_of_a_discharge_and_an_aged_cell_are_not_noted(m50):
+    whole = discharge(m50, "whole", 5.0, 0.05)
+    part = discharge(m50, "part", 5.0, 0.05).take(slice(0, 200))
+    aged = discharge(m50, "aged", 4.0, 0.05)
+    assert sizes_sentence(m50, [whole, replace(part, name="part"), aged], m50.capacity_ah) == ""
+
+
+def test_a_record_was_refused_for_the_size_that_another_one_gave_the_file(m50):
+    """The message said that the file of an 18650 has 13.1 Ah, as a pouch cell has whose record was beside its own."""
+    large = discharge(m50, "large", 13.1, 0.05)
+    small = discharge(m50, "small", 2.8, 0.05)
+    with pytest.raises(
+        DataError, match=r"^small: a full discharge takes 2\.8 Ah, and one in large takes 13\.1: "
+    ):
+        start_at_size(m50, [large, small], None)
+
+
+def test_a_smaller_cell_beside_another_was_told_as_other_electrode_materials(m50):
+    large = discharge(m50, "large", 4.9, 0.05)
+    small = discharge(m50, "small", 2.3, 0.05)
+    _, said = prepared_model(m50, [large, small], Conditions())
+    assert not [sentence for sentence in said if "electrode materials" in sentence]
+    assert [sentence for sentence in said if sentence.startswith("small: a full discharge takes 2.3 Ah")]
+
+
+def test_an_experiment_took_a_record_of_another_cell_without_a_word(m50):
+    config = parse_experiment(
+        {"name": "x", "data": {"kind": "virtual", "dt_s": 180.0}, "cell": {"bpx": str(FILE), "soc0": 1.0}}
+    )
+    small = discharge(m50, "small", 2.75, 0.05, n=401)
+    sources = SimpleNamespace(
+        records={"small": (small, None)}, roles={"train": ["small"], "valid": [], "test": []}
+    )
+    _, _, notes = _on_grid(config, declared_model(FILE), sources)
+    assert [
+        note for note in notes if note.startswith("small: a full discharge takes 2.75 Ah, and the file of")
+    ]
