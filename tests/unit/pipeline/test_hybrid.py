@@ -880,6 +880,14 @@ def test_a_voltage_of_no_cell_was_told_without_when_it_left_the_limits(model, da
     assert last.endswith(f"V first at {data.time_s[20]:g} s, up to 5.000 V at {data.time_s[20]:g} s.")
 
 
+def test_a_full_cell_at_rest_was_told_as_above_its_limit_by_microvolts(model, data):
+    voltage = np.full(len(data), 3.9)
+    for beyond_v, said in ((1e-8, False), (4e-4, False), (1e-3, True)):
+        voltage[0], voltage[-1] = model.cell.upper_voltage_v + beyond_v, model.cell.lower_voltage_v - beyond_v
+        told = simulated_record_sentences(model.cell, data, voltage, np.linspace(1.0, 0.5, len(data)))
+        assert any("a voltage outside" in note for note in told) == said
+
+
 def test_by_how_much_a_record_emptied_or_overfilled_a_cell_was_not_told(model, data):
     voltage = np.full(len(data), 3.9)
     for soc, words in (
