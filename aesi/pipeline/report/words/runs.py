@@ -92,6 +92,12 @@ def _gain_sentence(view: RunView) -> str:
             f"mV RMSE on the test records{declared}."
         )
     corrected = _figure(view.model(view.corrected), "free_run", "test_rmse_mv")
+    alone = before if view.corrected == view.physics else corrected
+    if alone is not None and round(alone, HUNDREDTHS) == round(after, HUNDREDTHS):
+        return (
+            "The data-driven correction makes no difference here: in free run on the test records the error is "
+            f"{after:.{HUNDREDTHS}f} mV with and without it. Use the {view.corrected} alone."
+        )
     if corrected is not None and view.corrected != view.chosen and corrected < min(before, after):
         between, last = _distinct_mv(corrected, after)
         return (
