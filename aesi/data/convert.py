@@ -104,12 +104,17 @@ def _size_line(record: Measurement) -> list[str]:
             f"{ENOUGH_STEPS} steps of the current are clear, or the voltage does not follow them; --cell FILE checks "
             "it."
         ]
-    low, high = (each / resistance for each in USUAL_RESISTANCE_OHM_AH)
+    low, high = (_plain(each / resistance, 2) for each in USUAL_RESISTANCE_OHM_AH)
     return [
-        f"Steps of the current show {1e3 * resistance:.3g} mohm, as cells of {low:.2g} to {high:.2g} Ah do; if it is "
+        f"Steps of the current show {_plain(1e3 * resistance, 3)} mohm, as cells of {low} to {high} Ah do; if it is "
         "none of these, the current is in another unit than A (--unit current_a=...), or scaled, or, of a larger cell, "
         "the voltage was taken with the drop of its leads; --cell FILE checks it."
     ]
+
+
+def _plain(value: float, digits: int) -> str:
+    """A number to so many significant digits, without an exponent up to a million: '140' and not '1.4e+02'."""
+    return f"{float(f'{value:.{digits}g}'):g}"
 
 
 def _range(values: Array, unit: str) -> str:

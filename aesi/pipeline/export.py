@@ -248,13 +248,21 @@ def parameter_values(soc0: float = 1.0) -> pybamm.ParameterValues:
 
 
 def simulation(time_s=None, current_a=None, soc0: float = 1.0, model=pybamm.lithium_ion.SPMe) -> pybamm.Simulation:
-    """PyBaMM's simulation under a current (A) that is a straight line between the times (s); 1C without."""
+    """PyBaMM's simulation under a current (A) that is a straight line between the times (s); 1C without.
+
+    Solve a current by solve() or solve(t_eval=time_s): with solve([0, end]) PyBaMM may step over pulses after a rest.
+    """
     values = parameter_values(soc0)
     if time_s is not None:
         current = pybamm.Interpolant(np.asarray(time_s, float), np.asarray(current_a, float), pybamm.t)
         values.update({{"Current function [A]": current}})
+    physics = model(options=OPTIONS)
     points = {{"x_n": 30, "x_s": 20, "x_p": 30, "r_n": 60, "r_p": 60}}  # the default 20 a particle miss by millivolts
-    return pybamm.Simulation(model(options=OPTIONS), parameter_values=values, var_pts=points)
+    meshes = dict(physics.default_submesh_types)
+    for side in ("negative", "positive"):  # closer at the surface, where even ones miss a step by millivolts
+        graded = {{"side": "right", "stretch": 2.0}}
+        meshes[f"{{side}} particle"] = pybamm.MeshGenerator(pybamm.Exponential1DSubMesh, submesh_params=graded)
+    return pybamm.Simulation(physics, parameter_values=values, var_pts=points, submesh_types=meshes)
 
 
 if __name__ == "__main__":

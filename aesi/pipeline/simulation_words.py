@@ -17,6 +17,8 @@ from aesi.records import Measurement, Run
 
 SOC_DIGITS = 3
 """Decimals of a state of charge in a note."""
+VOLTAGE_DIGITS = 3
+"""Decimals of a voltage in a note, V. A limit that is left by less than they show is not said to be left."""
 TOLD_SD = 0.01
 """Change of state of charge for which a note gives the change of the voltage. A convention."""
 
@@ -60,10 +62,12 @@ def simulated_record_sentences(
             f"{_physics_error_clause(record, rms(error), alone_v)}."
         )
     beyond = (soc < -GIVEN_SD) | (soc > 1.0 + GIVEN_SD)  # as closely as any is known
-    low, high = voltage_v < cell.lower_voltage_v, voltage_v > cell.upper_voltage_v
+    unseen_v = 0.5 * 10.0**-VOLTAGE_DIGITS  # a full cell at rest is at its limit, give or take microvolts
+    low, high = voltage_v < cell.lower_voltage_v - unseen_v, voltage_v > cell.upper_voltage_v + unseen_v
     limits = f"the cell's {cell.lower_voltage_v:g} to {cell.upper_voltage_v:g} V"
     left = [
-        f"{side} {limit:g} V first at {stamp(record.time_s[int(np.argmax(rows))])} s, {furthest} {voltage_v[at]:.3f} "
+        f"{side} {limit:g} V first at {stamp(record.time_s[int(np.argmax(rows))])} s, {furthest} "
+        f"{voltage_v[at]:.{VOLTAGE_DIGITS}f} "
         f"V at {stamp(record.time_s[at])} s"
         for side, limit, rows, furthest, at in (
             ("below", cell.lower_voltage_v, low, "down to", int(np.argmin(voltage_v))),

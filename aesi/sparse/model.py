@@ -144,9 +144,12 @@ class SparseModel:
         return self.scaling.is_outside(self._variables(series))
 
     def kept(self, series: ErrorSeries) -> Array:
-        """(n,) share of the correction that is applied along a record, w of fade.py; 1 where it does not fade."""
+        """(n,) share of the correction that is applied along a record, w of fade.py; 1 where it does not fade, 0 of one
+        that helped on no left-out drive (amplitude 0)."""
         if self.fade is None:
             return np.ones(len(series))
+        if self.fade.amplitude == 0.0:
+            return np.zeros(len(series))
         return self.fade.kept(*self._fade_inputs(self._variables(series), series))
 
     def to_dict(self) -> dict[str, Any]:

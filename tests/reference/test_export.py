@@ -116,3 +116,23 @@ def test_a_calibrated_file_is_read_by_the_standard(tmp_path, name):
     shipped = Path(__file__).resolve().parents[2] / "experiments" / "cells" / f"{name}.bpx.json"
     export(shipped, out, "bpx")
     bpx.parse_bpx_file(str(out))
+
+
+def test_the_script_missed_steps_of_a_drive_by_millivolts(cell, tmp_path):
+    script = runpy.run_path(str(export(saved(cell, (), tmp_path), tmp_path / "found.py", "pybamm").files[0]))
+    time_s = np.arange(0.0, 121.0)
+    current_a = np.select([time_s < 20.0, time_s < 60.0, time_s < 80.0], [0.0, -4.5, 14.0], 2.0)
+    solution = script["simulation"](time_s, current_a, soc0=0.7).solve(t_eval=time_s, t_interp=time_s)
+    ours = aesi.simulate(cell, time_s, current_a, soc0=0.7).voltage_v
+    assert 1e3 * np.abs(np.asarray(solution["Voltage [V]"](time_s)) - ours).max() < 2.5
+
+
+def test_the_script_did_not_say_how_pulses_are_stepped_over(cell, tmp_path):
+    """104 mV and the whole charge of two pulses were lost by solve([0, end]), as PyBaMM's examples solve."""
+    script = runpy.run_path(str(export(saved(cell, (), tmp_path), tmp_path / "found.py", "pybamm").files[0]))
+    assert "Solve a current by solve()" in script["simulation"].__doc__
+    time_s = np.arange(0.0, 1801.0)
+    current_a = np.where(np.isin(time_s // 10, (60, 120)), 15.0, 0.0)
+    solution = script["simulation"](time_s, current_a, soc0=0.7).solve()
+    passed_ah = float(solution["Discharge capacity [A.h]"](time_s[-1]))
+    assert passed_ah == pytest.approx(np.trapezoid(current_a, time_s) / 3600.0, rel=2e-3)

@@ -56,7 +56,7 @@ class FileOutcome:
     that of `after`, with its 95 % block-bootstrap interval, V; NaN where one of them has no voltage.  emptied_s : state
     -> time at which its simulation ran out of lithium or salt, s; only states that did.
     start_slope_v : (n,) V, change of the voltage of `after` by one standard deviation of an initial state that was not
-    fitted; None where it was fitted.
+    fitted; None where it was fitted.  at_its_temperature : whether the record has a temperature.
     """
 
     name: str
@@ -71,6 +71,7 @@ class FileOutcome:
     emptied_s: Mapping[State, float] = field(default_factory=dict)
     start_slope_v: Array | None = None
     unsimulated: Mapping[State, str] = field(default_factory=dict)
+    at_its_temperature: bool = False
 
     def residual_v(self, state: State) -> Array:
         """(n,) V, measured - model."""
@@ -185,6 +186,7 @@ def _outcome(
         gain,
         emptied_s,
         unsimulated=unsimulated,
+        at_its_temperature=data.temperature_degc is not None,
     )
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from aesi.advice import listed
 from aesi.constants import MV_PER_V
 from aesi.numerics.metrics import rms
 from aesi.tracer.decide.model_to_write import AS_GOOD
@@ -126,6 +127,14 @@ def _advice(files: Sequence[FileOutcome]) -> str:
     if ran_out:
         where = ", ".join(ran_out)
         return f"The model runs empty or full on {where}: check capacity (soh), soc0 and temperature first."
+    if all(f.at_its_temperature for f in files if f.part == "fit"):
+        without = [f.name for f in _tests(files) if not f.at_its_temperature]
+        if without:
+            # The finding holds at the measured temperatures; under load a cell is kelvins warmer than declared.
+            return (
+                f"The fitted records were simulated at their measured temperatures, and {listed(without)} at that of "
+                "the cell's file: give its own first (a column temperature_degc)."
+            )
     return "Another effect is missing, or a further one: search again with the test part among the data (--data)."
 
 

@@ -77,5 +77,6 @@ def test_a_current_in_kiloamperes_or_c_rates_was_written_without_a_word(tmp_path
         return line
 
     assert told(1.0).startswith("Steps of the current show 20 mohm, as cells of 1 to 45 Ah do; if it is none")
-    assert "show 2e+04 mohm, as cells of 0.001 to 0.045 Ah do" in told(1e-3)
+    assert "show 20000 mohm, as cells of 0.001 to 0.045 Ah do" in told(1e-3)
+    assert "show 4 mohm, as cells of 5 to 220 Ah do" in told(5.0)  # not 2.2e+02
     assert "show 100 mohm, as cells of 0.2 to 9 Ah do" in told(0.2)

@@ -34,6 +34,16 @@ def test_a_changed_cell_agrees_with_pybamm_through_pulses(cell):
     assert 1e3 * np.abs(plain - check.pybamm_v).max() > 2 * check.max_mv  # the change reached PyBaMM
 
 
+@pytest.mark.parametrize(("model", "most_mv"), [("SPMe", 2.0), ("DFN", 4.0)])
+def test_steps_of_a_drive_were_missed_by_the_mesh_of_pybamm(cell, model, most_mv):
+    """By 7.9 and 9.4 mV, which looked like an error of this package. 200 graded points in a particle, instead of the 60
+    here, agree with it to 0.4 mV (SPMe) and 1.5 mV (DFN)."""
+    time_s = np.arange(0.0, 121.0)
+    current_a = np.select([time_s < 20.0, time_s < 60.0, time_s < 80.0], [0.0, -6.5, 14.0], 2.0)
+    check = aesi.cross_check(cell, time_s, current_a, soc0=0.7, model=model)
+    assert check.max_mv < most_mv
+
+
 def test_a_run_that_ends_early_is_not_compared(cell):
     time_s = np.arange(0.0, 7201.0, 60.0)
     with pytest.raises(SimulationError):

@@ -384,6 +384,21 @@ def test_a_cold_record_had_no_correction_and_nothing_said_so(fading, data, tmp_p
     assert "of the correction" not in said
 
 
+def test_a_correction_that_is_applied_nowhere_was_said_to_fade_to_a_share_of_its_size(fading, data, tmp_path):
+    region = fading.correction.fade.region
+    folder = replace(fading, correction=replace(fading.correction, fade=Fade(0.0, region))).save(
+        tmp_path / "m"
+    )
+    table = pd.DataFrame({"time_s": data.time_s, "current_a": data.current_a, "voltage_v": data.voltage_v})
+    table.to_csv(tmp_path / "drive.csv", index=False)
+    said = []
+    asked = ProfileRequest(soc0=SOC0)
+    predict_file(folder, tmp_path / "drive.csv", tmp_path / "out.csv", asked, say_notes=said.extend)
+    assert any("none of the correction is applied: this is the physics model." in note for note in said)
+    assert not any("fades" in note for note in said)
+    assert (pd.read_csv(tmp_path / "out.csv")["weight"] == 0.0).all()
+
+
 def test_a_model_that_does_not_fade_keeps_all_and_one_without_a_correction_has_none_to_keep(model, data):
     assert (model.predict(data.time_s, data.current_a, SOC0).weight == 1.0).all()
     physics = HybridModel(model.cell)
@@ -878,6 +893,14 @@ def test_a_voltage_of_no_cell_was_told_without_when_it_left_the_limits(model, da
     voltage[20] = 5.0
     *_, last = simulated_record_sentences(model.cell, data, voltage, np.linspace(0.9, 0.5, len(data)))
     assert last.endswith(f"V first at {data.time_s[20]:g} s, up to 5.000 V at {data.time_s[20]:g} s.")
+
+
+def test_a_full_cell_at_rest_was_told_as_above_its_limit_by_microvolts(model, data):
+    voltage = np.full(len(data), 3.9)
+    for beyond_v, said in ((1e-8, False), (4e-4, False), (1e-3, True)):
+        voltage[0], voltage[-1] = model.cell.upper_voltage_v + beyond_v, model.cell.lower_voltage_v - beyond_v
+        told = simulated_record_sentences(model.cell, data, voltage, np.linspace(1.0, 0.5, len(data)))
+        assert any("a voltage outside" in note for note in told) == said
 
 
 def test_by_how_much_a_record_emptied_or_overfilled_a_cell_was_not_told(model, data):

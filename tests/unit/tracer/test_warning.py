@@ -39,6 +39,17 @@ def test_what_explains_the_data_and_not_the_test_part_is_contradicted(word, effe
     assert ("the finding" in sentence) == bool(effects)
 
 
+def test_a_test_record_without_its_temperature_was_said_to_lack_an_effect():
+    """A cell that warms by 2 K under load: 2.49 mV beyond the noise, 0.2 with its thermocouple given."""
+    right, wrong = NOISE_V * np.hypot(1.0, 0.5), NOISE_V * np.hypot(1.0, 2.0)
+    fitted, test = outcome(right, part="fit"), outcome(wrong)
+    for at_its, advised in (((True, False), True), ((False, False), False), ((True, True), False)):
+        files = [replace(f, at_its_temperature=has) for f, has in zip((fitted, test), at_its, strict=True)]
+        (sentence,) = warnings(files, verdict("found", "series_resistance"))
+        assert ("drive at that of the cell's file: give its own first" in sentence) == advised
+        assert ("Another effect is missing" in sentence) != advised
+
+
 def test_a_finding_that_is_not_written_was_contradicted_by_the_declared_model():
     right, wrong = NOISE_V * np.hypot(1.0, 0.5), NOISE_V * np.hypot(1.0, 2.0)
     said = verdict("found", "series_resistance")

@@ -90,7 +90,13 @@ def _gain_sentence(view: RunView) -> str:
             f"mV RMSE on the test records{declared}."
         )
     corrected = _figure(view.model(view.corrected), "free_run", "test_rmse_mv")
-    if corrected is not None and _is_less(corrected, before) and not _is_less(after, corrected):
+    alone = before if corrected is None or view.corrected == view.physics else corrected
+    if not _is_less(alone, after) and not _is_less(after, alone):
+        return (
+            "The data-driven correction makes no difference here: in free run on the test records the error is "
+            f"{after:.{HUNDREDTHS}f} mV with and without it. Use the {view.corrected} alone."
+        )
+    if corrected is not None and _is_less(corrected, before) and _is_less(corrected, after):
         between, last = _distinct_mv(corrected, after)
         return (
             f"{ON_TEST} is {between} mV with the {view.corrected} and {before:.1f} mV with the {view.physics} as "
@@ -98,10 +104,9 @@ def _gain_sentence(view: RunView) -> str:
         )
     first, last = _distinct_mv(before, after)
     if not _is_less(after, before):
-        error = f"grows from {first} mV to {last} mV" if _is_less(before, after) else f"stays at {last} mV"
         return (
-            "The data-driven correction does not help here: in free run on the test records the error "
-            f"{error}. Use the {view.physics} alone."
+            "The data-driven correction does not help here: in free run on the test records the error grows from "
+            f"{first} mV to {last} mV. Use the {view.physics} alone."
         )
     share = own_share(view)
     if share is None or corrected is None or view.corrected == view.physics:
