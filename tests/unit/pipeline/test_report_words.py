@@ -443,7 +443,7 @@ def test_a_refit_that_does_as_well_is_said_to(views):
             (
                 "the voltage error beyond sensor noise is 0.30 mV in cross-validation",
                 "account for up to 0.80 mV",
-                "no reason to change",
+                "no reason to add",
             ),
         ),
         ("found", ("with the finding added, the voltage", "is 0.30 mV", "up to 0.80 mV count as explained")),

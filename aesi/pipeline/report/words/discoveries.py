@@ -211,7 +211,7 @@ def reason_finding(discovery: Mapping[str, Any]) -> str:
         so = (
             "; what the known-good records lack too, the verdict does not tell: leave --good out to ask for that."
             if discovery.get("good")
-            else ", so these data give no reason to change the model."
+            else ", so these data give no reason to add to the model."
         )
         return f"Why: {amount}. The noise and the accuracy of any such model account for up to {allowed:.2f} mV{so}"
     if discovery["verdict"] == "found":
