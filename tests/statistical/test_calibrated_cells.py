@@ -14,11 +14,6 @@ from aesi.errors import DataError
 from aesi.physics import Cell, simulate
 
 CELLS = Path(__file__).resolve().parents[2] / "experiments" / "cells"
-ENDS_ELSEWHERE = pytest.mark.xfail(
-    strict=True,
-    reason="its descents end at other maxima of the posterior since diffusivities are stepped continuously, 4.8 mV "
-    "away at 25 degC and 28 at 5; the file stays until the tables that rest on it are measured again",
-)
 
 
 @pytest.mark.slow
@@ -26,7 +21,7 @@ ENDS_ELSEWHERE = pytest.mark.xfail(
     ("name", "file", "data"),
     [
         ("hg2", "lg_18650hg2", "lg_18650hg2"),
-        pytest.param("hg2_25degc", "lg_18650hg2_25degc", "lg_18650hg2", marks=ENDS_ELSEWHERE),
+        ("hg2_25degc", "lg_18650hg2_25degc", "lg_18650hg2"),
         ("panasonic", "panasonic_ncr18650pf", "panasonic_ncr18650pf"),
         ("panasonic_25degc", "panasonic_ncr18650pf_25degc", "panasonic_ncr18650pf"),
         ("hg2_cold", "lg_18650hg2_cold", "lg_18650hg2"),
