@@ -300,9 +300,8 @@ def prepared_model(
     )
     declared, start = start, with_activation(start)
     full_discharges = () if conditions.same_cell else full_discharge_numbers(cell, records)
-    smaller = other_sizes(
-        cell, records
-    )  # whose capacity is not the one that the largest full discharge shows
+    # Their capacity is not the one that the largest full discharge shows.
+    smaller = other_sizes(cell, records)
     of_size = (records[i] for i in full_discharges if records[i].name not in smaller)
     potential_sentences = filter(None, (other_materials_sentence(start, record) for record in of_size))
     cut_names = [

@@ -179,7 +179,7 @@ def explain_part(names: Sequence[str], discovery: Mapping[str, Any]) -> str:
     """The predicate of effects that are named with an `unknown`."""
     explain = "explains" if len(names) == 1 else "explain"
     if fit_explains(discovery):
-        return f"{explain} the error, but these data do not show that nothing else does"
+        return f"{explain} the error, but other explanations are not excluded"
     return f"{explain} a part of the error"
 
 
