@@ -39,6 +39,7 @@ from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.report.candidate_effects import CandidateEffect, ranking
 from aesi.tracer.report.explain import explain
+from aesi.tracer.report.other_hold import other_hold_warnings
 from aesi.tracer.report.outcome import FileOutcome, State, States, depletion_notes, held_out_rmse_v, outcomes
 from aesi.tracer.report.own_parameters import OwnParameter, ages_told, own_parameters
 from aesi.tracer.report.tell_apart import telling_experiment
@@ -107,7 +108,8 @@ class Discovery:
     not_adopted : why the written model lacks the effects of the verdict, or is not the refit with the smallest error.
     notes : assumptions, and remarks on the records and the search.
     contradicted : whether an explanation of the data leaves a larger error on the test part than a right one may.
-    warnings : sentences on that; on records that contradict their own temperature; on a written model that is worse
+    warnings : sentences on that; on records that contradict their own temperature, or whose current seems to run
+    otherwise between the rows than it was taken; on a written model that is worse
     than another one, on the test part or on the fitted rows; and on a test part without load.
     other_temperature : names of the records, tests included, that contradict their temperature and that no model
     fitted at that temperature explains.
@@ -305,6 +307,7 @@ def _discovery_of(
         contradicted=contradicted_by_v(explained, verdict) is not None,
         warnings=(
             *(other.sentence(name) for name, other in at_other.items()),
+            *other_hold_warnings(evidence.paths.get("tight", evidence.path)),
             *warnings(files, verdict, REST_C_RATE * problem.cell.capacity_ah, explained),
         ),
         other_temperature=tuple(at_other),

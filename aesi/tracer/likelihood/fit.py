@@ -133,13 +133,13 @@ class HypothesisFitter:
     def closest(self, starts: Sequence[Array], size: Size) -> Array:
         """The one of these coordinates from which a descent at this size of the model error has least to go; the first
         of equal ones."""
-        objective = _Whitened(self, size, np.ones(len(self.problem.measured), dtype=bool))
+        return min(starts, key=lambda x: self.cost(np.clip(x, self.low, self.high), size))
 
-        def cost(x: Array) -> float:
-            residual = objective.residual(np.clip(x, self.low, self.high))
-            return np.inf if residual is None else float(residual @ residual)
-
-        return min(starts, key=cost)
+    def cost(self, x: Array, size: Size) -> float:
+        """Minus the logarithm of the posterior density at x, up to a constant, nats, at this size of the model error;
+        infinite where the model fails."""
+        residual = _Whitened(self, size, np.ones(len(self.problem.measured), dtype=bool)).residual(x)
+        return np.inf if residual is None else 0.5 * float(residual @ residual)
 
     def descend(
         self,
