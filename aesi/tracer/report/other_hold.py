@@ -66,13 +66,14 @@ def _warning(path: Path, k: int) -> str:
         return fitter.cost(x, size), np.inf if left_v is None else MV_PER_V * rms(left_v[problem.slices[k]])
 
     now_cost, now_mv = refitted(problem, chosen)
-    cost, left_mv = min(refitted(otherwise, one) for one in _best_by_names(path))
+    (cost, left_mv), names = min((refitted(otherwise, one), one.hypothesis) for one in _best_by_names(path))
     if not cost <= now_cost - ALIKE_NATS or not left_mv < now_mv:
         return ""
+    model = " + ".join(names) or "no effect"
     return (
         f"with the current {WORDS[held.hold]} the fitted rows of {held.name} are explained better "
-        f"({left_mv:.3g} mV RMS are left instead of {now_mv:.3g}): the file seems to be written so, and the verdict "
-        f"may rest on that alone. Declare it with {HOLD_OPTION.format(held.hold)}, and search again."
+        f"({left_mv:.3g} mV RMS are left by {model}, instead of {now_mv:.3g}): the file seems to be written so, and the "
+        f"verdict may rest on that alone. Declare it with {HOLD_OPTION.format(held.hold)}, and search again."
     )
 
 

@@ -46,7 +46,8 @@ def test_a_record_that_the_other_hold_explains_better_is_warned_of(made, declare
         assert warning.startswith("with the current constant since the row before")
         assert "Declare it with --hold backward" in warning
         left_mv, taken_mv = map(
-            float, re.search(r"\((\S+) mV RMS are left instead of (\S+)\)", warning).groups()
+            float,
+            re.search(r"\((\S+) mV RMS are left by series_resistance, instead of (\S+)\)", warning).groups(),
         )
         assert 1e-3 * left_mv == pytest.approx(NOISE_V, rel=0.05)
         assert left_mv < taken_mv
