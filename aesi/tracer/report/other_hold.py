@@ -24,8 +24,8 @@ WORDS: Mapping[Hold, str] = {"linear": "linear between rows", "backward": "const
 
 
 def other_hold_warnings(path: Path) -> tuple[str, ...]:
-    """A sentence on each record whose hold was not declared, where with the other one the chosen hypothesis, or the
-    best of fewer effects, leaves less than the chosen one and is more probable by `ALIKE_NATS`: the least that tells
+    """A sentence on each record whose hold was not declared, where with the other one a hypothesis of fewer effects,
+    or else the chosen one, leaves less than the chosen one and is more probable by `ALIKE_NATS`: the least that tells
     two hypotheses apart.
 
     Rows of 1 s whose current was held, taken as straight lines, have been explained by a wrong electrolyte and porosity
@@ -66,24 +66,22 @@ def _warning(path: Path, k: int) -> str:
         return fitter.cost(x, size), np.inf if left_v is None else MV_PER_V * rms(left_v[problem.slices[k]])
 
     now_cost, now_mv = refitted(problem, chosen)
-    (cost, left_mv), names = min((refitted(otherwise, one), one.hypothesis) for one in _best_by_names(path))
-    if not cost <= now_cost - ALIKE_NATS or not left_mv < now_mv:
-        return ""
-    model = " + ".join(names) or "no effect"
-    return (
-        f"with the current {WORDS[held.hold]} the fitted rows of {held.name} are explained better "
-        f"({left_mv:.3g} mV RMS are left by {model}, instead of {now_mv:.3g}): the file seems to be written so, and the "
-        f"verdict may rest on that alone. Declare it with {HOLD_OPTION.format(held.hold)}, and search again."
-    )
+    for one in _no_larger(path):
+        cost, left_mv = refitted(otherwise, one)
+        if cost <= now_cost - ALIKE_NATS and left_mv < now_mv:
+            model = " + ".join(one.hypothesis) or "no effect"
+            return (
+                f"with the current {WORDS[held.hold]} the fitted rows of {held.name} are explained better "
+                f"({left_mv:.3g} mV RMS are left by {model}, instead of {now_mv:.3g}): the file seems to be written "
+                f"so, and the verdict may rest on that alone. Declare it with {HOLD_OPTION.format(held.hold)}, and "
+                "search again."
+            )
+    return ""
 
 
-def _best_by_names(path: Path) -> list[FittedHypothesis]:
-    """The chosen hypothesis, and of those with fewer effects the fit of each number that says most of unseen data."""
-    best = {len(path.chosen.hypothesis): path.chosen}
-    for one in path.explanations():
-        names = len(one.hypothesis)
-        if not isinstance(one, FittedHypothesis) or names >= len(path.chosen.hypothesis):
-            continue
-        if names not in best or one.score.total > best[names].score.total:
-            best[names] = one
-    return list(best.values())
+def _no_larger(path: Path) -> list[FittedHypothesis]:
+    """The hypotheses that were fitted with fewer effects than the chosen one, of equally many the best first, and the
+    chosen one last."""
+    fits = [one for one in path.explanations() if isinstance(one, FittedHypothesis)]
+    fewer = [one for one in fits if len(one.hypothesis) < len(path.chosen.hypothesis)]
+    return [*sorted(fewer, key=lambda one: (len(one.hypothesis), -one.score.total)), path.chosen]
