@@ -6,7 +6,9 @@ SI units and seconds; current is positive on discharge; voltage error e = V_meas
 from aesi.records.error_series import INPUT_NAMES, ErrorModel, ErrorSeries, FreeRun
 from aesi.records.failed import Failed
 from aesi.records.measurement import (
+    HOLD_WORDS,
     LABORATORY,
+    OTHER_HOLD,
     Hold,
     Measurement,
     Spectrum,
@@ -20,8 +22,10 @@ from aesi.records.run import Run
 from aesi.records.split import ROLES, HeldOutDrive, LeftOutDrives, Role, Split
 
 __all__ = [
+    "HOLD_WORDS",
     "INPUT_NAMES",
     "LABORATORY",
+    "OTHER_HOLD",
     "ROLES",
     "ErrorModel",
     "ErrorSeries",

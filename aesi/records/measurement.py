@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, get_args
 
@@ -20,6 +21,12 @@ if TYPE_CHECKING:
 
 Hold = Literal["linear", "backward"]
 """How the current runs between samples: straight lines, or constant since the row before (as loggers do)."""
+HOLD_WORDS: Mapping[Hold, str] = {
+    "linear": "linear between rows",
+    "backward": "constant since the row before",
+}
+"""What follows 'the current is' for each hold."""
+OTHER_HOLD: Mapping[Hold, Hold] = {"linear": "backward", "backward": "linear"}
 LABORATORY = "virtual laboratory (PyBaMM)"
 """Source of a record that was simulated, not measured."""
 
@@ -40,12 +47,12 @@ def hold_sentence(
 
     option : how a user sets another hold, with {} in its place.  saved : whether the hold is that of a saved model.
     """
-    words = {"linear": "as linear between rows", "backward": "constant since the row before"}
+    taken = f"the current is taken {'as ' if hold == 'linear' else ''}{HOLD_WORDS[hold]}"
     if declared:
-        return f"{name}: the current is taken {words[hold]}, as declared."
-    writer, other = {"linear": ("", "backward"), "backward": (", as loggers write", "linear")}[hold]
+        return f"{name}: {taken}, as declared."
+    writer = ", as loggers write" if hold == "backward" else ""
     writer = ", as the saved model was made" if saved else writer
-    return f"{name}: the current is taken {words[hold]}{writer}; {option.format(other)} takes it otherwise."
+    return f"{name}: {taken}{writer}; {option.format(OTHER_HOLD[hold])} takes it otherwise."
 
 
 def measured_on_case(temperature_degc: Array) -> bool:

@@ -6,7 +6,7 @@ and not in the cold.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -45,17 +45,15 @@ def capacity_test_ah(cell: Cell, record: Measurement) -> float | None:
 def other_sizes(cell: Cell, records: Sequence[Measurement], file_ah: float = 0.0) -> dict[str, float]:
     """Name of a record -> charge of its full discharge, Ah, for those that take less than `OF_ONE_CELL` of the largest
     one; empty where none does.  file_ah : capacity in the cell's file, which counts as a full discharge; 0 for none."""
-    capacities = _capacities_ah(cell, records)
-    largest = max([file_ah, *capacities.values()])
-    return {name: charge for name, charge in capacities.items() if charge < OF_ONE_CELL * largest}
+    return _smaller(_capacities_ah(cell, records), file_ah)
 
 
 def sizes_sentence(cell: Cell, records: Sequence[Measurement], file_ah: float = 0.0) -> str:
     """A sentence on the records that `other_sizes` has; '' where there is none."""
-    others = other_sizes(cell, records, file_ah)
+    capacities = _capacities_ah(cell, records)
+    others = _smaller(capacities, file_ah)
     if not others:
         return ""
-    capacities = _capacities_ah(cell, records)
     name = max(capacities, key=lambda one: capacities[one])
     charges = listed([f"{charge:.3g}" for charge in others.values()])
     if file_ah >= capacities[name]:
@@ -73,3 +71,8 @@ def sizes_sentence(cell: Cell, records: Sequence[Measurement], file_ah: float = 
 def _capacities_ah(cell: Cell, records: Sequence[Measurement]) -> dict[str, float]:
     found = {record.name: capacity_test_ah(cell, record) for record in records}
     return {name: charge for name, charge in found.items() if charge is not None}
+
+
+def _smaller(capacities_ah: Mapping[str, float], file_ah: float) -> dict[str, float]:
+    largest = max([file_ah, *capacities_ah.values()])
+    return {name: charge for name, charge in capacities_ah.items() if charge < OF_ONE_CELL * largest}

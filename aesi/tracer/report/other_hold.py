@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from aesi.constants import MV_PER_V
 from aesi.errors import AesiError
 from aesi.numerics.metrics import rms
-from aesi.records import Hold
+from aesi.records import HOLD_WORDS, OTHER_HOLD
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import HOLD_OPTION
 from aesi.tracer.likelihood.fit import FittedHypothesis, HypothesisFitter
@@ -18,9 +18,6 @@ from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.search.hypothesis_fits import FIT_ROUNDS
 from aesi.tracer.search.path import Path
 from aesi.tracer.search.plausible import ALIKE_NATS
-
-OTHER: Mapping[Hold, Hold] = {"linear": "backward", "backward": "linear"}
-WORDS: Mapping[Hold, str] = {"linear": "linear between rows", "backward": "constant since the row before"}
 
 
 def other_hold_warnings(path: Path) -> tuple[str, ...]:
@@ -44,7 +41,7 @@ def _undeclared(problem: InverseProblem) -> Iterator[int]:
     for k, record in enumerate(problem.records):
         if record.data.hold is not None or record.thin.time_s is not record.data.time_s:
             continue
-        held = replace(record, thin_hold=OTHER[record.hold])
+        held = replace(record, thin_hold=OTHER_HOLD[record.hold])
         try:
             one, other = (declared.simulated(r, k, thin=True).voltage_v[: r.n_fit] for r in (record, held))
         except AesiError:
@@ -56,7 +53,7 @@ def _undeclared(problem: InverseProblem) -> Iterator[int]:
 def _warning(path: Path, k: int) -> str:
     problem, size, chosen = path.problem, path.chosen.score.size, path.chosen
     taken = problem.records[k].hold
-    held = replace(problem.records[k], hold=OTHER[taken], thin_hold=OTHER[taken])
+    held = replace(problem.records[k], hold=OTHER_HOLD[taken], thin_hold=OTHER_HOLD[taken])
     otherwise = replace(problem, records=(*problem.records[:k], held, *problem.records[k + 1 :]))
 
     def refitted(one: InverseProblem, fit: FittedHypothesis) -> tuple[float, float]:
@@ -71,7 +68,7 @@ def _warning(path: Path, k: int) -> str:
         if cost <= now_cost - ALIKE_NATS and left_mv < now_mv:
             model = " + ".join(one.hypothesis) or "no effect"
             return (
-                f"with the current {WORDS[held.hold]} the fitted rows of {held.name} are explained better "
+                f"with the current {HOLD_WORDS[held.hold]} the fitted rows of {held.name} are explained better "
                 f"({left_mv:.3g} mV RMS are left by {model}, instead of {now_mv:.3g}): the file seems to be written "
                 f"so, and the verdict may rest on that alone. Declare it with {HOLD_OPTION.format(held.hold)}, and "
                 "search again."
