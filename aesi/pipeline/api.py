@@ -79,7 +79,8 @@ def discover(
     tests : measurements for the test only; nothing is fitted to them.
     soc0 : state of charge at the first sample, 0 to 1; None reads it from the voltage.
     max_effects : most effects that may be added, 0 to 10.  seed : of the bootstrap intervals.
-    hold : how the current runs between rows; None takes the declaration of each record.
+    hold : how the current runs between rows; None takes the declaration of each record, and of one without what
+    explains it better.
     effect_files : Python files with effects of your own; they are executed, so name only files that you trust.
     only, without : ids of the effects to try, or not to try; parameters that excluded effects restate stay fixed.
     model : "espm" or "dfn" for every hypothesis; None takes the porous electrode where it differs notably from the

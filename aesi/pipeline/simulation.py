@@ -242,12 +242,13 @@ def _profiled_model(
     record = _record(profile, file, asked.hold)
     check_belongs(model.cell, [record])
     start, hold = _start(model, record, asked.soc0), model.hold_of(record)
+    saved = "" if model.hold is None else "as the saved model was made"
     say(
         [
             *model.cell.unread,
             *fitted_record_sentences(model.cell, record, asked.soh, model.effects),
             start.sentence,
-            hold_sentence(record.name, hold, asked.hold is not None, saved=model.hold is not None),
+            hold_sentence(record.name, hold, asked.hold is not None, why=saved),
             temperature_sentence(model.cell, record, model.effects),
             *temperature_range_sentences(model.cell, [record.temperature_degc], model.effects),
             *contradiction_sentences(model, record, start.soc, hold),

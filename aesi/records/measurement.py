@@ -40,19 +40,17 @@ def assumed_hold(time_s: Array) -> Hold:
     return "backward" if float(np.diff(time_s).max(initial=0.0)) > SLOW_SAMPLING_S else "linear"
 
 
-def hold_sentence(
-    name: str, hold: Hold, declared: bool, option: str = "--hold {}", *, saved: bool = False
-) -> str:
+def hold_sentence(name: str, hold: Hold, declared: bool, option: str = "--hold {}", *, why: str = "") -> str:
     """A sentence on the hold that was used.
 
-    option : how a user sets another hold, with {} in its place.  saved : whether the hold is that of a saved model.
+    option : how a user sets another hold, with {} in its place.  why : clause, why it was taken if nobody declared it;
+    empty where nothing but the rows' distance says.
     """
     taken = f"the current is taken {'as ' if hold == 'linear' else ''}{HOLD_WORDS[hold]}"
     if declared:
         return f"{name}: {taken}, as declared."
-    writer = ", as loggers write" if hold == "backward" else ""
-    writer = ", as the saved model was made" if saved else writer
-    return f"{name}: {taken}{writer}; {option.format(OTHER_HOLD[hold])} takes it otherwise."
+    reason = why or ("as loggers write" if hold == "backward" else "")
+    return f"{name}: {', '.join(filter(None, (taken, reason)))}; {option.format(OTHER_HOLD[hold])} takes it otherwise."
 
 
 def measured_on_case(temperature_degc: Array) -> bool:

@@ -7,6 +7,7 @@ report, decide, search, likelihood, case.
     case/trust             how far the values in the cell file are believed
     case/problem           records, cell, and the parameters that hypotheses may move   -> InverseProblem
     decide/model_choice    which model of the cell: single particle or porous electrode
+    decide/other_hold      records whose current runs otherwise between their rows, which are searched again
     decide/evidence        searches at several trusts, verdict, and the written model   -> Evidence
       (decide/good_records   the same, where good records are given for comparison)
       (decide/shared_effects effects that the good records show too are no difference)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path as FilePath
+from types import MappingProxyType
 
 import numpy as np
 
@@ -23,11 +24,13 @@ from aesi.records import Hold, Measurement
 from aesi.tracer.case.checks import check_compared, check_record, check_same_cell
 from aesi.tracer.case.energies import ACTIVATION_ENERGIES
 from aesi.tracer.case.free_parameter import RECORD_OWNERS, by_owner
+from aesi.tracer.case.inferred_hold import InferredHold, hold_of_test
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import PreparedRecord, prepare_all, prepare_test
 from aesi.tracer.decide.evidence import Answer, Evidence, searched_answer
 from aesi.tracer.decide.good_records import searched_answer_beside
 from aesi.tracer.decide.model_choice import ModelChoice, with_model
+from aesi.tracer.decide.other_hold import inferred_holds
 from aesi.tracer.decide.temperatures import (
     contradicting_unseen,
     other_temperatures,
@@ -39,7 +42,6 @@ from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.report.candidate_effects import CandidateEffect, ranking
 from aesi.tracer.report.explain import explain
-from aesi.tracer.report.other_hold import other_hold_warnings
 from aesi.tracer.report.outcome import FileOutcome, State, States, depletion_notes, held_out_rmse_v, outcomes
 from aesi.tracer.report.own_parameters import OwnParameter, ages_told, own_parameters
 from aesi.tracer.report.tell_apart import telling_experiment
@@ -97,7 +99,8 @@ class Discovery:
     cell, held, model_effects : the written model: its cell, the effects that the cell's values contain, and the effects
     that a cell file cannot hold.
     soc0 : of the first record: fitted state of charge at the first row, in the stoichiometry windows of `cell`.
-    hold : how the current runs between the rows of all records, as they declare; None where they differ or do not.
+    hold : how the current runs between the rows of all records, as they declare or as was inferred; None where they
+    differ or do not.
     written : effects of the written model by id, with their parameters; they differ from the verdict's where these do
     not carry over.  own : model -> the declared parameters that were fitted, and their values.
     candidates : each effect that was simulated, best first.  files : errors by file and part.
@@ -108,8 +111,7 @@ class Discovery:
     not_adopted : why the written model lacks the effects of the verdict, or is not the refit with the smallest error.
     notes : assumptions, and remarks on the records and the search.
     contradicted : whether an explanation of the data leaves a larger error on the test part than a right one may.
-    warnings : sentences on that; on records that contradict their own temperature, or whose current seems to run
-    otherwise between the rows than it was taken; on a written model that is worse
+    warnings : sentences on that; on records that contradict their own temperature; on a written model that is worse
     than another one, on the test part or on the fitted rows; and on a test part without load.
     other_temperature : names of the records, tests included, that contradict their temperature and that no model
     fitted at that temperature explains.
@@ -173,6 +175,9 @@ def discover(
     good : records of the same cell that are known to be good. The search then is for effects that act on the
     measurements and not on these.
 
+    Where the data are explained better if the current of a record that declares no hold runs otherwise between its rows
+    than it was assumed to, they are searched again so.
+
     Raises DataError where the data cannot decide anything or do not belong to the cell.
     """
     began = time.perf_counter()
@@ -180,13 +185,29 @@ def discover(
         raise DataError("give at least one measurement to look at.")
     for data in (*measurements, *good, *tests):
         check_voltage(cell, data)
-    problem = inverse_problem(
-        cell, measurements, soc0, 0.0 if tests else holdout, effects, given, model or "espm", good
+    problem_with = partial(
+        inverse_problem,
+        cell,
+        measurements,
+        soc0,
+        0.0 if tests else holdout,
+        effects,
+        given,
+        model or "espm",
+        good,
     )
+
+    def tests_with(inferred: Mapping[int, InferredHold]) -> tuple[PreparedRecord, ...]:
+        holds = (hold_of_test(data, measurements, inferred.values()) for data in tests)
+        return tuple(
+            prepare_test(cell, data, measurements, soc0, given, hold)
+            for data, hold in zip(tests, holds, strict=True)
+        )
+
+    inferred: dict[int, InferredHold] = {}
+    problem, tested = problem_with(), tests_with(inferred)
     check_compared(problem)
-    records = problem.records
-    tested = tuple(prepare_test(cell, data, measurements, soc0, given) for data in tests)
-    declared = ModelState(problem)
+    records, declared = problem.records, ModelState(problem)
     for index, record in enumerate((*records, *tested)):
         run = declared.simulated(record, index if index < len(records) else None, thin=True)
         check_same_cell(problem, record, run)
@@ -203,8 +224,16 @@ def discover(
         return Archive(archive, context_of(one), other_model)
 
     evidence, choice = with_model(problem, model, search, archive_of, max_effects)
+    while others := inferred_holds(evidence.paths.get("tight", evidence.path)):
+        inferred |= others
+        evidence, choice = with_model(problem_with(inferred=inferred), model, search, archive_of, max_effects)
     found = _discovery_of(
-        evidence, choice, tested, spent.simulations, np.random.default_rng(seed), time.perf_counter() - began
+        evidence,
+        choice,
+        tests_with(inferred),
+        spent.simulations,
+        np.random.default_rng(seed),
+        time.perf_counter() - began,
     )
     return found if max_effects else replace(found, tried=())
 
@@ -218,12 +247,14 @@ def inverse_problem(
     given: Sequence[ActiveEffect] = (),
     model: ModelName = "espm",
     good: Sequence[Measurement] = (),
+    inferred: Mapping[int, InferredHold] = MappingProxyType({}),
 ) -> InverseProblem:
     """The problem that `discover` searches, from the same arguments.
 
+    inferred : number of a record -> how its current runs, where nobody declared that.
     Raises DataError where a record is too short or holds no load, and where an effect's id is reserved.
     """
-    records = prepare_all(cell, measurements, soc0, holdout, given, good)
+    records = prepare_all(cell, measurements, soc0, holdout, given, good, inferred)
     for record in records:
         check_record(cell, record)
     taken = next((name for name in effects if name in (*RECORD_OWNERS, ACTIVATION_ENERGIES)), None)
@@ -307,7 +338,6 @@ def _discovery_of(
         contradicted=contradicted_by_v(explained, verdict) is not None,
         warnings=(
             *(other.sentence(name) for name, other in at_other.items()),
-            *other_hold_warnings(evidence.paths.get("tight", evidence.path)),
             *warnings(files, verdict, REST_C_RATE * problem.cell.capacity_ah, explained),
         ),
         other_temperature=tuple(at_other),

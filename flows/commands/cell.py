@@ -339,7 +339,7 @@ def discover(
     max_effects: options.MaxEffects = 3,
     seed: options.Seed = 0,
     effect_file: options.EffectFiles = None,
-    hold: options.RecordHold = None,
+    hold: options.SoughtHold = None,
     only: Annotated[
         list[str] | None,
         typer.Option(

@@ -125,6 +125,11 @@ RecordHold = Annotated[
     Literal["linear", "backward"] | None, typer.Option("--hold", help=HOLD_HELP.format(""))
 ]
 """`HoldOption` of a command that fits: the rows of a record tell, also where --cell is a saved model."""
+SoughtHold = Annotated[
+    Literal["linear", "backward"] | None,
+    typer.Option("--hold", help=HOLD_HELP.format("what explains the data better, and where neither does, ")),
+]
+"""`RecordHold` of a command that seeks what explains the data."""
 
 
 def _no_key_twice(pairs: list[str] | None) -> list[str] | None:

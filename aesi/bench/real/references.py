@@ -57,7 +57,8 @@ def temperature_row(found: Discovery, record: Measurement, measured_degc: Array)
     K.
     """
     run = simulate(
-        found.cell, record.time_s, record.current_a, found.soc0, found.model_effects, None, record.hold_taken,
+        found.cell, record.time_s, record.current_a, found.soc0, found.model_effects, None,
+        found.hold or record.hold_taken,
         on_depletion="clip",
     )  # fmt: skip
     difference = run.series["temperature_k"] - ZERO_CELSIUS_K - measured_degc

@@ -487,7 +487,8 @@ class DiscoverConfig(Section):
     until_s : s, time up to which every record of `test` is used, or every test record of kind `virtual`.
     holdout : share of each record, at its end, that is held out if there are no test records; None takes 0.3.
     hold : current between rows, `backward` or `linear` (known with `data.kind: virtual`). None takes `data.hold` if the
-    file gives it, else `backward` for a record with rows more than 5 s apart and `linear` for others.
+    file gives it, else what explains the data better, and where neither does, `backward` for a record with rows more
+    than 5 s apart and `linear` for others.
     max_effects : largest number of effects that are named.
     """
 

@@ -7,8 +7,9 @@ record as measured.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +25,7 @@ from aesi.physics.effect import ActiveEffect
 from aesi.physics.initial_state import InitialState, initial_state
 from aesi.physics.rest.open_circuit import GOOD_READING_V
 from aesi.records import Hold, Measurement, at_its_temperature, hold_sentence
+from aesi.tracer.case.inferred_hold import InferredHold, as_inferred
 from aesi.tracer.case.thinned import ThinnedRecord, thinned_record, thinned_together, thinning_error_v
 
 THINNED_SHARE = 0.5
@@ -299,11 +301,13 @@ def _prepared(
     holdout: float,
     given: Sequence[ActiveEffect],
     shared: bool,
+    inferred: InferredHold | None,
 ) -> PreparedRecord:
     """A record with its noise, its initial state of charge and its fit part.
 
     holdout : share of the time, at the end, that fits may not see (0 for none).  given : effects that the declared
-    model has.  shared : True where `soc0` was given for several records.
+    model has.  shared : True where `soc0` was given for several records.  inferred : its hold where nobody declared
+    that which it has.
     Raises DataError where its initial state cannot be known.
     """
     data = record.whole
@@ -333,7 +337,13 @@ def _prepared(
         noise_full_v=noise.sd_v,
         notes=(
             *start_note,
-            hold_sentence(data.name, record.hold, data.hold is not None, HOLD_OPTION),
+            hold_sentence(
+                data.name,
+                record.hold,
+                data.hold is not None and inferred is None,
+                HOLD_OPTION,
+                why="" if inferred is None else inferred.reason,
+            ),
             *_temperature_noted(data),
         ),
     )
@@ -407,15 +417,18 @@ def prepare_test(
     seen: Sequence[Measurement],
     soc0: float | None,
     given: Sequence[ActiveEffect] = (),
+    inferred: InferredHold | None = None,
 ) -> PreparedRecord:
     """A prepared test record, to which nothing is fitted.
 
     Where a fitted record leads to it (`leading_record`), the simulation starts with that record and only the later rows
     are judged. The notes then say so, in place of a state of charge read from the first row.
+
+    inferred : how its current runs, where nobody declared that.
     """
     led = leading_record(data, seen)
-    whole = data if led is None else led[1]
-    prepared = _prepared(cell, thinned_record(cell, whole), soc0, 0.0, given, shared=True)
+    whole = as_inferred(data if led is None else led[1], inferred)
+    prepared = _prepared(cell, thinned_record(cell, whole), soc0, 0.0, given, True, inferred)
     if led is None:
         return prepared
     index = led[0]
@@ -446,6 +459,7 @@ def prepare_all(
     holdout: float,
     given: Sequence[ActiveEffect] = (),
     good: Sequence[Measurement] = (),
+    inferred: Mapping[int, InferredHold] = MappingProxyType({}),
 ) -> tuple[PreparedRecord, ...]:
     """The prepared records of one or several measurements, thinned together (`thinned_together`).
 
@@ -453,14 +467,19 @@ def prepare_all(
     that fits may not see (0 for none).  given : effects that the declared model has.
     good : measurements that are known to be good. Their records come last, are fitted whole, and take the initial state
     of charge from their voltage.
+    inferred : number of a record -> how its current runs, where nobody declared that.
     Raises DataError where an initial state cannot be known.
     """
-    rows = thinned_together(cell, (*measurements, *good))
-    shared = len(measurements) > 1
+    holds = [inferred.get(k) for k in range(len(measurements) + len(good))]
+    rows = thinned_together(cell, list(map(as_inferred, (*measurements, *good), holds)))
+    shared, fitted = len(measurements) > 1, len(measurements)
     return (
-        *(_prepared(cell, one, soc0, holdout, given, shared) for one in rows[: len(measurements)]),
         *(
-            replace(_prepared(cell, one, None, 0.0, given, False), good=True)
-            for one in rows[len(measurements) :]
+            _prepared(cell, one, soc0, holdout, given, shared, hold)
+            for one, hold in zip(rows[:fitted], holds[:fitted], strict=True)
+        ),
+        *(
+            replace(_prepared(cell, one, None, 0.0, given, False, hold), good=True)
+            for one, hold in zip(rows[fitted:], holds[fitted:], strict=True)
         ),
     )

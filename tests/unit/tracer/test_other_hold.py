@@ -27,37 +27,63 @@ def written(cell, hold, seed=0):
     return Measurement(time_s, current_a, voltage_v + NOISE_V * rng.standard_normal(1500), name="drive")
 
 
+TRIED = {"series_resistance": CATALOGUE["series_resistance"]}
+
+
+@pytest.fixture(scope="module")
+def cell():
+    return Cell.from_bpx(CELLS / "lg_m50_chen2020.bpx.json")
+
+
+def hold_note(found, name="drive"):
+    (note,) = (note for note in found.notes if note.startswith(f"{name}: the current is taken"))
+    return note
+
+
 @pytest.mark.parametrize(
-    ("made", "declared", "warned"),
+    ("made", "declared", "taken", "why"),
     [
-        ("backward", None, True),
-        ("linear", None, False),
-        ("backward", "backward", False),
-        ("backward", "linear", False),
+        ("backward", None, "backward", "which explains its fitted rows better"),
+        ("linear", None, None, "--hold backward"),
+        ("backward", "backward", "backward", "as declared"),
+        ("backward", "linear", "linear", "as declared"),
     ],
 )
-def test_a_record_that_the_other_hold_explains_better_is_warned_of(made, declared, warned):
-    cell = Cell.from_bpx(CELLS / "lg_m50_chen2020.bpx.json")
-    record = replace(written(cell, made), hold=declared)
-    found = discover(cell, [record], soc0=0.8, effects={"series_resistance": CATALOGUE["series_resistance"]})
-    said = [warning for warning in found.warnings if "the file seems to be written so" in warning]
-    assert len(said) == warned
-    for warning in said:
-        assert warning.startswith("with the current constant since the row before")
-        assert "Declare it with --hold backward" in warning
-        left_mv, taken_mv = map(
-            float,
-            re.search(r"\((\S+) mV RMS are left by series_resistance, instead of (\S+)\)", warning).groups(),
+def test_a_record_is_explained_with_the_hold_that_it_was_written_with(cell, made, declared, taken, why):
+    found = discover(cell, [replace(written(cell, made), hold=declared)], soc0=0.8, effects=TRIED)
+    note = hold_note(found)
+    assert why in note
+    assert found.hold == taken
+    if made in (taken, "linear"):
+        (contact,) = found.candidates[0].parameters.values()
+        assert found.verdict.effects == ("series_resistance",)
+        assert contact.low <= 8e-3 <= contact.high
+    if declared is None and made == "backward":
+        assert note.startswith("drive: the current is taken constant since the row before, which")
+        assert note.endswith("--hold linear (in an experiment discover.hold: linear) takes it otherwise.")
+        errors = re.search(
+            r"the model with series_resistance leaves (\S+) mV RMS of them; the model with series_resistance left "
+            r"(\S+) with the current linear between rows",
+            note,
         )
+        left_mv, taken_mv = map(float, errors.groups())
         assert 1e-3 * left_mv == pytest.approx(NOISE_V, rel=0.05)
         assert left_mv < taken_mv
 
 
-def test_effects_that_make_up_for_the_hold_are_warned_of():
-    cell = Cell.from_bpx(CELLS / "lg_m50_chen2020.bpx.json")
+def test_effects_made_up_for_the_hold(cell):
     several = ("series_resistance", "electrolyte_transport", "porosity")
-    found = discover(
-        cell, [written(cell, "backward")], soc0=0.8, effects={name: CATALOGUE[name] for name in several}
-    )
-    assert found.verdict.effects != ("series_resistance",)  # what is wrong, beside the hold
-    assert any("the file seems to be written so" in warning for warning in found.warnings)
+    tried = {name: CATALOGUE[name] for name in several}
+    straight = replace(written(cell, "backward"), hold="linear")
+    assert discover(cell, [straight], soc0=0.8, effects=tried).verdict.effects != ("series_resistance",)
+    found = discover(cell, [written(cell, "backward")], soc0=0.8, effects=tried)
+    assert found.verdict.word == "found"
+    assert found.verdict.effects == ("series_resistance",)
+
+
+def test_a_test_record_of_the_same_logger_is_judged_with_the_inferred_hold(cell):
+    test = replace(written(cell, "backward", seed=1), name="later")
+    found = discover(cell, [written(cell, "backward")], [test], soc0=0.8, effects=TRIED)
+    assert "as that of the fitted records" in hold_note(found, "later")
+    (later,) = (one for one in found.files if one.name == "later")
+    assert later.errors("after").rmse_v == pytest.approx(NOISE_V, rel=0.05)
