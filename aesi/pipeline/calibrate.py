@@ -12,14 +12,14 @@ import numpy as np
 
 from aesi.calibration import Calibration, Conditions, calibrate
 from aesi.calibration.fit import OnStep
-from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.parameters import check_names
-from aesi.calibration.posterior import PosteriorSamples, check_posterior, sample_posterior
 from aesi.calibration.records.prepared import with_temperatures
 from aesi.calibration.records.sizes import sizes_sentence
 from aesi.calibration.records.spectra import BAND_HZ, check_spectra
 from aesi.calibration.result import RecordError
 from aesi.calibration.start import full_discharge_numbers, scaled_to_discharge
+from aesi.calibration.uncertainty.health import HEALTH_WORDS, health_intervals, health_of
+from aesi.calibration.uncertainty.posterior import PosteriorSamples, check_posterior, sample_posterior
 from aesi.calibration.written_cell import start_soc
 from aesi.constants import CM_PER_M, MV_PER_V, ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError

@@ -53,6 +53,17 @@ def hold_sentence(name: str, hold: Hold, declared: bool, option: str = "--hold {
     return f"{name}: {', '.join(filter(None, (taken, reason)))}; {option.format(OTHER_HOLD[hold])} takes it otherwise."
 
 
+@dataclass(frozen=True)
+class InferredHold:
+    """The hold of a record that declares none.
+
+    hold : how the current runs.  reason : clause, why it is not the assumed one.
+    """
+
+    hold: Hold
+    reason: str
+
+
 def measured_on_case(temperature_degc: Array) -> bool:
     """True where this temperature column (n,) was measured. One that never changes was stated: a chamber's set point,
     or an assumed temperature."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path as FilePath
@@ -20,11 +20,10 @@ from aesi.physics.initial_state import REST_C_RATE
 from aesi.physics.record_checks import check_voltage
 from aesi.physics.simulation import ModelName
 from aesi.physics.start.temperature import OtherTemperature
-from aesi.records import Hold, Measurement
+from aesi.records import Hold, InferredHold, Measurement
 from aesi.tracer.case.checks import check_compared, check_record, check_same_cell
 from aesi.tracer.case.energies import ACTIVATION_ENERGIES
 from aesi.tracer.case.free_parameter import RECORD_OWNERS, by_owner
-from aesi.tracer.case.inferred_hold import InferredHold, hold_of_test
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import PreparedRecord, prepare_all, prepare_test
 from aesi.tracer.decide.evidence import Answer, Evidence, searched_answer
@@ -198,7 +197,7 @@ def discover(
     )
 
     def tests_with(inferred: Mapping[int, InferredHold]) -> tuple[PreparedRecord, ...]:
-        holds = (hold_of_test(data, measurements, inferred.values()) for data in tests)
+        holds = (_hold_of_test(data, measurements, inferred.values()) for data in tests)
         return tuple(
             prepare_test(cell, data, measurements, soc0, given, hold)
             for data, hold in zip(tests, holds, strict=True)
@@ -236,6 +235,17 @@ def discover(
         time.perf_counter() - began,
     )
     return found if max_effects else replace(found, tried=())
+
+
+def _hold_of_test(
+    test: Measurement, fitted: Iterable[Measurement], inferred: Iterable[InferredHold]
+) -> InferredHold | None:
+    """The hold of a test record that declares none, as a logger wrote the fitted ones: the one that was inferred of all
+    fitted records of which it is known; None where that is not one."""
+    holds = {one.hold for one in inferred}
+    if test.hold is not None or len(holds) != 1 or holds | {one.hold for one in fitted} - {None} != holds:
+        return None
+    return InferredHold(holds.pop(), "as that of the fitted records")
 
 
 def inverse_problem(

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aesi.calibration.health import HEALTH_WORDS
+from aesi.calibration.uncertainty.health import HEALTH_WORDS
 from aesi.numerics.files.whole import write_whole
 from aesi.pipeline.report.page import write_page
 from aesi.pipeline.written import SUMMARY, SUMMARY_PAGE, SUMMARY_TABLE

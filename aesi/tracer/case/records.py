@@ -24,8 +24,7 @@ from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.initial_state import InitialState, initial_state
 from aesi.physics.rest.open_circuit import GOOD_READING_V
-from aesi.records import Hold, Measurement, at_its_temperature, hold_sentence
-from aesi.tracer.case.inferred_hold import InferredHold, as_inferred
+from aesi.records import Hold, InferredHold, Measurement, at_its_temperature, hold_sentence
 from aesi.tracer.case.thinned import ThinnedRecord, thinned_record, thinned_together, thinning_error_v
 
 THINNED_SHARE = 0.5
@@ -427,7 +426,7 @@ def prepare_test(
     inferred : how its current runs, where nobody declared that.
     """
     led = leading_record(data, seen)
-    whole = as_inferred(data if led is None else led[1], inferred)
+    whole = _held(data if led is None else led[1], inferred)
     prepared = _prepared(cell, thinned_record(cell, whole), soc0, 0.0, given, True, inferred)
     if led is None:
         return prepared
@@ -452,6 +451,10 @@ def joined(first: Measurement, second: Measurement) -> Measurement:
     )
 
 
+def _held(data: Measurement, inferred: InferredHold | None) -> Measurement:
+    return data if inferred is None else data.held(inferred.hold)
+
+
 def prepare_all(
     cell: Cell,
     measurements: Sequence[Measurement],
@@ -471,7 +474,7 @@ def prepare_all(
     Raises DataError where an initial state cannot be known.
     """
     holds = [inferred.get(k) for k in range(len(measurements) + len(good))]
-    rows = thinned_together(cell, list(map(as_inferred, (*measurements, *good), holds)))
+    rows = thinned_together(cell, list(map(_held, (*measurements, *good), holds)))
     shared, fitted = len(measurements) > 1, len(measurements)
     return (
         *(

@@ -22,7 +22,6 @@ from aesi.tracer.decide.model_to_write import (
     stand_in_notes,
     why_not_refit,
 )
-from aesi.tracer.decide.one_cause import with_one_effect
 from aesi.tracer.decide.verdict import (
     Thresholds,
     Verdict,
@@ -36,6 +35,7 @@ from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.forward import forward_search, refitted
 from aesi.tracer.search.hypothesis_fits import base_of
+from aesi.tracer.search.one_cause import with_one_effect
 from aesi.tracer.search.path import Path, Report
 from aesi.tracer.search.plausible import most_plausible, plausibility
 from aesi.tracer.search.wrong_parameters import beyond_spread, with_wrong_parameters

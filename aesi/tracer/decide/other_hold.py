@@ -10,8 +10,7 @@ import numpy as np
 from aesi.constants import MV_PER_V
 from aesi.errors import AesiError
 from aesi.numerics.metrics import rms
-from aesi.records import HOLD_WORDS, OTHER_HOLD
-from aesi.tracer.case.inferred_hold import InferredHold
+from aesi.records import HOLD_WORDS, OTHER_HOLD, InferredHold
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.decide.verdict import Thresholds, beyond_noise, tolerance_v
 from aesi.tracer.likelihood.fit import FittedHypothesis, HypothesisFitter

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from aesi.calibration.health import HEALTH_WORDS
+from aesi.calibration.uncertainty.health import HEALTH_WORDS
 from aesi.errors import AesiError, InputError
 from aesi.numerics.files.source_digest import source_digest
 from aesi.pipeline.batch.job import Settings

@@ -12,13 +12,13 @@ import pytest
 
 from aesi.calibration import calibrate
 from aesi.calibration.fit import _moved_start_sentences, prepared_model
-from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.model import ERROR_V, REPEATS
 from aesi.calibration.parameters import FitParameter, free_parameters, with_priors
-from aesi.calibration.posterior import PosteriorSamples, sample_posterior
 from aesi.calibration.records.conditions import Conditions, Prior
 from aesi.calibration.result import at_bounds, information_weights, intervals
 from aesi.calibration.start import full_discharge_numbers, scaled_to_discharge, size_assumed
+from aesi.calibration.uncertainty.health import HEALTH_WORDS, health_intervals, health_of
+from aesi.calibration.uncertainty.posterior import PosteriorSamples, sample_posterior
 from aesi.errors import DataError, InputError
 from aesi.numerics.metrics import rms
 from aesi.physics import simulate

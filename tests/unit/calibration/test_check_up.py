@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from aesi.calibration import Conditions, calibrate
-from aesi.calibration.health import health_intervals, health_of
+from aesi.calibration.uncertainty.health import health_intervals, health_of
 from aesi.physics import simulate
 from aesi.physics.effects import CATALOGUE
 from aesi.records import Measurement

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 import aesi
-from aesi.calibration.health import HEALTH_WORDS, health_of
+from aesi.calibration.uncertainty.health import HEALTH_WORDS, health_of
 from aesi.errors import InputError
 from aesi.numerics.files.source_digest import source_digest
 from aesi.physics.effects import CATALOGUE

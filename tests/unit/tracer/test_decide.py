@@ -31,7 +31,6 @@ from aesi.tracer.decide.model_to_write import (
     why_not_refit,
     worst_ratio,
 )
-from aesi.tracer.decide.one_cause import with_one_effect
 from aesi.tracer.decide.verdict import (
     Thresholds,
     Verdict,
@@ -51,6 +50,7 @@ from aesi.tracer.likelihood.surrogates import FAMILY_WISE, admission_nats, large
 from aesi.tracer.search.archive import Archive, context_of, identity
 from aesi.tracer.search.forward import forward_search
 from aesi.tracer.search.hypothesis_fits import base_of, fitted_hypothesis, values_without
+from aesi.tracer.search.one_cause import with_one_effect
 from aesi.tracer.search.path import Path, Step
 from aesi.tracer.search.wrong_parameters import beyond_spread, with_wrong_parameters, wrong_sds
 
@@ -522,8 +522,8 @@ def test_of_three_names_that_one_cause_stands_for_the_third_was_lost(monkeypatch
     one = SimpleNamespace(hypothesis=(cause.id,), at_bounds=())
     problem = SimpleNamespace(effects={**wrong, cause.id: cause}, competing=lambda: ())
     path = Path(problem, None, SimpleNamespace(), (), SimpleNamespace(hypothesis=names))
-    monkeypatch.setattr("aesi.tracer.decide.one_cause.fitted_hypothesis", lambda *given: one)
-    monkeypatch.setattr("aesi.tracer.decide.one_cause.most_plausible", lambda fits, many: fits[1])
+    monkeypatch.setattr("aesi.tracer.search.one_cause.fitted_hypothesis", lambda *given: one)
+    monkeypatch.setattr("aesi.tracer.search.one_cause.most_plausible", lambda fits, many: fits[1])
     assert with_one_effect(path, None)[1] == (cause.id, *names)
 
 

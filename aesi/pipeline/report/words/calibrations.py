@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from aesi.calibration.health import HEALTH_WORDS
+from aesi.calibration.uncertainty.health import HEALTH_WORDS
 from aesi.physics.simulation import MODEL_WORDS
 from aesi.pipeline.digits import resolving
 from aesi.pipeline.report.words.sizes import capitalised
