@@ -22,8 +22,8 @@ from aesi.tracer.search.plausible import ALIKE_NATS
 
 def inferred_holds(path: Path) -> dict[int, InferredHold]:
     """Number of a record -> its other hold, of records that declare none, where with it a hypothesis of fewer effects,
-    or else the chosen one, explains the record (leaves no more than a right one may) and is more probable than the
-    chosen one is by `ALIKE_NATS`: the least that tells two hypotheses apart.
+    or else the chosen one, explains the record (leaves no more than a right one may), leaves less than the chosen one
+    does, and is more probable by `ALIKE_NATS`: the least that tells two hypotheses apart.
 
     Rows of 1 s whose current was held, taken as straight lines, have been explained by a wrong electrolyte and porosity
     where the contact resistance was wrong. Where neither explains the record, its hold cannot be told from what else
@@ -69,7 +69,8 @@ def _better_hold(path: Path, k: int) -> InferredHold | None:
     now_cost, now_v = refitted(problem, chosen)
     for one in _no_larger(path):
         cost, left_v = refitted(otherwise, one)
-        if cost <= now_cost - ALIKE_NATS and beyond_noise(left_v, noise_v) <= allowed_v:
+        explains = left_v < now_v and beyond_noise(left_v, noise_v) <= allowed_v
+        if explains and cost <= now_cost - ALIKE_NATS:
             reason = (
                 f"which explains its fitted rows better ({_model(one)} leaves {MV_PER_V * left_v:.3g} mV RMS of them; "
                 f"{_model(chosen)} left {MV_PER_V * now_v:.3g} with the current {HOLD_WORDS[taken]})"
