@@ -20,6 +20,7 @@ BENCHMARKS = {
     "dfn": "aesi.bench.physics.dfn",
     "start": "aesi.bench.physics.start",
     "calibrate": "aesi.bench.physics.calibrate",
+    "resistance": "aesi.bench.physics.resistance",
     "ensemble": "aesi.bench.hybrid.ensemble",
     "design": "aesi.bench.hybrid.design",
     "spci": "aesi.bench.intervals.spci",

@@ -20,14 +20,16 @@ from aesi.calibration.result import RecordError
 from aesi.calibration.start import full_discharge_numbers, scaled_to_discharge
 from aesi.calibration.uncertainty.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.uncertainty.posterior import PosteriorSamples, check_posterior, sample_posterior
+from aesi.calibration.uncertainty.pulse_resistance import PULSE_S, pulse_resistance
 from aesi.calibration.written_cell import start_soc
-from aesi.constants import CM_PER_M, MV_PER_V, ZERO_CELSIUS_K
+from aesi.constants import CM_PER_M, MILLI, MV_PER_V, ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError
 from aesi.numerics.files.whole import write_whole
 from aesi.over_time import stamp
 from aesi.physics.arguments import check_temperature
 from aesi.physics.cell import Cell
 from aesi.physics.cell.bpx_values import check_values
+from aesi.physics.cell.energies import SPAN_K
 from aesi.physics.record_checks import check_measured
 from aesi.physics.simulation import MODEL_WORDS
 from aesi.pipeline.distinct import check_distinct, check_distinct_spectra
@@ -282,6 +284,7 @@ def calibration_content(
         "declared_capacity_ah": found.declared.capacity_ah,
         "declared_degc": found.declared.initial_temperature_k - ZERO_CELSIUS_K,
         "health": _health_rows(found),
+        "pulse_resistance": _pulse_resistance(found),
         "size_assumed": found.size_assumed,
         "undetermined": [
             {"weights": dict(o.weights), "narrowed": o.narrowed, "sentence": o.sentence}
@@ -344,6 +347,25 @@ def _health_rows(found: Calibration) -> dict[str, dict[str, float | None]]:
         fitted = high - low > ROUND_OFF * abs(value)
         rows[name] = {"value": value, "low": low if fitted else None, "high": high if fitted else None}
     return rows
+
+
+def _pulse_resistance(found: Calibration) -> dict[str, Any]:
+    """The resistance of a pulse in mohm, a row a temperature; None where the cell cannot give the pulse there.
+
+    `fitted` of a row: whether its temperature is between those of the records, or within `SPAN_K` of one.
+    """
+    told = pulse_resistance(found)
+    fitted_degc = [kelvin - ZERO_CELSIUS_K for _, kelvin in found.cell.fitted_at_k]
+    columns = {"mohm": told.ohm, "low_mohm": told.low_ohm, "high_mohm": told.high_ohm}
+    rows = [
+        {
+            "temperature_degc": degc,
+            "fitted": min(fitted_degc) - SPAN_K <= degc <= max(fitted_degc) + SPAN_K,
+            **{key: [MILLI * v if np.isfinite(v) else None for v in ohm[k]] for key, ohm in columns.items()},
+        }
+        for k, degc in enumerate(told.temperature_degc.tolist())
+    ]
+    return {"seconds": PULSE_S[-1], "soc": told.soc.tolist(), "rows": rows}
 
 
 def _posterior_bounds(posterior: PosteriorSamples | None, name: str) -> dict[str, float]:

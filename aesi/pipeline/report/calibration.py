@@ -16,7 +16,7 @@ from aesi.pipeline.report.nyquist import nyquist_figures
 from aesi.pipeline.report.page import write_page
 from aesi.pipeline.report.plots import maps, records
 from aesi.pipeline.report.views import DiscoveryTrace, Row
-from aesi.pipeline.report.words.calibrations import best_known_first
+from aesi.pipeline.report.words.calibrations import best_known_first, pulse_sentence
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -59,10 +59,11 @@ def write_calibration_report(path: str | Path, view: CalibrationView) -> Path:
     return write_page(
         path,
         "calibration.html",
-        _fit_figures(view.traces) | courses(parameters) | nyquist,
+        _fit_figures(view.traces) | courses(parameters) | pulse_figure(view.content) | nyquist,
         title=f"Calibration of {view.content['cell']}",
         view=view,
         finding=finding(view.content),
+        pulse_sentence=pulse_sentence(view.content),
         parameters=[row for row in parameters if KNOT not in row["name"]],
         knots=[row for row in parameters if KNOT in row["name"]],
         nyquist=list(nyquist),
@@ -157,6 +158,38 @@ def courses(parameters: Sequence[Row]) -> dict[str, Figure]:
         "records hardly determine the factor."
     )
     return {"courses": style.framed(fig, "Dependence on stoichiometry", caption, 340)}
+
+
+def pulse_figure(content: Mapping[str, Any]) -> dict[str, Figure]:
+    """The resistance of a pulse over temperature, a line and a band a state of charge, on a logarithmic axis."""
+    told = content["pulse_resistance"]
+    fig = style.figure(
+        "Resistance of a pulse over temperature",
+        "Lines: as the file predicts. Bands: 95 %, as the records leave it. A dotted line: no record is near.",
+        400,
+    )
+    for k, (soc, colour) in enumerate(zip(told["soc"], style.MODEL_COLOURS, strict=False)):
+        rows = [row for row in told["rows"] if row["mohm"][k] is not None]
+        degc = [row["temperature_degc"] for row in rows]
+        name = f"{100 * soc:.0f} % charge"
+        fig.add_scatter(
+            x=[*degc, *degc[::-1]],
+            y=[row["high_mohm"][k] for row in rows] + [row["low_mohm"][k] for row in rows[::-1]],
+            mode="none", fill="toself", fillcolor=style.translucent(colour), hoverinfo="skip",
+            legendgroup=name, showlegend=False,
+        )  # fmt: skip
+        fig.add_scatter(
+            x=degc, y=[row["mohm"][k] for row in rows], mode="lines", legendgroup=name, showlegend=False,
+            line={"color": colour, "dash": "dot"}, hoverinfo="skip",
+        )  # fmt: skip
+        near = [row for row in rows if row["fitted"]]
+        fig.add_scatter(
+            x=[row["temperature_degc"] for row in near], y=[row["mohm"][k] for row in near],
+            mode="lines+markers", name=name, legendgroup=name, line={"color": colour},
+        )  # fmt: skip
+    fig.update_xaxes(title_text="temperature, °C")
+    fig.update_yaxes(title_text="resistance, mohm", type="log", dtick="D2")
+    return {"pulse_resistance": fig}
 
 
 def _knots(parameters: Sequence[Row]) -> dict[tuple[str, str], list[tuple[float, Row]]]:

@@ -14,7 +14,13 @@ from aesi.physics import Cell, simulate
 from aesi.pipeline.calibrate import calibrate_files, fit_traces
 from aesi.pipeline.impedance import SpectrumError
 from aesi.pipeline.report import DiscoveryTrace
-from aesi.pipeline.report.calibration import CalibrationView, courses, finding, write_calibration_report
+from aesi.pipeline.report.calibration import (
+    CalibrationView,
+    courses,
+    finding,
+    pulse_figure,
+    write_calibration_report,
+)
 from aesi.records import Measurement, Spectrum
 
 START = Path(__file__).resolve().parents[3] / "experiments" / "cells" / "lg_m50_chen2020.bpx.json"
@@ -35,6 +41,12 @@ def record(name, **more):
     }  # fmt: skip
 
 
+def pulse_row(degc, fitted, *mohm):
+    low, high = ([None if v is None else factor * v for v in mohm] for factor in (0.9, 1.1))
+    row = {"temperature_degc": degc, "fitted": fitted, "mohm": list(mohm)}
+    return row | {"low_mohm": low, "high_mohm": high}
+
+
 @pytest.fixture
 def content():
     return {
@@ -49,6 +61,15 @@ def content():
         "health": {
             "resistance_mohm": {"value": 12.0, "low": 10.0, "high": 14.0},
             "capacity_ah": {"value": 3.0, "low": None, "high": None},
+        },
+        "pulse_resistance": {
+            "seconds": 10.0,
+            "soc": [0.8, 0.2],
+            "rows": [
+                pulse_row(-20.0, False, 200.0, None),
+                pulse_row(0.0, False, 90.0, 110.0),
+                pulse_row(25.0, True, 42.0, 45.0),
+            ],
         },
         "size_assumed": "",
         "undetermined": [{"weights": {}, "narrowed": 1.0, "sentence": "the data do not determine it"}],
@@ -128,6 +149,18 @@ def test_spectra_are_drawn_by_temperature(tmp_path, content):
     assert "nothing was fitted to them" in html
     assert "<td>10.0</td><td>yes</td>" in html
     assert "<td>no</td>" in html
+
+
+def test_the_resistance_is_told_over_temperature_with_what_the_records_leave_open(tmp_path, content):
+    html = page(tmp_path, CalibrationView(content, "", traces(["pulses"]), HEALTH))
+    assert "Resistance of a discharge at 1C for 10\u00a0s" in html
+    assert re.search(r'<th scope="row">25</th><td>42 <small>\[37.8, 46.2\]</small></td>', html)
+    assert html.count("none near: by the priors") == 2
+    assert html.count("cannot give the pulse") == 1
+    bands, dotted, near = pulse_figure(content)["pulse_resistance"].data[3:]  # of 20 % charge
+    assert list(bands.x) == [0.0, 25.0, 25.0, 0.0]
+    assert list(dotted.y) == [110.0, 45.0]
+    assert list(near.y) == [45.0]
 
 
 def test_one_record_is_named_and_its_error_is_no_range(content):

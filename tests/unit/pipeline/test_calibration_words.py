@@ -45,6 +45,19 @@ def test_a_report_says_at_what_a_record_was_taken_and_what_the_records_tell_of_e
                 file | {"name": "b", "temperature_degc": 9.5},
             ],
             "health": {},
+            "pulse_resistance": {
+                "seconds": 10.0,
+                "soc": [0.8, 0.2],
+                "rows": [
+                    {
+                        "temperature_degc": -10.0,
+                        "fitted": False,
+                        "mohm": [120.4, None],
+                        "low_mohm": [75.96, None],
+                        "high_mohm": [199.2, None],
+                    }
+                ],
+            },
             "size_assumed": "no record tells it.",
             "parameters": {
                 "contact": told | {"of_prior": 1.001},
@@ -58,6 +71,9 @@ def test_a_report_says_at_what_a_record_was_taken_and_what_the_records_tell_of_e
         }
     )
     assert "**Warning:** a starts elsewhere." in text
+    assert "| degC | at 80 % charge | at 20 % charge |" in text
+    assert "| -10 * | 120 [76, 199] | cannot give the pulse |" in text
+    assert "\n\\* no record within 8 K: " in text
     assert "\nNo record tells it.\n" in text
     assert "| a | 25.0, as declared | 2.00 |" in text
     assert "| b | 9.5 | 2.00 |" in text

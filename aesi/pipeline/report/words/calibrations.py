@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from aesi.calibration.uncertainty.health import HEALTH_WORDS
+from aesi.physics.cell.energies import SPAN_K
 from aesi.physics.simulation import MODEL_WORDS
 from aesi.pipeline.digits import resolving
 from aesi.pipeline.report.words.sizes import capitalised
@@ -33,7 +34,7 @@ def to_text(content: Mapping[str, Any]) -> str:
     """The report as Markdown."""
     lines = [f"# Calibration of {content['cell']}", "", f"Fitted with {MODEL_WORDS[content['model']]}.", ""]
     lines += [line for warning in content["warnings"] for line in (f"**Warning:** {warning}", "")]
-    lines += [*_files(content), "", *_health(content), "", *_parameters(content)]
+    lines += [*_files(content), "", *_health(content), "", *_pulses(content), "", *_parameters(content)]
     if content["impedance"]:
         lines += ["", *_impedance(content)]
     sections = (
@@ -70,6 +71,45 @@ def _health(content: Mapping[str, Any]) -> list[str]:
     assumed = content["size_assumed"]
     said = ["", capitalised(assumed)] if assumed else []
     return ["| state of health | value | 95 % interval |", "|---|---|---|", *rows, *said]
+
+
+def _pulses(content: Mapping[str, Any]) -> list[str]:
+    told = content["pulse_resistance"]
+    rows = [
+        f"| {row['temperature_degc']:g}{'' if row['fitted'] else ' *'} | {' | '.join(_ohms(row))} |"
+        for row in told["rows"]
+    ]
+    at = " | ".join(f"at {100 * soc:.0f} % charge" for soc in told["soc"])
+    return [
+        f"| degC | {at} |",
+        f"|---|{'---|' * len(told['soc'])}",
+        *rows,
+        "",
+        pulse_sentence(content),
+        *([OUTSIDE] if not all(row["fitted"] for row in told["rows"]) else []),
+    ]
+
+
+OUTSIDE = (
+    f"\\* no record within {SPAN_K:g} K: the intervals are mostly those of the activation energies' priors."
+)
+
+
+def pulse_sentence(content: Mapping[str, Any]) -> str:
+    """What the resistances and their intervals are."""
+    return (
+        f"Resistance of a discharge at 1C for {content['pulse_resistance']['seconds']:g} s from rest, mohm, with 95 % "
+        "intervals: what these records leave open, without what the model itself is off by."
+    )
+
+
+def _ohms(row: Mapping[str, Any]) -> list[str]:
+    """'42.2 [40.4, 44.1]' for each state of charge."""
+    values = zip(row["mohm"], row["low_mohm"], row["high_mohm"], strict=True)
+    return [
+        "cannot give the pulse" if value is None else f"{value:.3g} [{low:.3g}, {high:.3g}]"
+        for value, low, high in values
+    ]
 
 
 def best_known_first(content: Mapping[str, Any]) -> list[dict[str, Any]]:

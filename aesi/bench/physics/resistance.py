@@ -1,0 +1,162 @@
+"""`aesi bench resistance`: does a calibrated file know how far off its resistance is where no record was?
+
+A file that was calibrated at 25 degC alone predicts the resistance of a pulse elsewhere, with a 95 % interval
+(`aesi.calibration.uncertainty.pulse_resistance`).
+
+Measured: a Panasonic NCR18650PF, calibrated on its C/20 cycle and pulses at 25 degC, against all 1C pulses of its tests
+at 25, 10, 0 and -10 degC. Those tests are also of other days, on which the cell had another capacity.
+
+Virtual: cells drawn from the priors of a calibration, activation energies included, calibrated on a drive and a 1C
+discharge at 25 degC, against their own resistance at `TEMPERATURES_DEGC` and `SOCS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import NonNegativeInt
+
+from aesi.bench.physics.cells import START
+from aesi.bench.scoring import proportion
+from aesi.calibration import calibrate
+from aesi.calibration.parameters import free_parameters, with_interfaces, with_parameters
+from aesi.calibration.uncertainty.pulse_resistance import (
+    PULSE_S,
+    TEMPERATURES_DEGC,
+    PulseResistance,
+    log_resistance,
+    pulse_resistance,
+)
+from aesi.data.catalogue import PANASONIC, locate
+from aesi.data.read import read_measurement
+from aesi.errors import AesiError, DataError
+from aesi.numerics.typing import Array
+from aesi.physics import Cell, initial_state, simulate
+from aesi.records import Measurement
+
+FITTED = ("25degC_c20_ocv", "25degC_hppc")
+PULSES = {"25degC_hppc": None, "10degC_hppc": None, "0degC_hppc": None, "n10degC_hppc": 78610.2}
+"""Record of pulses -> time at which it ends, s; the one at -10 degC has a gap of nine hours there."""
+NEAR_1C, STEADY_C = 0.1, 0.03
+"""Largest deviation of a pulse's current from 1C and within the pulse, in C. Conventions."""
+NOISE_V, HOLD_S, REST_S = 1e-3, 30, 60
+"""Of a virtual record: standard deviation of the noise, V; duration of each constant current and of the rest at the
+beginning, s. Conventions."""
+BALANCE = ("capacity", "full_stoichiometry")
+"""Last parts of the names of parameters that are not drawn, since hardly any draw of them is a cell."""
+
+
+def run(
+    cells: str = "experiments/cells", virtual: NonNegativeInt = 10, seed: NonNegativeInt = 0
+) -> Iterator[dict[str, Any]]:
+    """One row per measured record, or with an `error` one for the cell; one per temperature of the virtual cells; each
+    with the share of resistances inside their intervals (`inside_pct`, with its own 95 % interval), the median of high
+    over low of the intervals (`width`), and that of the larger over the smaller of prediction and truth (`off`).
+
+    cells : folder of the cell files.  virtual : number of virtual cells.  seed : of these.
+    """
+    start = Cell.from_bpx(Path(cells) / f"{START}.bpx.json")
+    yield from _measured(start)
+    yield from _virtual(with_interfaces(start), virtual, np.random.default_rng(seed))
+
+
+def _measured(start: Cell) -> Iterator[dict[str, Any]]:
+    try:
+        records = {
+            name: read_measurement(locate(PANASONIC, name), stop_s=PULSES.get(name))
+            for name in dict.fromkeys((*FITTED, *PULSES))
+        }
+    except DataError as error:
+        yield {"cell": PANASONIC, "error": str(error)}
+        return
+    found = calibrate(start, [records[name] for name in FITTED])
+    for name in PULSES:
+        record = records[name]
+        soc, ohm = measured_pulses(record, initial_state(found.cell, record).soc, found.cell.capacity_ah)
+        degc = float(np.mean(np.asarray(record.temperature_degc, dtype=float)))
+        told = pulse_resistance(found, degc, soc)
+        row = {"cell": PANASONIC, "record": name, "degc": round(degc, 1), "fitted": name in FITTED}
+        yield row | _figures(told.ohm[0], told.low_ohm[0], told.high_ohm[0], ohm)
+
+
+def measured_pulses(record: Measurement, soc0: float, capacity_ah: float) -> tuple[Array, Array]:
+    """(states of charge, resistances in ohm) of the 1C discharge pulses from rest of a record, (n,) each.
+
+    soc0 : state of charge at its first row.
+    """
+    time_s, current_a, voltage_v = record.time_s, record.current_a, record.voltage_v
+    c_rate = current_a / capacity_ah
+    soc = soc0 - record.discharged_ah(record.hold_taken) / capacity_ah
+    found = []
+    for k in np.flatnonzero((np.abs(c_rate[:-1]) < STEADY_C) & (np.abs(c_rate[1:] - 1.0) < NEAR_1C)):
+        end = int(
+            np.searchsorted(time_s, time_s[k] + PULSE_S[-1])
+        )  # of the pulse, whose last row is `end` - 1
+        pulse = c_rate[k + 1 : end]
+        if end < len(time_s) and len(pulse) > 1 and np.ptp(pulse[1:]) < STEADY_C:
+            found.append(
+                (soc[k], (voltage_v[k] - voltage_v[end - 1]) / float(np.mean(current_a[k + 1 : end])))
+            )
+    socs, ohm = np.array(found, dtype=float).reshape(-1, 2).T
+    return socs, ohm
+
+
+def _virtual(start: Cell, cells: int, rng: np.random.Generator) -> Iterator[dict[str, Any]]:
+    """The rows of the virtual cells, by temperature; they are simulated with the model that is calibrated."""
+    predicted: list[PulseResistance] = []
+    true_ohm: list[Array] = []
+    while len(predicted) < cells:
+        cell = _drawn(start, rng)
+        try:
+            records = [_record(cell, current, soc0, rng) for current, soc0 in _loads(start.capacity_ah, rng)]
+        except AesiError:
+            continue  # it runs empty under these loads
+        told = pulse_resistance(calibrate(start, records))
+        predicted.append(told)
+        true_ohm.append(np.exp(log_resistance(cell, told.temperature_degc, told.soc)))
+    for a, degc in enumerate(TEMPERATURES_DEGC if cells else ()):
+        ohm, low_ohm, high_ohm = (
+            np.array([getattr(one, key)[a] for one in predicted]) for key in ("ohm", "low_ohm", "high_ohm")
+        )
+        row = {"cell": "virtual", "degc": degc, "cells": cells}
+        yield row | _figures(ohm, low_ohm, high_ohm, np.array([truth[a] for truth in true_ohm]))
+
+
+def _drawn(start: Cell, rng: np.random.Generator) -> Cell:
+    """A cell with parameters drawn from the priors of a calibration."""
+    free = [one for one in free_parameters(start, np.inf) if not one.name.endswith(BALANCE)]
+    return with_parameters(start, {one.name: one.value(float(rng.standard_normal())) for one in free})
+
+
+def _loads(capacity_ah: float, rng: np.random.Generator) -> tuple[tuple[Array, float], ...]:
+    """(current in A at 1 Hz, state of charge at its start) of a random drive of constant currents with a mean of 0.6C,
+    and of a 1C discharge."""
+    drive = np.repeat(rng.normal(0.6, 0.8, 80), HOLD_S).clip(-1.0, 2.4) * capacity_ah
+    discharge = np.full(3000, capacity_ah)
+    drive[:REST_S] = discharge[:REST_S] = discharge[-300:] = 0.0
+    return (drive, 0.9), (discharge, 0.95)
+
+
+def _record(truth: Cell, current_a: Array, soc0: float, rng: np.random.Generator) -> Measurement:
+    time_s = np.arange(float(len(current_a)))
+    voltage_v = simulate(truth, time_s, current_a, soc0, hold="backward").voltage_v
+    noise_v = NOISE_V * rng.standard_normal(len(time_s))
+    return Measurement(time_s, current_a, voltage_v + noise_v, name=f"from {soc0:g}", hold="backward")
+
+
+def _figures(ohm: Array, low_ohm: Array, high_ohm: Array, true_ohm: Array) -> dict[str, Any]:
+    """The figures of a row, of arrays of one shape; pulses that a cell or its model cannot give do not count."""
+    here = np.isfinite(ohm) & np.isfinite(true_ohm)
+    predicted, low, high, truth = (a[here] for a in (ohm, low_ohm, high_ohm, true_ohm))
+    if not len(truth):
+        return {"pulses": 0}
+    inside = (low <= truth) & (truth <= high)
+    return {
+        "pulses": len(truth),
+        **proportion(int(inside.sum()), len(inside)).named("inside"),
+        "width": round(float(np.median(high / low)), 2),
+        "off": round(float(np.median(np.exp(np.abs(np.log(predicted / truth))))), 3),
+    }
