@@ -50,7 +50,9 @@ WATCHED = {
         lower={"rmse_mv": RESULT},
         together=True,
     ),
-    "resistance": Watch(("cell", "record", "degc", "cells"), higher={"inside_pct": RATE}, lower={"off": RESULT}),
+    "resistance": Watch(
+        ("cell", "record", "degc", "cells"), higher={"inside_pct": RATE}, lower={"off": RESULT}
+    ),
     "ensemble": Watch(("terms", "lambda1", "rows", "candidates", "resamples"), higher={"ratio": TIMING}),
     "design": Watch(("setting", "cells", "candidates"), higher={"aesi_i_mean_pct": RATE}),
     "spci": Watch(

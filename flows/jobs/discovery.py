@@ -185,7 +185,7 @@ def _asked(case: Case) -> dict[str, Any]:
         "test_digest": ", ".join(m.digest for m in case.tests),
         "good": ", ".join(m.name for m in case.good),
         "good_digest": ", ".join(m.digest for m in case.good),
-        "hold": ", ".join(dict.fromkeys(m.hold_taken for m in case.records)),
+        "hold_asked": ", ".join(dict.fromkeys(m.hold for m in case.records if m.hold is not None)),
         "model_asked": case.model or "",
         "effect_files": ", ".join(file.name for file in case.effect_files),
         "effect_files_digest": "".join(sha256(held).hexdigest()[:16] for held in contents(case.effect_files)),
@@ -227,7 +227,7 @@ def _track_result(tracker: Tracker | None, found: Discovery, content: dict[str, 
     from flows.tracking.view import NOTE
 
     tracker.parameters(
-        {"model": found.choice.model},
+        {"model": found.choice.model, "hold": ", ".join(dict.fromkeys(f.hold for f in found.files))},
         {
             "verdict": content["verdict"],
             "effects": ", ".join(content["effects"]),

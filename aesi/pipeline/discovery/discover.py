@@ -315,7 +315,7 @@ def _file_rows(found: Discovery) -> list[dict[str, Any]]:
         errors = {state: f.errors(state) for state in STATES}
         rmse = {f"{s}_mv": None if told is None else MV_PER_V * told.rmse_v for s, told in errors.items()}
         gains = {"gain_mv": gain, "gain_low_mv": low, "gain_high_mv": high}
-        rows.append({"name": f.name, "part": f.part, **rmse, **gains})
+        rows.append({"name": f.name, "part": f.part, **rmse, **gains, "hold": f.hold})
     return rows
 
 

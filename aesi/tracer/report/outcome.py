@@ -13,7 +13,7 @@ from aesi.errors import AesiError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, BoolArray
 from aesi.physics.depletion import ran_out
-from aesi.records import Run
+from aesi.records import Hold, Run
 from aesi.tracer.case.records import PreparedRecord
 from aesi.tracer.likelihood.model_state import ModelState
 
@@ -56,7 +56,8 @@ class FileOutcome:
     that of `after`, with its 95 % block-bootstrap interval, V; NaN where one of them has no voltage.  emptied_s : state
     -> time at which its simulation ran out of lithium or salt, s; only states that did.
     start_slope_v : (n,) V, change of the voltage of `after` by one standard deviation of an initial state that was not
-    fitted; None where it was fitted.  at_its_temperature : whether the record has a temperature.
+    fitted; None where it was fitted.  at_its_temperature : whether the record has a temperature.  hold : how its
+    current was taken to run between its rows.
     """
 
     name: str
@@ -72,6 +73,7 @@ class FileOutcome:
     start_slope_v: Array | None = None
     unsimulated: Mapping[State, str] = field(default_factory=dict)
     at_its_temperature: bool = False
+    hold: Hold = "linear"
 
     def residual_v(self, state: State) -> Array:
         """(n,) V, measured - model."""
@@ -187,6 +189,7 @@ def _outcome(
         emptied_s,
         unsimulated=unsimulated,
         at_its_temperature=data.temperature_degc is not None,
+        hold=record.hold,
     )
 
 

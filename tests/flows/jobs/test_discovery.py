@@ -92,7 +92,7 @@ def test_searches_of_other_cells_records_or_options_are_told_apart_by_what_is_tr
     data = case.measurements[0]
     others = {
         "cell_digest": replace(case, cell=tmp_path / "other.json"),
-        "hold": replace(case, measurements=(replace(data, hold="backward"),)),
+        "hold_asked": replace(case, measurements=(replace(data, hold="backward"),)),
         "data_digest": replace(case, measurements=(replace(data, current_a=1.01 * data.current_a),)),
         "test_digest": replace(case, tests=(data,)),
         "model_asked": replace(case, model="espm"),

@@ -87,3 +87,4 @@ def test_a_test_record_of_the_same_logger_is_judged_with_the_inferred_hold(cell)
     assert "as that of the fitted records" in hold_note(found, "later")
     (later,) = (one for one in found.files if one.name == "later")
     assert later.errors("after").rmse_v == pytest.approx(NOISE_V, rel=0.05)
+    assert {one.hold for one in found.files} == {"backward"}
