@@ -4,7 +4,8 @@ A file that was calibrated at 25 degC alone predicts the resistance of a pulse e
 (`aesi.calibration.uncertainty.pulse_resistance`).
 
 Measured: a Panasonic NCR18650PF, calibrated on its C/20 cycle and pulses at 25 degC, against all 1C pulses of its tests
-at 25, 10, 0 and -10 degC. Those tests are also of other days, on which the cell had another capacity.
+at 25, 10, 0 and -10 degC, which are also of other days, on which the cell had another capacity; and an LG M50T,
+calibrated on its C/20 discharge and UDDS, against its 1C pulses.
 
 Virtual: cells drawn from the priors of a calibration, activation energies included, calibrated on a drive and a 1C
 discharge at 25 degC, against their own resistance at `TEMPERATURES_DEGC` and `SOCS`.
@@ -30,16 +31,24 @@ from aesi.calibration.uncertainty.pulse_resistance import (
     log_resistance,
     pulse_resistance,
 )
-from aesi.data.catalogue import PANASONIC, locate
+from aesi.constants import ZERO_CELSIUS_K
+from aesi.data.catalogue import M50T, PANASONIC, locate
 from aesi.data.read import read_measurement
 from aesi.errors import AesiError, DataError
 from aesi.numerics.typing import Array
 from aesi.physics import Cell, initial_state, simulate
 from aesi.records import Measurement
 
-FITTED = ("25degC_c20_ocv", "25degC_hppc")
-PULSES = {"25degC_hppc": None, "10degC_hppc": None, "0degC_hppc": None, "n10degC_hppc": 78610.2}
-"""Record of pulses -> time at which it ends, s; the one at -10 degC has a gap of nine hours there."""
+MEASURED: tuple[tuple[str, tuple[str, ...], dict[str, float | None]], ...] = (
+    (
+        PANASONIC,
+        ("25degC_c20_ocv", "25degC_hppc"),
+        {"25degC_hppc": None, "10degC_hppc": None, "0degC_hppc": None, "n10degC_hppc": 78610.2},
+    ),
+    (M50T, ("n0_c20_discharge", "n0_udds"), {"n0_hppc": None}),
+)
+"""Data set, records that a file is calibrated on, and records of pulses with the time at which they are cut, s, or None;
+the one at -10 degC has a gap of nine hours there."""
 NEAR_1C, STEADY_C = 0.1, 0.03
 """Largest deviation of a pulse's current from 1C and within the pulse, in C. Conventions."""
 NOISE_V, HOLD_S, REST_S = 1e-3, 30, 60
@@ -64,22 +73,31 @@ def run(
 
 
 def _measured(start: Cell) -> Iterator[dict[str, Any]]:
-    try:
-        records = {
-            name: read_measurement(locate(PANASONIC, name), stop_s=PULSES.get(name))
-            for name in dict.fromkeys((*FITTED, *PULSES))
-        }
-    except DataError as error:
-        yield {"cell": PANASONIC, "error": str(error)}
-        return
-    found = calibrate(start, [records[name] for name in FITTED])
-    for name in PULSES:
-        record = records[name]
-        soc, ohm = measured_pulses(record, initial_state(found.cell, record).soc, found.cell.capacity_ah)
-        degc = float(np.mean(np.asarray(record.temperature_degc, dtype=float)))
-        told = pulse_resistance(found, degc, soc)
-        row = {"cell": PANASONIC, "record": name, "degc": round(degc, 1), "fitted": name in FITTED}
-        yield row | _figures(told.ohm[0], told.low_ohm[0], told.high_ohm[0], ohm)
+    for cell, fitted, pulses in MEASURED:
+        try:
+            records = {
+                name: read_measurement(locate(cell, name), stop_s=pulses.get(name))
+                for name in dict.fromkeys((*fitted, *pulses))
+            }
+        except DataError as error:
+            yield {"cell": cell, "error": str(error)}
+            continue
+        found = calibrate(start, [records[name] for name in fitted])
+        for name in pulses:
+            soc, ohm = measured_pulses(
+                records[name], initial_state(found.cell, records[name]).soc, found.cell.capacity_ah
+            )
+            degc = _mean_degc(found.cell, records[name])
+            told = pulse_resistance(found, degc, soc)
+            row = {"cell": cell, "record": name, "degc": round(degc, 1), "fitted": name in fitted}
+            yield row | _figures(told.ohm[0], told.low_ohm[0], told.high_ohm[0], ohm)
+
+
+def _mean_degc(cell: Cell, record: Measurement) -> float:
+    """The mean temperature of a record, degC; that of the cell's file where it has none."""
+    if record.temperature_degc is None:
+        return cell.initial_temperature_k - ZERO_CELSIUS_K
+    return float(np.mean(record.temperature_degc))
 
 
 def measured_pulses(record: Measurement, soc0: float, capacity_ah: float) -> tuple[Array, Array]:
