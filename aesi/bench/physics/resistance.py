@@ -47,7 +47,7 @@ MEASURED: tuple[tuple[str, tuple[str, ...], dict[str, float | None]], ...] = (
     ),
     (M50T, ("n0_c20_discharge", "n0_udds"), {"n0_hppc": None}),
 )
-"""Data set, records that a file is calibrated on, and records of pulses with the time at which they are cut, s, or None;
+"""Data set, records that a file is calibrated on, and records of pulses with the time of their cut, s, or None;
 the one at -10 degC has a gap of nine hours there."""
 NEAR_1C, STEADY_C = 0.1, 0.03
 """Largest deviation of a pulse's current from 1C and within the pulse, in C. Conventions."""
