@@ -18,6 +18,7 @@ from aesi.physics.effect import ActiveEffect
 from aesi.physics.folded import folded
 from aesi.physics.model import PLAIN, EspmModel
 from aesi.pipeline.product.declared import declared_model
+from aesi.pipeline.product.hybrid import HybridModel
 
 Target = Literal["bpx", "pybamm"]
 SUFFIX = {"bpx": ".json", "pybamm": ".py"}
@@ -80,7 +81,7 @@ def export(model: Path, out: Path, to: Target = "bpx") -> Exported:
     if not found.same_window(declared.cell):
         held.append("State of charge 0 and 1 are now those of the changed electrodes.")
     if to == "bpx":
-        left += _unheld_sentences(found.left, declared.beside, "BPX has no field for")
+        left += _unheld_sentences(found.left, declared, "BPX has no field for")
         left += _beyond_bpx(found.cell)
         if found.cell.contact_resistance_ohm:
             left.append(
@@ -95,17 +96,18 @@ def export(model: Path, out: Path, to: Target = "bpx") -> Exported:
         for effect in found.left
         if effect not in unknown
     ]
-    left += _unheld_sentences(unknown, declared.beside, "PyBaMM's model from BPX has no counterpart of")
+    left += _unheld_sentences(unknown, declared, "PyBaMM's model from BPX has no counterpart of")
     text = _bpx(found.cell)
     _check_not_replaced(out, bpx, text)
     scripts = [_write(path, _script(bpx.name, more)) for path in script]
     return Exported((*scripts, _write(bpx, text)), tuple(held), tuple(left))
 
 
-def _unheld_sentences(effects: Sequence[ActiveEffect], beside: Sequence[str], why: str) -> list[str]:
+def _unheld_sentences(effects: Sequence[ActiveEffect], model: HybridModel, why: str) -> list[str]:
     """A sentence for each effect that the target does not hold, and one for all that were fitted beside a finding."""
-    said = [f"{_effect_words(effect)}: {why} it." for effect in effects if effect.id not in beside]
-    names = [effect.id for effect in effects if effect.id in beside]
+    beside = [effect for effect in effects if model.was_beside(repr(effect))]
+    said = [f"{_effect_words(effect)}: {why} it." for effect in effects if effect not in beside]
+    names = list(dict.fromkeys(effect.id for effect in beside))
     return [*said, *([f"{', '.join(names)}, fitted beside what was found: {why} that."] if names else [])]
 
 
