@@ -11,7 +11,7 @@ from typing import Any, Literal
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import InputError
 from aesi.numerics.files.whole import write_whole
-from aesi.physics import Cell
+from aesi.physics import Cell, ModelName
 from aesi.physics.arguments import check_choice
 from aesi.physics.cell.parts import NO_FILM, UNITY
 from aesi.physics.effect import ActiveEffect
@@ -22,6 +22,8 @@ from aesi.pipeline.product.hybrid import HybridModel
 
 Target = Literal["bpx", "pybamm"]
 SUFFIX = {"bpx": ".json", "pybamm": ".py"}
+PYBAMM_MODELS: Mapping[ModelName, str] = {"espm": "SPMe", "dfn": "DFN"}
+"""PyBaMM's name of the model that a script solves unless it is asked for another."""
 OWN_FIELDS: Mapping[str, Mapping[str, Any]] = {
     "resistance of films": {"film_ohm_m2": NO_FILM},
     "rates over stoichiometry": {"rate_factor": UNITY},
@@ -69,6 +71,9 @@ def export(model: Path, out: Path, to: Target = "bpx") -> Exported:
     *script, bpx = files_written(out, to)
     declared = declared_model(model)
     found = folded(declared.cell, declared.effects)
+    # A file is simulated with the model that it was fitted with.
+    if declared_model(found.cell).model != declared.model:
+        found = replace(found, cell=replace(found.cell, fitted_with=declared.model))
     held = [
         *declared.cell.unread,
         *(f"{_effect_words(effect)}: written into the cell." for effect in found.held),
@@ -99,7 +104,7 @@ def export(model: Path, out: Path, to: Target = "bpx") -> Exported:
     left += _unheld_sentences(unknown, declared, "PyBaMM's model from BPX has no counterpart of")
     text = _bpx(found.cell)
     _check_not_replaced(out, bpx, text)
-    scripts = [_write(path, _script(bpx.name, more)) for path in script]
+    scripts = [_write(path, _script(bpx.name, more, declared.model)) for path in script]
     return Exported((*scripts, _write(bpx, text)), tuple(held), tuple(left))
 
 
@@ -205,9 +210,13 @@ def _write(path: Path, text: str) -> Path:
     return path
 
 
-def _script(bpx: str, more: _Pybamm) -> str:
+def _script(bpx: str, more: _Pybamm, model: ModelName) -> str:
     return SCRIPT.format(
-        bpx=bpx, options=repr(more.options), values=repr(more.values), hour_s=SECONDS_PER_HOUR
+        bpx=bpx,
+        options=repr(more.options),
+        values=repr(more.values),
+        physics=PYBAMM_MODELS[model],
+        hour_s=SECONDS_PER_HOUR,
     )
 
 
@@ -249,7 +258,7 @@ def parameter_values(soc0: float = 1.0) -> pybamm.ParameterValues:
     return values
 
 
-def simulation(time_s=None, current_a=None, soc0: float = 1.0, model=pybamm.lithium_ion.SPMe) -> pybamm.Simulation:
+def simulation(time_s=None, current_a=None, soc0: float = 1.0, model=pybamm.lithium_ion.{physics}) -> pybamm.Simulation:
     """PyBaMM's simulation under a current (A) that is a straight line between the times (s); 1C without.
 
     Solve a current by solve() or solve(t_eval=time_s): with solve([0, end]) PyBaMM may step over pulses after a rest.
