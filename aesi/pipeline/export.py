@@ -11,16 +11,19 @@ from typing import Any, Literal
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import InputError
 from aesi.numerics.files.whole import write_whole
-from aesi.physics import Cell
+from aesi.physics import Cell, ModelName
 from aesi.physics.arguments import check_choice
 from aesi.physics.cell.parts import NO_FILM, UNITY
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.folded import folded
 from aesi.physics.model import PLAIN, EspmModel
 from aesi.pipeline.product.declared import declared_model
+from aesi.pipeline.product.hybrid import HybridModel
 
 Target = Literal["bpx", "pybamm"]
 SUFFIX = {"bpx": ".json", "pybamm": ".py"}
+PYBAMM_MODELS: Mapping[ModelName, str] = {"espm": "SPMe", "dfn": "DFN"}
+"""PyBaMM's name of the model that a script solves unless it is asked for another."""
 OWN_FIELDS: Mapping[str, Mapping[str, Any]] = {
     "resistance of films": {"film_ohm_m2": NO_FILM},
     "rates over stoichiometry": {"rate_factor": UNITY},
@@ -68,6 +71,9 @@ def export(model: Path, out: Path, to: Target = "bpx") -> Exported:
     *script, bpx = files_written(out, to)
     declared = declared_model(model)
     found = folded(declared.cell, declared.effects)
+    # A file is simulated with the model that it was fitted with.
+    if declared_model(found.cell).model != declared.model:
+        found = replace(found, cell=replace(found.cell, fitted_with=declared.model))
     held = [
         *declared.cell.unread,
         *(f"{_effect_words(effect)}: written into the cell." for effect in found.held),
@@ -80,7 +86,7 @@ def export(model: Path, out: Path, to: Target = "bpx") -> Exported:
     if not found.same_window(declared.cell):
         held.append("State of charge 0 and 1 are now those of the changed electrodes.")
     if to == "bpx":
-        left += _unheld_sentences(found.left, declared.beside, "BPX has no field for")
+        left += _unheld_sentences(found.left, declared, "BPX has no field for")
         left += _beyond_bpx(found.cell)
         if found.cell.contact_resistance_ohm:
             left.append(
@@ -95,17 +101,18 @@ def export(model: Path, out: Path, to: Target = "bpx") -> Exported:
         for effect in found.left
         if effect not in unknown
     ]
-    left += _unheld_sentences(unknown, declared.beside, "PyBaMM's model from BPX has no counterpart of")
+    left += _unheld_sentences(unknown, declared, "PyBaMM's model from BPX has no counterpart of")
     text = _bpx(found.cell)
     _check_not_replaced(out, bpx, text)
-    scripts = [_write(path, _script(bpx.name, more)) for path in script]
+    scripts = [_write(path, _script(bpx.name, more, declared.model)) for path in script]
     return Exported((*scripts, _write(bpx, text)), tuple(held), tuple(left))
 
 
-def _unheld_sentences(effects: Sequence[ActiveEffect], beside: Sequence[str], why: str) -> list[str]:
+def _unheld_sentences(effects: Sequence[ActiveEffect], model: HybridModel, why: str) -> list[str]:
     """A sentence for each effect that the target does not hold, and one for all that were fitted beside a finding."""
-    said = [f"{_effect_words(effect)}: {why} it." for effect in effects if effect.id not in beside]
-    names = [effect.id for effect in effects if effect.id in beside]
+    beside = [effect for effect in effects if model.was_beside(repr(effect))]
+    said = [f"{_effect_words(effect)}: {why} it." for effect in effects if effect not in beside]
+    names = list(dict.fromkeys(effect.id for effect in beside))
     return [*said, *([f"{', '.join(names)}, fitted beside what was found: {why} that."] if names else [])]
 
 
@@ -203,9 +210,13 @@ def _write(path: Path, text: str) -> Path:
     return path
 
 
-def _script(bpx: str, more: _Pybamm) -> str:
+def _script(bpx: str, more: _Pybamm, model: ModelName) -> str:
     return SCRIPT.format(
-        bpx=bpx, options=repr(more.options), values=repr(more.values), hour_s=SECONDS_PER_HOUR
+        bpx=bpx,
+        options=repr(more.options),
+        values=repr(more.values),
+        physics=PYBAMM_MODELS[model],
+        hour_s=SECONDS_PER_HOUR,
     )
 
 
@@ -247,7 +258,7 @@ def parameter_values(soc0: float = 1.0) -> pybamm.ParameterValues:
     return values
 
 
-def simulation(time_s=None, current_a=None, soc0: float = 1.0, model=pybamm.lithium_ion.SPMe) -> pybamm.Simulation:
+def simulation(time_s=None, current_a=None, soc0: float = 1.0, model=pybamm.lithium_ion.{physics}) -> pybamm.Simulation:
     """PyBaMM's simulation under a current (A) that is a straight line between the times (s); 1C without.
 
     Solve a current by solve() or solve(t_eval=time_s): with solve([0, end]) PyBaMM may step over pulses after a rest.

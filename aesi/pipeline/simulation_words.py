@@ -9,8 +9,9 @@ from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, BoolArray
 from aesi.over_time import stamp
 from aesi.physics import Cell
+from aesi.physics.effects import CATALOGUE
 from aesi.physics.rest.open_circuit import GIVEN_SD
-from aesi.pipeline.product.hybrid import HybridModel
+from aesi.pipeline.product.hybrid import HybridModel, id_in
 from aesi.pipeline.product.prediction import Prediction
 from aesi.pipeline.product.trained import trained_figures, trained_sentence
 from aesi.records import Measurement, Run
@@ -19,23 +20,20 @@ SOC_DIGITS = 3
 """Decimals of a state of charge in a note."""
 VOLTAGE_DIGITS = 3
 """Decimals of a voltage in a note, V. A limit that is left by less than they show is not said to be left."""
+INFERRING = frozenset(id for id, effect in CATALOGUE.items() if effect.infers == "temperature")
+"""Ids of the effects whose temperature a record that holds its own does without."""
 TOLD_SD = 0.01
 """Change of state of charge for which a note gives the change of the voltage. A convention."""
 
 
 def effect_sentences(record: Measurement, model: HybridModel) -> list[str]:
     """A sentence on the effects that act, or that the cell holds, with their values, which may be defaults; of those
-    that were fitted beside what was found the names alone."""
-    acting = {
-        one.id: repr(one)
-        for one in model.effects
-        if record.temperature_degc is None or one.effect.infers != "temperature"
-    }
-    held = {words.partition("(")[0]: words for words in model.held}
-    told, inside = (
-        [words for id, words in each.items() if id not in model.beside] for each in (acting, held)
-    )
-    beside = [id for id in (acting | held) if id in model.beside]
+    that were fitted beside what was found the names alone. Of one name several may act: each is told."""
+    measured = record.temperature_degc is not None
+    acting = [repr(one) for one in model.effects if not (measured and one.effect.infers == "temperature")]
+    held = [words for words in model.held if not (measured and id_in(words) in INFERRING)]
+    told, inside = ([words for words in each if not model.was_beside(words)] for each in (acting, held))
+    beside = dict.fromkeys(id_in(words) for words in (*acting, *held) if model.was_beside(words))
     said = [f"with {', '.join(told)}"] if told else []
     said += [f"the saved model includes {', '.join(inside)}"] if inside else []
     which = "and other" if said else "the saved model includes"

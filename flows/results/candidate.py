@@ -141,6 +141,8 @@ def save(rebuilt: Rebuilt, out: Path) -> Path:
         hold=rebuilt.config.data.hold,
         soc0=rebuilt.declared.soc0,
         model=rebuilt.declared.model,
+        held=rebuilt.declared.held,
+        beside=rebuilt.declared.beside,
     )
     model.save(out / MODEL)
     content = {

@@ -68,7 +68,14 @@ def track_start(tracker: Tracker, config: ExperimentConfig, loaded: Loaded, fold
     write_whole(folder / INPUTS / RECORDS, codec.dumps(loaded.split))
     write_whole(folder / INPUTS / LEFT_OUT, codec.dumps(loaded.left_out))
     soc0 = next(iter(loaded.soc0.values()), None)
-    HybridModel(loaded.cell, loaded.effects, soc0=soc0, model=loaded.model).save(folder / INPUTS / DECLARED)
+    HybridModel(
+        loaded.cell,
+        loaded.effects,
+        soc0=soc0,
+        model=loaded.model,
+        held=() if config.cell.start == "recalibrated" else loaded.held,
+        beside=loaded.beside,
+    ).save(folder / INPUTS / DECLARED)
     tracker.files(folder / INPUTS, INPUTS)
     tracker.datasets(
         [

@@ -187,15 +187,16 @@ def write_discovery(out: Path, case: Case, found: Discovery, mlflow_run_id: str 
 
     content = discovery_content(found, case.notes)
     write_whole(out / FINDING, json.dumps(content, indent=1, allow_nan=False) + "\n")
-    found_model(found).save(out / MODEL)
+    found_model(found, case.declared()).save(out / MODEL)
     title = ", ".join(m.name for m in case.measurements)
     write_discovery_report(out / REPORT, discovery_view(found, content, title, mlflow_run_id))
     return content
 
 
-def found_model(found: Discovery) -> HybridModel:
+def found_model(found: Discovery, given: HybridModel | None = None) -> HybridModel:
     """The cell with what was found: as far as its file can hold it as values of the cell, the rest as effects.
 
+    given : the declared model, whose effects keep the words that it has for them; None for one without any.
     Lost lithium and active material, which move full and empty, stay effects, so that a state of charge keeps its
     meaning.
     """
@@ -204,14 +205,16 @@ def found_model(found: Discovery) -> HybridModel:
         inside = folded(found.cell, ())
     left = inside.left if inside.held else found.model_effects
     held = (*found.held, *inside.held)
+    said = HybridModel(found.cell) if given is None else given
+    fitted = (one for one in (*left, *held) if one not in said.effects)
     return HybridModel(
         inside.cell,
         left,
         soc0=found.soc0,
         hold=found.hold,
         model=found.choice.model,
-        held=tuple(map(repr, held)),
-        beside=tuple(one.id for one in (*left, *held) if one.id not in found.written),
+        held=(*said.held, *map(repr, held)),
+        beside=(*said.beside, *(repr(one) for one in fitted if one.id not in found.written)),
         finding=" ".join(map(capitalised, found.warnings)),
     )
 

@@ -93,7 +93,7 @@ class Finding:
     @cached_property
     def model(self) -> HybridModel:
         """The written model, with the effects that were found, for `predict` and `save`."""
-        return found_model(self.found)
+        return found_model(self.found, self.case.declared())
 
     def to_frame(self) -> pd.DataFrame:
         """The candidates, best first: one row per parameter, with its 90 % interval."""

@@ -68,7 +68,7 @@ class Loaded:
     as resampling, dropped rows, a fallback.
     config : the experiment as it is run; with the data and cell of the fallback if `fallback` is not empty.
     fallback : why the fallback is used, one sentence.  model : kind of the physics.  files : hash of the files that
-    declare the cell.
+    declare the cell.  held, beside : of the declared model, see `HybridModel`.
     """
 
     cell: Cell
@@ -84,6 +84,8 @@ class Loaded:
     model: ModelName = "espm"
     files: str = ""
     cells: Mapping[str, Cell] = field(default_factory=dict)
+    held: tuple[str, ...] = ()
+    beside: tuple[str, ...] = ()
 
     @property
     def setting(self) -> str:
@@ -169,6 +171,8 @@ def _load(config: ExperimentConfig) -> Loaded:
         model=given.model,
         files=_cell_files_digest(path, config),
         cells={name: variant.cell for name, variant in physics.by_name.items()},
+        held=given.held,
+        beside=given.beside,
     )
 
 

@@ -177,6 +177,8 @@ def hybrid(result: Result) -> HybridModel:
         hold=result.loaded.config.data.hold,
         soc0=next(iter(result.loaded.soc0.values()), None) if physics == result.corrected else None,
         model=result.loaded.model,
+        held=result.loaded.held if physics == DECLARED else (),  # a refit moves the values
+        beside=result.loaded.beside,
     )
 
 

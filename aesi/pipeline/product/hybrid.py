@@ -54,8 +54,8 @@ class HybridModel:
     hold : how the current runs between rows of records that do not declare it; None tells it by their rows.
     soc0 : default state of charge at the first row, or None.
     model : of the physics, "espm" or "dfn".
-    held : effects that are contained in values of the cell, in words.  beside : ids of effects, held or active, that
-    were fitted together with the found ones and are no finding themselves.
+    held : effects that are contained in values of the cell, in words.  beside : effects, held or active, that were
+    fitted together with the found ones and are no finding themselves, in the same words, or by their ids.
     finding : its errors on test records, in words; '' where they are not known.
     """
 
@@ -96,6 +96,10 @@ class HybridModel:
     def with_soh(self, soh: Soh | None) -> Self:
         """A copy with the cell at a state of health, see `Cell.with_soh`; unchanged for None."""
         return self if soh is None else replace(self, cell=self.cell.with_soh(soh))
+
+    def was_beside(self, words: str) -> bool:
+        """Whether an effect, in the words of `held`, was fitted together with the found ones and is no finding."""
+        return words in self.beside or id_in(words) in self.beside
 
     def hold_of(self, record: Measurement) -> Hold:
         """How the current of a record runs between its rows: as it declares, else as the model was made, else as
@@ -392,6 +396,11 @@ def _on_own_rows(prediction: Prediction, own: ErrorSeries) -> Prediction:
         temperature_degc=own.temperature_degc,
         collector_mol_m3=own.collector_mol_m3,
     )
+
+
+def id_in(words: str) -> str:
+    """The id of an effect in its words, `series_resistance(resistance_ohm=0.008)`."""
+    return words.partition("(")[0]
 
 
 @contextmanager

@@ -826,6 +826,34 @@ def test_what_was_fitted_beside_a_finding_was_told_with_its_values_as_if_found(m
     )
 
 
+def test_an_effect_beside_the_models_own_of_that_name_was_told_alone(model, record, tmp_path):
+    """A gain of 1.04 that was found and one of 1.02 that was asked for act together, and 1.02 was told."""
+    gain = CATALOGUE["current_sensor_gain"]
+    offset = CATALOGUE["voltage_sensor_offset"].activate(offset_v=-6.6e-5)
+    effects = (offset, gain.activate(gain=1.04))
+    found = HybridModel(model.cell, effects, beside=(repr(offset),)).save(tmp_path / "found")
+    asked = activated(
+        [("current_sensor_gain", {"gain": 1.02}), ("voltage_sensor_offset", {"offset_v": 0.01})]
+    )
+    said: list[str] = []
+    simulate_file(found, record, tmp_path / "o.csv", effects=asked, say_notes=said.extend)
+    words = (
+        ": with current_sensor_gain(gain=1.04), current_sensor_gain(gain=1.02), voltage_sensor_offset(offset_v=0.01); "
+        "and other parameters that were fitted together: voltage_sensor_offset."
+    )
+    assert any(note.endswith(words) for note in said)
+
+
+def test_a_temperature_that_was_found_was_told_to_be_in_a_record_of_another(model, data, tmp_path):
+    shift = CATALOGUE["ambient_temperature"].activate(shift_k=-17.0)
+    found = HybridModel(folded(model.cell, [shift]).cell, held=(repr(shift),)).save(tmp_path / "found")
+    record = tmp_path / "measured.csv"
+    replace(data, temperature_degc=np.full(len(data), 20.0)).to_frame().to_csv(record, index=False)
+    said: list[str] = []
+    simulate_file(found, record, tmp_path / "o.csv", say_notes=said.extend)
+    assert not [note for note in said if "ambient_temperature" in note]
+
+
 def test_an_unknown_target_of_an_export_ended_in_a_key_error(model, tmp_path):
     with pytest.raises(InputError, match="to = 'foo' is not known; give 'bpx' or 'pybamm'"):
         export(model.save(tmp_path / "alone"), tmp_path / "o.json", to="foo")

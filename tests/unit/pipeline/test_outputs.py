@@ -21,6 +21,8 @@ from small_experiment import (
 from aesi.data import read_measurement
 from aesi.errors import FitError
 from aesi.physics import Cell, initial_state
+from aesi.physics.effects import CATALOGUE
+from aesi.physics.folded import folded
 from aesi.pipeline.experiment.judging.evaluate import evaluate_models
 from aesi.pipeline.experiment.outputs import Result, hybrid, notes, write_outputs
 from aesi.pipeline.product.hybrid import HybridModel
@@ -50,6 +52,21 @@ def covered(model, record):
     data = read_measurement(record)
     predicted = model.predict_record(data, SOC0)
     return np.mean((data.voltage_v >= predicted.lower_v) & (data.voltage_v <= predicted.upper_v))
+
+
+def test_the_words_for_what_a_found_model_holds_were_lost_in_a_run_that_started_from_it(record, tmp_path):
+    offset = CATALOGUE["voltage_sensor_offset"].activate(offset_v=1e-5)
+    inside = folded(Cell.from_bpx(BPX), [CATALOGUE["series_resistance"].activate(resistance_ohm=1.5e-3)])
+    words = {"held": tuple(map(repr, inside.held)), "beside": (repr(offset),)}
+    folder = HybridModel(inside.cell, (offset,), soc0=SOC0, **words).save(tmp_path / "found" / "model")
+    config = experiment(record, models=["ESPM"])
+    config = config.model_copy(update={"cell": config.cell.model_copy(update={"bpx": str(folder)})})
+    loaded, chosen, _ = fitted(record)
+    loaded = replace(load(config), split=loaded.split, left_out=loaded.left_out)
+    problem = build_problem(loaded, config)
+    judged = conformalise(final_models(problem, chosen, config).fitted, problem, chosen, config)
+    one = Result(config, loaded, problem, chosen, [], judged, evaluate_models(judged, loaded.split), "", 0.0)
+    assert {name: getattr(hybrid(one), name) for name in words} == words
 
 
 def test_physics_was_saved_with_the_bands_of_other_physics(record):

@@ -10,6 +10,7 @@ from aesi.physics import simulate
 from aesi.physics.effect import Contribution, Effect
 from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.discovery.discover import discovery_content, found_model
+from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Measurement
 from aesi.tracer import discover
 from aesi.tracer.case.checks import FOREIGN_CELL_V, check_same_cell
@@ -32,6 +33,20 @@ def test_an_ohmic_drop_is_found_with_its_size(cell, few, make):
     assert "series_resistance" in {active.id for active in found.held}
     assert any(words.startswith("series_resistance(") for words in found_model(found).held)
     assert "series_resistance(" in found.cell.description
+
+
+def test_what_a_saved_model_had_was_told_as_fitted_beside_the_next_finding(cell, few, make):
+    """The contacts that a first search had found were no more told, and a gain only as one of many parameters."""
+    gain = CATALOGUE["current_sensor_gain"].activate(gain=1.02)
+    offset = CATALOGUE["voltage_sensor_offset"].activate(offset_v=1e-4)
+    given = HybridModel(cell, (offset, gain), held=("porosity(factor=1.01)",), beside=(repr(offset),))
+    found = discover(cell, [make((gain,))], soc0=0.9, effects=few, given=given.effects)
+    written = found_model(found, given)
+    assert written.held[0] == "porosity(factor=1.01)"
+    assert gain in written.effects
+    assert not written.was_beside(repr(gain))
+    assert written.was_beside(repr(offset))
+    assert all(map(written.was_beside, written.held[1:]))
 
 
 def test_a_cell_as_declared_lacks_nothing(cell, few, make):
