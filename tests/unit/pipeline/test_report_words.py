@@ -276,9 +276,9 @@ def test_a_correction_that_had_faded_to_nothing_was_told_as_held_at_the_edge():
     model = {"free_run": {"outside_pct": 47.0}, "test_records": {"cold": cold, "near": near, "same": same}}
     assert runs.outside_finding(model) == (
         "cold: 100 % of the rows lie outside the range the correction was trained on; at -0.2 degC, 24 K below what it "
-        "was trained at, none of the correction is applied: this is the physics model. near: 41 % of the rows lie "
-        "outside the range the correction was trained on; the correction fades towards the physics, to "
-        "93 % of its size on average."
+        "was trained at, none of the correction is applied: this is the physics model and the error of the first "
+        "measured voltage, which decays. near: 41 % of the rows lie outside the range the correction was trained on; "
+        "the correction fades towards the physics, to 93 % of its size on average."
     )
 
 
