@@ -117,3 +117,21 @@ def test_a_long_setting_pushed_all_runs_but_the_first_off_the_page(page, tmp_pat
     page.open(write_comparison(tmp_path / "page.html", runs), 1280, shown=f"{table} !== null")
     assert page.evaluate(f"{table}.rows[0].cells.length") == 5
     assert page.evaluate(f"{table}.scrollWidth <= {table}.parentElement.clientWidth")
+
+
+def test_a_run_called_by_many_settings_hid_all_figures_of_all_runs(page, tmp_path):
+    """The name of the row, which stays where it is, was as wide as the page."""
+    changes = "library.feedback=true, search.regime=one_step, search.top_share=1, library.inputs=null, "
+    changes += "models=[ESPM,AESI I,AESI II,ridge,SINDy-C,PySINDy ensemble,DMD with control]"
+    runs = [
+        ComparedRun(
+            f"{k:032x}", f"smoke, seed {k}: {changes}", "smoke", "2026-01-01 00:00", {"seed": str(k)}, {}
+        )
+        for k in range(2)
+    ]
+    written = write_comparison(tmp_path / "page.html", runs)
+    table = "[...document.querySelectorAll('table')].find(t => t.rows[0].cells[0].textContent === 'run')"
+    page.open(written, 1280, shown=f"{table} !== undefined")
+    name = f"{table}.querySelector('tbody td')"
+    assert page.evaluate(f"{name}.textContent.includes('PySINDy')")
+    assert page.evaluate(f"{table}.scrollWidth <= {table}.parentElement.clientWidth")

@@ -25,7 +25,13 @@ from aesi.physics.record_checks import check_measured
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.drives import by_role, cut_short, training_drives
 from aesi.pipeline.experiment.left_out import TrainingDrives, series_under
-from aesi.pipeline.experiment.physics_models import FREE, PhysicsModels, no_rows, physics_models
+from aesi.pipeline.experiment.physics_models import (
+    FREE,
+    RECALIBRATED,
+    PhysicsModels,
+    no_rows,
+    physics_models,
+)
 from aesi.pipeline.experiment.recalibrate import FitRecord, StateSource
 from aesi.pipeline.experiment.sources import (
     Sources,
@@ -151,6 +157,7 @@ def _load(config: ExperimentConfig) -> Loaded:
         *grid_notes,
         *_repeat_sentences(config, records),
         *_single_drive_sentences(training),
+        *_kept_sentences(physics, config),
         *([DFN_NOTE] if given.model == "dfn" else []),
         *depletion_notes,
     ]
@@ -220,6 +227,24 @@ def _single_drive_sentences(training: TrainingDrives) -> list[str]:
         "One drive trains, so that the physics fitted to it has seen the rows on which its intervals and bands are "
         "calibrated: they may come out too narrow, also around a correction of it; a second drive, or a second repeat, "
         "has them calibrated on what was left out."
+    ]
+
+
+def _kept_sentences(physics: PhysicsModels, config: ExperimentConfig) -> list[str]:
+    """A sentence on the share of the recalibration that is kept (left_out.py) if it is not all of it; empty if no model
+    of the experiment is recalibrated."""
+    share = physics.recalibration_share
+    if share == 1.0 or (config.cell.start != "recalibrated" and RECALIBRATED not in config.models):
+        return []
+    if share == 0.0:
+        return [
+            "None of the recalibration is kept, so that the recalibrated model is the declared one: a recalibration "
+            "without a part of the training drives does not make the error on that part smaller (in the median of the "
+            "parts, each left out in turn)."
+        ]
+    return [
+        f"Of each change of the recalibration {100.0 * share:.2g} % is kept: so much carries over to a part of the "
+        "training drives that it was fitted without (in the median of the parts, each left out in turn)."
     ]
 
 

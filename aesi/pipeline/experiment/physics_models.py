@@ -51,10 +51,12 @@ class PhysicsModels:
     """The physics models of an experiment.
 
     by_name : name -> model.  corrected : name of the model that the correction is learnt on.
+    recalibration_share : share of the fitted deviations that the recalibrated model has, 0 to 1.
     """
 
     by_name: Mapping[str, PhysicsVariant]
     corrected: str
+    recalibration_share: float = 1.0
 
     @property
     def chosen(self) -> PhysicsVariant:
@@ -69,7 +71,7 @@ class PhysicsModels:
         z = share * np.array(whole.deviations)
         moved = deviating(whole.declared, whole.effects, ALL, z, whole.model)
         moved = replace(moved, missed_v=whole.missed_v)
-        return replace(self, by_name={**self.by_name, RECALIBRATED: moved})
+        return replace(self, by_name={**self.by_name, RECALIBRATED: moved}, recalibration_share=share)
 
     def initial_soc(self, name: str, record: FitRecord, hold: Hold) -> tuple[float, float]:
         """(state of charge at the first row, in the stoichiometry windows of the named model; its standard deviation if

@@ -62,8 +62,13 @@ def trained_figures(
     }
 
 
-def trained_sentence(name: str, figures: Mapping[str, Any], *, one_step: bool = False) -> str:
-    """A sentence from the figures on a record of that name, predicted in free run or one step ahead."""
+def trained_sentence(
+    name: str, figures: Mapping[str, Any], *, one_step: bool = False, first_measured: bool = True
+) -> str:
+    """A sentence from the figures on a record of that name, predicted in free run or one step ahead.
+
+    first_measured : whether the first voltage is measured, whose error a free run starts with.
+    """
     share, kept = figures["outside_pct"], figures["kept_pct"]
     head = f"{name}: {_percent_words(share)} of the rows lie outside the range the correction was trained on"
     where, beyond = "", figures["beyond_k"] or 0.0
@@ -77,7 +82,11 @@ def trained_sentence(name: str, figures: Mapping[str, Any], *, one_step: bool = 
     if kept >= NONE_PCT:
         share_kept = _percent_words(kept)
         return f"{head}; {where}the correction fades towards the physics, to {share_kept} of its size on average."
-    alone = "the physics model and its last measured error" if one_step else "the physics model"
+    alone = "the physics model"
+    if one_step:
+        alone += " and its last measured error"
+    elif first_measured:
+        alone += " and the error of the first measured voltage, which decays"
     return f"{head}; {where}none of the correction is applied: this is {alone}."
 
 

@@ -37,9 +37,8 @@ def write_run_report(path: str | Path, view: RunView) -> Path:
     figures = paper_figures(view)
     for section in sections.SECTIONS:
         figures.update(section.figures(view))
-    chosen, physics, corrected = (
-        {**NOT_COMPARED, **(view.model(name) or {"name": name})}
-        for name in (view.chosen, view.physics, view.corrected)
+    chosen, physics = (
+        {**NOT_COMPARED, **(view.model(name) or {"name": name})} for name in (view.chosen, view.physics)
     )
     return write_page(
         path,
@@ -49,7 +48,7 @@ def write_run_report(path: str | Path, view: RunView) -> Path:
         view=view,
         chosen=chosen,
         physics=physics,
-        corrected=corrected,
+        corrected_mv=runs.corrected_mv(view),
         own_share=runs.own_share(view),
         finding=runs.run_finding(view),
         sentences=[

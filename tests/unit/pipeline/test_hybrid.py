@@ -394,9 +394,17 @@ def test_a_correction_that_is_applied_nowhere_was_said_to_fade_to_a_share_of_its
     said = []
     asked = ProfileRequest(soc0=SOC0)
     predict_file(folder, tmp_path / "drive.csv", tmp_path / "out.csv", asked, say_notes=said.extend)
-    assert any("none of the correction is applied: this is the physics model." in note for note in said)
+    alone = "none of the correction is applied: this is the physics model"
+    assert any(f"{alone} and the error of the first measured voltage, which decays." in note for note in said)
     assert not any("fades" in note for note in said)
     assert (pd.read_csv(tmp_path / "out.csv")["weight"] == 0.0).all()
+
+    table.drop(columns="voltage_v").to_csv(tmp_path / "drive.csv", index=False)
+    said = []
+    predict_file(folder, tmp_path / "drive.csv", tmp_path / "out.csv", asked, say_notes=said.extend)
+    assert any(f"{alone}." in note for note in said)
+    out = pd.read_csv(tmp_path / "out.csv")
+    np.testing.assert_array_equal(out["voltage_v"], out["physics_v"])
 
 
 def test_a_model_that_does_not_fade_keeps_all_and_one_without_a_correction_has_none_to_keep(model, data):

@@ -72,6 +72,26 @@ def test_intervals_about_physics_that_has_seen_the_only_drive_were_given_without
     assert sum("One drive trains" in note for note in one.notes) == told
 
 
+@pytest.mark.parametrize(
+    ("share", "told"),
+    [
+        (0.0, "None of the recalibration is kept, so that the recalibrated model is the declared one"),
+        (0.31, "Of each change of the recalibration 31 % is kept"),
+        (1.0, None),
+    ],
+)
+def test_a_recalibrated_model_that_is_the_declared_one_was_shown_beside_it_without_a_word(
+    tmp_path, monkeypatch, share, told
+):
+    monkeypatch.setattr("aesi.pipeline.experiment.left_out.carried_over", lambda slopes: share)
+    small = experiment(write_record(tmp_path), models=["ESPM"])
+    recalibrated = small.cell.model_copy(update={"start": "recalibrated"})
+    notes = load(small.model_copy(update={"cell": recalibrated})).notes
+    assert [told in note for note in notes].count(True) == 1 if told else not any("kept" in n for n in notes)
+    if share == 0.0:  # no model of this experiment is recalibrated
+        assert not any("kept" in note for note in load(small).notes)
+
+
 def test_the_error_that_a_fit_allowed_for_goes_with_its_physics(loaded):
     records = [*loaded.split.train, *loaded.split.test, *(part.series for part in loaded.left_out.parts)]
     assert {series.missed_v for series in records} == {MODEL_ERROR_V}

@@ -213,6 +213,32 @@ def test_the_correction_was_credited_with_what_the_recalibration_does(views, tmp
     assert "90.3" not in tiles
 
 
+def test_the_correction_was_credited_with_a_recalibration_that_is_no_row_of_the_table(views, tmp_path):
+    """`models` without `ESPM recalibrated`: 99.8 % was told, of which the recalibration took 99.5."""
+    view = views.run_view(200)
+    figures = view.models[1]["free_run"] | {
+        "test_mser_recalibrated_pct": 75.0,
+        "train_rmse_mv": 4.0,
+        "train_mser_pct": 75.0,  # 8.0 mV as declared
+        "train_mser_recalibrated_pct": 84.0,  # 10.0 mV recalibrated
+    }
+    learned = replace(
+        view, models=(view.models[0], {**view.models[1], "free_run": figures}), corrected="ESPM recalibrated"
+    )
+    assert runs.run_finding(learned) == (
+        "On held-out test records, in free run, the RMSE is 4.1 mV with ESPM + AESI I, 8.2 mV with the ESPM "
+        "recalibrated alone and 13.2 mV with the ESPM as declared. The correction removes 75.0 % of the mean squared "
+        "error that the ESPM recalibrated leaves (90.3 % of that of the ESPM as declared)."
+    )
+    assert runs.own_share(learned) == pytest.approx(75.0)
+    page = write_run_report(tmp_path / "r.html", learned).read_text()
+    tiles = page[page.index('<div class="stats">') : page.index('<p class="lead">')]
+    assert "8.2\xa0mV" in tiles
+    assert "than the ESPM recalibrated, test, free run" in tiles
+    alone = replace(learned, models=learned.models[1:])
+    assert "the ESPM recalibrated errs by 10.0 mV and the ESPM by 8.0 mV" in runs.validation_finding(alone)
+
+
 def test_other_corrections_that_do_better_are_told(views):
     view = views.run_view(200)
     names = {"ESPM + AESI I": 4.1, "ESPM + ridge": 3.9, "ESPM + constant": 3.2, "ESPM + boosting": 5.0}
@@ -250,9 +276,9 @@ def test_a_correction_that_had_faded_to_nothing_was_told_as_held_at_the_edge():
     model = {"free_run": {"outside_pct": 47.0}, "test_records": {"cold": cold, "near": near, "same": same}}
     assert runs.outside_finding(model) == (
         "cold: 100 % of the rows lie outside the range the correction was trained on; at -0.2 degC, 24 K below what it "
-        "was trained at, none of the correction is applied: this is the physics model. near: 41 % of the rows lie "
-        "outside the range the correction was trained on; the correction fades towards the physics, to "
-        "93 % of its size on average."
+        "was trained at, none of the correction is applied: this is the physics model and the error of the first "
+        "measured voltage, which decays. near: 41 % of the rows lie outside the range the correction was trained on; "
+        "the correction fades towards the physics, to 93 % of its size on average."
     )
 
 

@@ -8,6 +8,7 @@ from aesi.advice import listed
 from aesi.over_time import stamp
 from aesi.pipeline.product.trained import ALL_PCT, trained_sentence
 from aesi.pipeline.report.views import Row, RunView
+from aesi.records import Role
 
 NEARLY = 0.98
 """A one-step error above this share of persistence's is called no better than it."""
@@ -38,13 +39,27 @@ def _refit_better(view: RunView) -> str:
 def _refitted_mv(view: RunView) -> float | None:
     """RMSE of the refitted physics on the test records, mV; None where the correction is learnt on that physics, or
     there is no such figure."""
-    model = view.model(view.chosen)
-    after, beyond = (
-        _figure(model, "free_run", key) for key in ("test_rmse_mv", "test_mser_recalibrated_pct")
-    )
-    if view.corrected not in (view.physics, view.chosen) or after is None:
+    if view.corrected not in (view.physics, view.chosen):
         return None
-    return None if beyond is None or beyond >= 100.0 else float(after / np.sqrt(1.0 - beyond / 100.0))
+    return _before_mv(view, "test", "mser_recalibrated_pct")
+
+
+def _physics_mv(view: RunView, name: str, role: Role = "test") -> float | None:
+    """RMSE of the physics as declared, or of that which is corrected, in free run, mV. Of one that is not among the
+    models of the experiment it is told by what the chosen model takes off it; None where that is not known."""
+    told = _figure(view.model(name), "free_run", f"{role}_rmse_mv")
+    if told is not None:
+        return told
+    return _before_mv(view, role, "mser_pct" if name == view.physics else "mser_recalibrated_pct")
+
+
+def _before_mv(view: RunView, role: Role, key: str) -> float | None:
+    """RMSE, mV, of the physics that the chosen model takes so much off as its figure `key` says, per cent."""
+    model = view.model(view.chosen)
+    after, taken = (_figure(model, "free_run", f"{role}_{each}") for each in ("rmse_mv", key))
+    if after is None or taken is None or taken >= 100.0:
+        return None
+    return float(after / np.sqrt(1.0 - taken / 100.0))
 
 
 def _ran_out(view: RunView) -> str:
@@ -74,13 +89,11 @@ def _ran_out(view: RunView) -> str:
 
 def _gain_sentence(view: RunView) -> str:
     """A sentence on the error of the chosen model on the test records in free run, beside that of the physics."""
-    model, physics = view.model(view.chosen), view.model(view.physics)
-    before, after = (_figure(row, "free_run", "test_rmse_mv") for row in (physics, model))
-    reduction = _figure(model, "free_run", "test_mser_pct")
-    if after is None or reduction is None:
+    model = view.model(view.chosen)
+    after, reduction = (_figure(model, "free_run", key) for key in ("test_rmse_mv", "test_mser_pct"))
+    before, corrected = (_physics_mv(view, name) for name in (view.physics, view.corrected))
+    if after is None or reduction is None or before is None:
         return f"No model of the voltage error could be evaluated in free run on {view.cell}."
-    if before is None:  # the physics as declared is not among the models of the experiment
-        before = float(after / np.sqrt(1.0 - reduction / 100.0))
     if view.chosen in (view.physics, view.corrected):
         declared = (
             "" if view.chosen == view.physics else f", the {view.physics} as declared by {before:.1f} mV"
@@ -89,7 +102,6 @@ def _gain_sentence(view: RunView) -> str:
             f"No correction of the voltage error was chosen: the {view.chosen} alone errs by {after:.1f} "
             f"mV RMSE on the test records{declared}."
         )
-    corrected = _figure(view.model(view.corrected), "free_run", "test_rmse_mv")
     alone = before if corrected is None or view.corrected == view.physics else corrected
     if not _is_less(alone, after) and not _is_less(after, alone):
         return (
@@ -123,12 +135,16 @@ def _gain_sentence(view: RunView) -> str:
     )
 
 
+def corrected_mv(view: RunView) -> float | None:
+    """RMSE of the physics that the correction was learnt on, in free run on the test records, mV; None where it is not
+    known."""
+    return _physics_mv(view, view.corrected)
+
+
 def own_share(view: RunView) -> float | None:
     """By how much the correction lowers the mean squared error of the physics that it was learnt on, in free run on the
     test records, per cent; negative where it raises it. None where there is no correction, or a figure is missing."""
-    before, after = (
-        _figure(view.model(name), "free_run", "test_rmse_mv") for name in (view.corrected, view.chosen)
-    )
+    before, after = corrected_mv(view), _figure(view.model(view.chosen), "free_run", "test_rmse_mv")
     if not before or after is None or view.chosen in (view.physics, view.corrected):
         return None
     return 100.0 * (1.0 - (after / before) ** 2)
@@ -155,14 +171,14 @@ def refit_finding(view: RunView) -> str:
 def validation_finding(view: RunView) -> str:
     """A sentence where the physics refitted to the training records does worse than as declared: on these, else on
     the validation records."""
-    if (worse := _worse_refitted(view, "train_rmse_mv")) is not None:
+    if (worse := _worse_refitted(view, "train")) is not None:
         first, last = worse
         return (
             f"On the training records themselves the {view.corrected} errs by {last} mV and the {view.physics} by "
             f"{first} mV: its own parameters cannot follow these records. Leave them as declared (cell.start: "
             "declared)."
         )
-    if (worse := _worse_refitted(view, "valid_rmse_mv")) is None:
+    if (worse := _worse_refitted(view, "valid")) is None:
         return ""
     first, last = worse
     return (
@@ -172,11 +188,10 @@ def validation_finding(view: RunView) -> str:
     )
 
 
-def _worse_refitted(view: RunView, figure: str) -> tuple[str, str] | None:
-    """The errors of the physics as declared and refitted, mV, where the latter is the larger one."""
-    declared, refitted = (
-        _figure(view.model(name), "free_run", figure) for name in (view.physics, view.corrected)
-    )
+def _worse_refitted(view: RunView, role: Role) -> tuple[str, str] | None:
+    """The errors of the physics as declared and refitted on the records of a role, mV, where the latter is the larger
+    one."""
+    declared, refitted = (_physics_mv(view, name, role) for name in (view.physics, view.corrected))
     if declared is None or refitted is None or not _is_less(declared, refitted):
         return None
     return _distinct_mv(declared, refitted)
