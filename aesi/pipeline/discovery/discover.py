@@ -183,7 +183,7 @@ def run_case(case: Case, out: Path | None = None, progress: Progress | None = No
 
 def write_discovery(out: Path, case: Case, found: Discovery, mlflow_run_id: str = "") -> dict[str, Any]:
     """Write discovery.json, report.html and model/ to `out`; returns the content of discovery.json."""
-    from aesi.pipeline.report import write_discovery_report
+    from aesi.pipeline.report.write import write_discovery_report
 
     content = discovery_content(found, case.notes)
     write_whole(out / FINDING, json.dumps(content, indent=1, allow_nan=False) + "\n")
