@@ -20,7 +20,6 @@ from aesi.physics.cell import Soh
 from aesi.physics.effects import CATALOGUE, Effect, known_effects, selected
 from aesi.physics.folded import folded
 from aesi.physics.simulation import ModelName
-from aesi.pipeline.distinct import check_distinct
 from aesi.pipeline.notes import soh_day_sentences, temperature_range_sentences, temperature_sentence, together
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
@@ -76,11 +75,6 @@ class Case:
     soh: Soh | None = None
     good: tuple[Measurement, ...] = ()
     reader: Reader = "command"
-
-    def checked(self) -> Case:
-        """The case as it is.  Raises DataError for a record that is given twice."""
-        check_distinct((*self.measurements, *self.good), self.tests, led=True)
-        return self
 
     @property
     def records(self) -> tuple[Measurement, ...]:
