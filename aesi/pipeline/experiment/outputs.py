@@ -119,7 +119,7 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
         "cell": result.loaded.cell_name,
         "data": result.loaded.config.data.kind,
         "fallback": result.loaded.fallback or None,
-        "notes": list(notes(result)),
+        "notes": list(view.notes),
         "models": rows,
     }
     # Predictions repeat the finding of the saved model; it is left out if it is about another model than the saved one.
