@@ -117,7 +117,7 @@ def calibrate(
     starts : number of fits: one from the file, the others from cells drawn from the priors with `seed`. The end of the
     highest posterior density is taken, and a note says how far apart the ends are.
     Raises DataError for records that do not belong to the cell; FitError where the start cannot be simulated;
-    InputError for less than one start or evaluation.
+    InputError for less than one start or evaluation, and for a prior of no parameter or of an impossible value.
     """
     began = time.perf_counter()
     conditions = conditions or Conditions()

@@ -59,8 +59,8 @@ class CaseRecord:
 
 @dataclass(frozen=True)
 class HeatFit:
-    """Fitted heat capacity (J/K), conductance from case to surroundings (W/K), and RMS error of the temperatures
-    (K)."""
+    """Fitted heat capacity (J/K), conductance from case to surroundings (W/K), and RMS error of the temperatures (K) of
+    the records, by name, that were used."""
 
     heat_capacity_j_k: float
     conductance_w_k: float

@@ -64,7 +64,7 @@ class WorkingVector:
     globals: int
     knots: int
     records: int
-    silicon: bool = False
+    silicon: bool
 
     @property
     def zero(self) -> int:

@@ -31,10 +31,9 @@ from aesi.pipeline.calibrate import (
     start_at_size,
     start_cell,
 )
-from aesi.pipeline.discovery.budget import within_budget
-from aesi.pipeline.discovery.cold import with_cold_admitted
 from aesi.pipeline.discovery.discover import Case, run_case
 from aesi.pipeline.discovery.finding import Finding
+from aesi.pipeline.discovery.searchable import searchable
 from aesi.pipeline.distinct import check_distinct_spectra
 from aesi.pipeline.product.declared import Declared, declared_model
 from aesi.records import Hold, Measurement, Spectrum
@@ -117,7 +116,7 @@ def discover(
         good=known,
         reader="python",
     )
-    case = with_cold_admitted(within_budget(case.checked()))  # refused before anything is searched
+    case = searchable(case)  # refused before anything is searched
     finding = Finding(case, run_case(case, folder, progress))
     if folder is not None:
         finding.save(folder)

@@ -127,7 +127,7 @@ def calibrate_files(
 
     on_step : told at each step of the fit.
 
-    Raises CellError or DataError, one sentence, for what cannot be used.
+    Raises CellError, DataError or InputError, one sentence, for what cannot be used.
     """
     asked = request or Request()
     conditions = asked.conditions
@@ -270,7 +270,7 @@ def calibration_content(
 ) -> dict[str, Any]:
     """The report: errors by file, parameters with intervals, what stays open.
 
-    read : what a reader dropped, mapped or averaged in the files.
+    read : notes before those of the fit: what it leaves out of the file, and what a reader dropped, mapped or averaged.
     """
     sampled_notes = () if posterior is None else (posterior.sentence,)
     told = (note for note in (*read, *found.notes, *sampled_notes) if note != found.size_assumed)

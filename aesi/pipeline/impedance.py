@@ -56,8 +56,10 @@ def impedance_file(
     frequencies : LOW:HIGH:N in Hz, log-spaced, or a CSV with a column frequency_hz, or an instrument's (freq/Hz).
     model : "espm" or "dfn"; None takes that of a saved model, or that the cell's file was fitted with, else "espm".
     soh : share of the file's capacity that the cell had then, or the day of the test; None takes all of it.
-    say_notes : is given a sentence where the model has no double layer, and frequencies at which that shows, and on
-    frequencies that are too low and too high for it, or there more than once.
+    say_notes : is given sentences on what of the file was not read, on another model than the cell was fitted with, the
+    share of capacity on a day, a temperature that it was not fitted at, effects that an impedance lacks, a double layer
+    that is missing at frequencies at which that shows, and frequencies that are too low or too high for the model, or
+    there more than once.
     """
     given = declared_model(cell)
     declared = given.with_soh(soh)

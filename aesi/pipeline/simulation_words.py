@@ -13,7 +13,7 @@ from aesi.physics.effects import CATALOGUE
 from aesi.physics.rest.open_circuit import GIVEN_SD
 from aesi.pipeline.product.hybrid import HybridModel, id_in
 from aesi.pipeline.product.prediction import Prediction
-from aesi.pipeline.product.trained import trained_figures, trained_sentence
+from aesi.pipeline.product.trained import percent_words, trained_figures, trained_sentence
 from aesi.records import Measurement, Run
 
 SOC_DIGITS = 3
@@ -228,5 +228,4 @@ def _within(voltage_v: Array, lower_v: Array, upper_v: Array) -> BoolArray:
 
 def _percent(rows: BoolArray) -> str:
     """The share of True rows, '3.2 %'."""
-    share = 100.0 * float(np.mean(rows))
-    return f"{share:.2g} %" if share < 99.5 else "100 %"
+    return percent_words(100.0 * float(np.mean(rows)))

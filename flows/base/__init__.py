@@ -1,1 +1,1 @@
-"""The basis of all other folders: environment, console, content keys, stored stages."""
+"""The basis of all other folders: environment, console, locks, databases, interrupts, content keys, stored stages."""

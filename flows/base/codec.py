@@ -12,7 +12,6 @@ import io
 import json
 import zipfile
 from collections.abc import Mapping
-from functools import cached_property
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -81,7 +80,7 @@ def _encode(value: Any, arrays: dict[str, np.ndarray]) -> Any:
         fields = {
             field.name: _encode(getattr(value, field.name), arrays)
             for field in dataclasses.fields(value)
-            if field.init and not isinstance(getattr(type(value), field.name, None), cached_property)
+            if field.init
         }
         return {"class": [type(value).__module__, type(value).__qualname__], "fields": fields}
     raise Uncodable(f"a {type(value).__module__}.{type(value).__qualname__} is not data")

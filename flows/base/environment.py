@@ -53,7 +53,8 @@ def workspace() -> Path:
 
 
 def state() -> Path:
-    """The workspace's .aesi/: caches, journals, Prefect's home. Safe to delete while nothing runs."""
+    """The workspace's .aesi/: caches, Prefect's home, the journal of the searches, records of unfinished runs, and what
+    the tracking store has not taken yet. Who deletes it loses the last three."""
     return workspace() / ".aesi"
 
 

@@ -133,7 +133,7 @@ def _content(file: Path) -> object:
 
 
 @contextmanager
-def _refused(out: Path, option: str = "--out") -> Iterator[None]:
+def _refused(out: Path, option: str) -> Iterator[None]:
     """Turns an OSError in the body of the `with` statement into an InputError about the option.  Raises InputError also
     for `-`, which other programs take as the standard output."""
     if str(out) == "-":

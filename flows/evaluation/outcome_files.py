@@ -10,7 +10,7 @@ from flows.base.locks import ProcessLock
 
 
 class FileOutcomes:
-    """One file a result below `folder`; claims are file locks, which the kernel drops with their process."""
+    """One file a result below `folder`, and one below its folder `claims` for each that is claimed."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder

@@ -1,1 +1,1 @@
-"""The jobs that a user starts: experiment, discovery, calibration, worker; as Prefect flows or plain functions."""
+"""The jobs that a user starts: experiment, discovery, batch, calibration, worker; Prefect flows or plain functions."""

@@ -65,13 +65,6 @@ def check_case(case: Case) -> None:
     )
 
 
-def case_and_folder(config: ExperimentConfig, out: Path | None) -> tuple[Case, Path, TrackedUnder]:
-    """The case of an experiment, the folder of its results, and what it is tracked under."""
-    from aesi.pipeline.discovery.cases import case_of_experiment
-
-    return case_of_experiment(config), out or finding_folder(config), TrackedUnder.of(config)
-
-
 def finding_folder(config: ExperimentConfig) -> Path:
     """Where the finding of an experiment goes when no folder is named."""
     return environment.workspace() / "runs" / config.name / "discovery"
@@ -81,8 +74,25 @@ def run_discovery(
     case: Case, out: Path, run: Stages, console: Console, under: TrackedUnder
 ) -> dict[str, Any]:
     """The flow itself; `run` runs a stage.  Raises InputError where another process writes to `out` now."""
+    from aesi.pipeline.discovery.discover import run_case, write_discovery
+
+    started = time.monotonic()
+    kept = f"What was fitted is kept in {out}; the same command goes on from there."
+    title = ", ".join(m.name for m in case.measurements)
     with alone_in(out):
-        return _run_discovery(case, out, run, console, under)
+        if (out / ARCHIVE).exists():
+            console.say(_earlier_sentence(out))
+        with tracked_job(_subject(case, under), title, console) as tracker, kept_on_interrupt(kept):
+            _track_case(tracker, case)
+            follow = HypothesisTracker(tracker, console)
+            found = run("hypotheses", lambda: run_case(case, out, follow))
+            content: dict[str, Any] = run(
+                "report", lambda: write_discovery(out, case, found, _run_id(tracker))
+            )
+            _track_result(tracker, found, content, out)
+        run.publish("discovery", _page(content, out, tracker), "What the model lacks")
+        _say_result(console, content, (*case.restrictions, *case.assumed, *found.notes), out, started)
+    return content
 
 
 def _earlier_sentence(out: Path) -> str:
@@ -90,27 +100,6 @@ def _earlier_sentence(out: Path) -> str:
     replaced = ", and its finding is replaced when this search ends" if (out / FINDING).exists() else ""
     fits = "fits of the same cell and records by this version are taken up again"
     return f"{out} holds an earlier search: {fits}{replaced}."
-
-
-def _run_discovery(
-    case: Case, out: Path, run: Stages, console: Console, under: TrackedUnder
-) -> dict[str, Any]:
-    from aesi.pipeline.discovery.discover import run_case, write_discovery
-
-    started = time.monotonic()
-    if (out / ARCHIVE).exists():
-        console.say(_earlier_sentence(out))
-    kept = f"What was fitted is kept in {out}; the same command goes on from there."
-    title = ", ".join(m.name for m in case.measurements)
-    with tracked_job(_subject(case, under), title, console) as tracker, kept_on_interrupt(kept):
-        _track_case(tracker, case)
-        follow = HypothesisTracker(tracker, console)
-        found = run("hypotheses", lambda: run_case(case, out, follow))
-        content: dict[str, Any] = run("report", lambda: write_discovery(out, case, found, _run_id(tracker)))
-        _track_result(tracker, found, content, out)
-    run.publish("discovery", _page(content, out, tracker), "What the model lacks")
-    _say_result(console, content, (*case.restrictions, *case.assumed, *found.notes), out, started)
-    return content
 
 
 def _page(content: dict[str, Any], out: Path, tracker: Tracker | None) -> str:

@@ -10,7 +10,7 @@ from prefect.runtime import flow_run
 
 from flows.base import environment
 from flows.base.console import Console
-from flows.jobs.discovery import TrackedUnder, case_and_folder, run_discovery
+from flows.jobs.discovery import TrackedUnder, finding_folder, run_discovery
 from flows.jobs.experiment import run_experiment
 from flows.jobs.run_request import RunRequest
 from flows.jobs.stages import PrefectStages
@@ -73,12 +73,15 @@ def discovery(
     handed : `path` and `overrides` with the file as that process has read it, which says how the case is tracked.
     """
     environment.prepare_process()
+    from aesi.pipeline.discovery.cases import case_of_experiment
+
     console = Console()
     folder = Path(out) if out else None
     under = TrackedUnder()
     if case is None:
         asked = handed.request if handed else RunRequest(str(path), tuple(overrides or ()))
-        case, folder, under = case_and_folder(asked.config, folder)
+        case, under = case_of_experiment(asked.config), TrackedUnder.of(asked.config)
+        folder = folder or finding_folder(asked.config)
     elif handed:
         under = TrackedUnder.of(handed.request.config)
     assert folder is not None  # `aesi discover` with records asks for one

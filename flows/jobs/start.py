@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 from aesi.errors import first_line
 from flows.base import environment
 from flows.base.console import Console
-from flows.jobs.discovery import TrackedUnder, case_and_folder, check_case, run_discovery
+from flows.jobs.discovery import TrackedUnder, check_case, finding_folder, run_discovery
 from flows.jobs.experiment import run_experiment
 from flows.jobs.run_request import HandedOver, RunRequest
 from flows.jobs.stages import PlainStages, server_in_reach
@@ -77,18 +77,17 @@ def discover(
     case: Case,
     out: Path,
     use_prefect: bool = True,
-    under: TrackedUnder | None = None,
     request: RunRequest | None = None,
 ) -> dict[str, Any]:
     """Trace one case and write the finding to `out`; returns the content of discovery.json.
 
-    under : what it is tracked under.  request : of the experiment file that says so, if one does.
+    request : of the experiment file that describes the case and how it is tracked, if one does.
     Raises AesiError, one sentence, for what cannot be used; nothing is started then.
     """
     environment.prepare_process()
     from flows.base.store_address import checked_address
 
-    under = under or TrackedUnder()
+    under = TrackedUnder.of(request.config) if request else TrackedUnder()
     checked_address(under.tracking.uri)
     check_case(case)
 
@@ -117,8 +116,10 @@ def discover_experiment(
     request: RunRequest, out: Path | None = None, use_prefect: bool = True
 ) -> dict[str, Any]:
     """Trace the case that an experiment file describes; its results go below runs/ where no folder is given."""
-    case, folder, under = case_and_folder(request.config, out)
-    return discover(case, folder, use_prefect, under, request)
+    from aesi.pipeline.discovery.cases import case_of_experiment
+
+    config = request.config
+    return discover(case_of_experiment(config), out or finding_folder(config), use_prefect, request)
 
 
 def _with_or_without(under_prefect: Callable[[], T], plainly: Callable[[], T], use_prefect: bool) -> T:

@@ -1,1 +1,1 @@
-"""Results that are read back from the tracking store: tables, the user interface."""
+"""Results that are read back from the tracking store: tables, comparisons, single candidates, the user interface."""

@@ -19,6 +19,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from aesi.advice import listed
 from aesi.errors import AesiError, FitError, InputError
 from aesi.logins import without_login
 from aesi.numerics.files.whole import write_whole
@@ -172,8 +173,7 @@ def rebuilt_line(rebuilt: Rebuilt, out: Path) -> str:
 def _one_of(rebuilt: Rebuilt) -> str:
     if len(rebuilt.members) < 2 or rebuilt.number not in rebuilt.members:
         return ""
-    *others, last = rebuilt.members
-    numbers = f"{', '.join(map(str, others))} and {last}"
+    numbers = listed([str(number) for number in rebuilt.members])
     return f". It is one of several: the models of the run are the mean of candidates {numbers}"
 
 

@@ -69,7 +69,7 @@ class SearchResult:
         return tuple(trial for trial in self.trials if trial.feasible)
 
     def front(self) -> tuple[Trial, ...]:
-        """Feasible trials that no other feasible one beats in all losses."""
+        """Feasible trials that no other feasible one dominates: is as good as in all losses, and better than in one."""
         best = {trial.user_attrs[INDEX] for trial in self.study.best_trials}
         return tuple(trial for trial in self.feasible if trial.number in best)
 
@@ -86,7 +86,7 @@ class SearchResult:
             )
 
     def best(self) -> Trial:
-        """The trial of highest fitness; the earlier one on a tie.
+        """The trial of the front of highest fitness; the earlier one on a tie.
 
         Raises FitError, with the reasons counted, where no trial is feasible.
         """

@@ -8,6 +8,7 @@ from math import isfinite, log10
 from pathlib import Path
 from typing import Any
 
+from aesi.advice import listed
 from aesi.constants import MV_PER_V
 from aesi.logins import without_login
 from aesi.numerics.files.source_digest import source_digest
@@ -56,7 +57,7 @@ def track_start(tracker: Tracker, config: ExperimentConfig, loaded: Loaded, fold
     Raises BegunOtherwise where a run that is gone on with was begun on other data or of another cell.
     """
     held = {"cell_digest": loaded.files, "data_digest": ", ".join(loaded.digests.values())}
-    tracker.as_begun(held, "records or a cell file")
+    tracker.as_begun(held)
     whole = _without_logins(loaded.config.model_dump(mode="json"))
     content = {key: value for key, value in whole.items() if key not in NO_PARAMETERS}
     tracker.about(experiment_tags(f"{config.note}\n\n{HOW_TO_READ}".strip(), RUN_COLUMNS))
@@ -131,16 +132,19 @@ class CandidateTracker:
             "library_hash": genome.digest(self._problem.library),
             **self._shared,
         }
+        label, name, kind = f"candidate:{number}", f"candidate {number:03d}", "candidate"
+        if isinstance(outcome, Failed):
+            self._tracker.nested(label, name, kind, params, {}, failed=outcome.reason)
+            return
         self._tracker.nested(
-            label=f"candidate:{number}",
-            name=f"candidate {number:03d}",
-            kind="candidate",
-            params=params,
-            metrics={} if isinstance(outcome, Failed) else _metrics(outcome, self._valid_shares),
-            files={} if isinstance(outcome, Failed) else {COEFFICIENTS: coefficients(outcome.candidate)},
-            failed=outcome.reason if isinstance(outcome, Failed) else None,
-            tags={} if isinstance(outcome, Failed) or not outcome.note else {"aesi.intervals": outcome.note},
-            seconds=0.0 if isinstance(outcome, Failed) else outcome.seconds,
+            label,
+            name,
+            kind,
+            params,
+            _metrics(outcome, self._valid_shares),
+            files={COEFFICIENTS: coefficients(outcome.candidate)},
+            tags={"aesi.intervals": outcome.note} if outcome.note else {},
+            seconds=outcome.seconds,
         )
 
 
@@ -182,9 +186,8 @@ def track_result(
 
 def candidates_line(numbers: Sequence[int]) -> str:
     """'Candidate 12 of the search', or of which candidates the models are the mean."""
-    if len(numbers) == 1:
-        return f"Candidate {numbers[0]} of the search"
-    return f"The mean of candidates {', '.join(map(str, numbers[:-1]))} and {numbers[-1]} of the search"
+    which = "Candidate" if len(numbers) == 1 else "The mean of candidates"
+    return f"{which} {listed([str(number) for number in numbers])} of the search"
 
 
 def result_line(row: Mapping[str, Any]) -> str:

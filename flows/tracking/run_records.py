@@ -56,7 +56,7 @@ def records(experiment: str | None = None) -> list[RunRecord]:
     return [record for record in found if experiment in (None, record.experiment)]
 
 
-class RunLock:
+class RunLock(ProcessLock):
     """The right to work on a run; `held` says whether this process has it, as none is known to where the workspace's
     file system has no locks.
 
@@ -64,22 +64,8 @@ class RunLock:
     """
 
     def __init__(self, run_id: str) -> None:
-        folder = _folder()
+        super().__init__(_folder() / f"{run_id}.lock", str(_folder()), "working on the same run")
         self._run_id = run_id
-        self._lock = ProcessLock(folder / f"{run_id}.lock", str(folder), "working on the same run")
-
-    @property
-    def held(self) -> bool:
-        """Whether this process works on the run."""
-        return self._lock.held
-
-    def acquire(self) -> bool:
-        """Take the lock; False where another process has it."""
-        return self._lock.acquire()
-
-    def release(self) -> None:
-        """Give it back."""
-        self._lock.release()
 
     def __enter__(self) -> RunLock:
         if not self.acquire():

@@ -80,7 +80,8 @@ class Tracker:
     """Tracks one flow run, new or resumed.
 
     run_id : MLflow's id of the parent run, which also names the folder below runs/.  resumed : whether it is old.
-    title : what a new run is called; None names the experiment and the seed.
+    experiment_id : MLflow's id of the experiment.  title : what a new run is called; None names the experiment and the
+    seed.
     """
 
     def __init__(
@@ -94,7 +95,7 @@ class Tracker:
         self.store = store
         self._config = config
         self._say = say
-        self._experiment_id = store.experiment(config.name)
+        self.experiment_id = store.experiment(config.name)
         self._tracked: set[str] = set()
         self._began: dict[str, str] = {}
         self.resumed = run_id is not None
@@ -102,11 +103,11 @@ class Tracker:
             job = config.job if isinstance(config, Subject) else EXPERIMENT
             tags = {KIND: "run", JOB: job, "aesi.config_digest": config.digest, **source_tags()}
             name = title or f"{config.name}, seed {config.seed}"
-            self.run_id = store.create_run(self._experiment_id, _short(name), tags)
+            self.run_id = store.create_run(self.experiment_id, _short(name), tags)
         else:
             self.run_id = run_id
             store.client.update_run(run_id, status="RUNNING")
-            self._tracked = set(store.children(self._experiment_id, run_id))
+            self._tracked = set(store.children(self.experiment_id, run_id))
             self._began = dict(store.run(run_id).data.params)
         self._outbox = Outbox(
             environment.state() / "outbox" / self.run_id, partial(deliver, store), store.away, say
@@ -119,15 +120,10 @@ class Tracker:
             threading.Thread(target=self._sample, name="aesi-system", daemon=True).start()
 
     @property
-    def experiment_id(self) -> str:
-        """MLflow's id of the experiment."""
-        return self._experiment_id
-
-    @property
     def address(self) -> str:
         """Where MLflow's UI shows the run: on the server, or on the one that `aesi ui` starts."""
         server = without_login(self.store.uri) if self.store.uri.startswith("http") else LOCAL_UI
-        return f"{server.rstrip('/')}/#/experiments/{self._experiment_id}/runs/{self.run_id}?{TRAINING}"
+        return f"{server.rstrip('/')}/#/experiments/{self.experiment_id}/runs/{self.run_id}?{TRAINING}"
 
     def parameters(self, values: Mapping[str, Any], tags: Mapping[str, str] | None = None) -> None:
         """Parameters of the parent run.
@@ -142,15 +138,12 @@ class Tracker:
             self._say(f"tracking: the run stays tracked as it was begun, with {told}.")
         self._batch(params={k: v for k, v in texts.items() if k not in changed}, tags=dict(tags or {}))
 
-    def as_begun(self, values: Mapping[str, str], what: str) -> None:
-        """Raises BegunOtherwise where the run is gone on with and began with another of these parameters.
-
-        what : what they are of, in words.
-        """
-        if any(self._began.get(name, text) != text for name, text in _texts(values).items()):
+    def as_begun(self, digests: Mapping[str, str]) -> None:
+        """Raises BegunOtherwise where the run is gone on with and began on other records or another cell, by digest."""
+        if any(self._began.get(name, text) != text for name, text in _texts(digests).items()):
             raise BegunOtherwise(
-                f"run {self.run_id} was begun with {what} that are others now, and its candidates would stand beside "
-                "new ones of these; leave out --resume to start a new run."
+                f"run {self.run_id} was begun with records or a cell file that are others now, and its candidates "
+                "would stand beside new ones of these; leave out --resume to start a new run."
             )
 
     def metrics(self, values: Mapping[str, float], step: int = 0) -> None:
@@ -182,7 +175,7 @@ class Tracker:
         self._outbox.put(
             {
                 "kind": "run",
-                "experiment_id": self._experiment_id,
+                "experiment_id": self.experiment_id,
                 "parent": self.run_id,
                 "label": label,
                 "name": _short(name),
@@ -201,7 +194,7 @@ class Tracker:
         self._outbox.put(
             {
                 "kind": "mark",
-                "experiment_id": self._experiment_id,
+                "experiment_id": self.experiment_id,
                 "parent": self.run_id,
                 "label": label,
                 "tags": dict(tags),
@@ -210,7 +203,7 @@ class Tracker:
 
     def about(self, tags: Mapping[str, str]) -> None:
         """Tags of the experiment, where it has none of that name yet."""
-        self._outbox.put({"kind": "experiment", "experiment_id": self._experiment_id, "tags": dict(tags)})
+        self._outbox.put({"kind": "experiment", "experiment_id": self.experiment_id, "tags": dict(tags)})
 
     def files(self, path: Path, to: str | None = None) -> None:
         """A file or a folder as artifacts of the parent run; they may be delivered from another folder later."""
@@ -251,7 +244,7 @@ class Tracker:
         """Whether nothing has been tracked below the parent run."""
         return not self._tracked
 
-    def withdraw(self, wait_s: float = FLUSH_S) -> None:
+    def withdraw(self, wait_s: float) -> None:
         """Take the run back, as if it had never begun: MLflow keeps it among its deleted runs.
 
         Raises OSError or MlflowException where the store does not; the run can be ended then.

@@ -27,6 +27,7 @@ MAY = {
     "aesi/pipeline/batch": "hands the files of each cell on",
     "aesi/pipeline/discovery/budget.py": "thins each by its own length",
     "aesi/pipeline/discovery/cases.py": "reads the files",
+    "aesi/pipeline/discovery/searchable.py": "refuses what is fitted too",
     "aesi/pipeline/discovery/discover.py": "hands them to the tracer",
     "aesi/tracer/discovery.py": "hands them to the outcome",
     "flows/commands/cell.py": "takes --test from the command line",

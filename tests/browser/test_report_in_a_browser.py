@@ -2,8 +2,8 @@
 
 import pytest
 
-from aesi.pipeline.report import write_discovery_report, write_run_report
 from aesi.pipeline.report.compare import ComparedRun, write_comparison
+from aesi.pipeline.report.write import write_discovery_report, write_run_report
 
 
 @pytest.fixture(scope="module")

@@ -37,7 +37,7 @@ class Prepared:
 
     data : as measured.  rows, hold : thinned rows for the simulation, and how their current runs.  kelvin : (rows,) K,
     or None for the cell's own temperature.  start : state of charge at the first row.  soc_sd : its standard deviation
-    in the fit.  slow : True for C/7 at most.  flows : (rows,) 1 where a current flows, else 0.
+    in the fit.  slow : see `is_slow`.  flows : (rows,) 1 where a current flows, else 0.
     trusted : (rows,) see `Thinned`.
     """
 

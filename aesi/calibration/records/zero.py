@@ -77,7 +77,7 @@ class Zero:
 
 
 def is_slow(record: Measurement, nominal_ah: float) -> bool:
-    """Whether a record stays within C/7, except for single rows."""
+    """Whether 95 % of a record's rows stay within SLOW_C_RATE of its nominal capacity (Ah)."""
     return bool(np.quantile(np.abs(record.current_a), 0.95) <= SLOW_C_RATE * nominal_ah)
 
 

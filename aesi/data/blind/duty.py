@@ -1,4 +1,4 @@
-"""The tests of a case: drives, pulses, a slow discharge, each from a rest, of 20 to 60 minutes or one discharge."""
+"""The tests of a case: drives, pulses, a slow discharge, each from a rest, of 25 to 60 minutes or one discharge."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ LEAST_SOC = 0.1
 class DutyConditions:
     """Conditions of a test.
 
-    capacity_ah : of the cell.  rate : factor on the currents.  soc0 : at the first row.  dt_s : interval of rows, s.
+    capacity_ah : of the cell.  rate : factor on the currents of drives and pulses; the C-rates below are those at 1.
+    soc0 : at the first row.  dt_s : interval of rows, s.
     """
 
     capacity_ah: float
@@ -42,7 +43,7 @@ class DutyConditions:
 
     @property
     def builder(self) -> ProfileBuilder:
-        """The builder of profiles for this cell, with the factor on the currents."""
+        """The builder of profiles for this cell, with the factor on the currents of drives, but not on pulses."""
         return ProfileBuilder(self.capacity_ah, dt_s=self.dt_s, scale=self.rate)
 
 

@@ -24,7 +24,7 @@ from aesi.data.laboratory.changes import CONTACT_RESISTANCE, find_change
 from aesi.data.laboratory.mixing import porous_electrode
 from aesi.data.laboratory.sizes import gauss_sizes
 from aesi.data.profiles.profile import Profile
-from aesi.errors import DataError, SimulationError
+from aesi.errors import DataError, SimulationError, first_line
 from aesi.numerics.typing import Array
 
 LaboratoryModel = Literal["SPMe", "DFN"]
@@ -168,7 +168,7 @@ def parameter_values(bpx: Path, soc0: float) -> Any:
             values = pybamm.ParameterValues.create_from_bpx(str(bpx), target_soc=soc0)
     except Exception as error:
         # pydantic, json and bpx raise each their own
-        raise DataError(f"{bpx.name} is no usable BPX file: {str(error).splitlines()[0][:200]}") from None
+        raise DataError(f"{bpx.name} is no usable BPX file: {first_line(error)}") from None
     values.update(
         {"Upper voltage cut-off [V]": 6.0, "Lower voltage cut-off [V]": 0.5}, check_already_exists=False
     )

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from aesi.data.readers.formats import recognise
-from aesi.errors import DataError
+from aesi.errors import DataError, first_line
 from aesi.numerics.typing import Array
 
 
@@ -27,7 +27,7 @@ class ParquetTable:
             self.header = tuple(self._file.schema_arrow.names)
             self.format = recognise(self.header)
         except (pa.ArrowException, OSError, ValueError) as error:
-            raise DataError(f"{path.name} is damaged or no Parquet file: {_brief(error)}") from None
+            raise DataError(f"{path.name} is damaged or no Parquet file: {first_line(error)}") from None
 
     def read(self, positions: tuple[int, ...]) -> list[Array]:
         """The columns at the given positions; null becomes NaN."""
@@ -45,7 +45,9 @@ class ParquetTable:
         try:
             return [_floats(table.column(name)) for name in names]
         except pa.ArrowException as error:
-            raise DataError(f"{self.path.name} holds numbers that are no float64: {_brief(error)}") from None
+            raise DataError(
+                f"{self.path.name} holds numbers that are no float64: {first_line(error)}"
+            ) from None
 
     def read_text(self, positions: tuple[int, ...]) -> list[list[str]]:
         """The columns at the given positions as words; null becomes ''."""
@@ -59,7 +61,7 @@ class ParquetTable:
         try:
             return self._file.read(columns=names)
         except (pa.ArrowException, OSError, ValueError) as error:
-            raise DataError(f"{self.path.name} is damaged: {_brief(error)}") from None
+            raise DataError(f"{self.path.name} is damaged: {first_line(error)}") from None
 
     def where(self, row: int) -> str:
         """Parquet has rows, no lines."""
@@ -71,7 +73,3 @@ def _floats(column: Any) -> Array:
 
     values: Array = column.cast(pa.float64()).to_numpy().astype(np.float64)
     return values
-
-
-def _brief(error: Exception) -> str:
-    return str(error).splitlines()[0][:200] if str(error) else type(error).__name__

@@ -11,9 +11,8 @@ from aesi.data.reading import record_names
 from aesi.errors import ConfigError, DataError
 from aesi.physics import ModelName
 from aesi.physics.cell import Soh
-from aesi.pipeline.discovery.budget import within_budget
-from aesi.pipeline.discovery.cold import with_cold_admitted
 from aesi.pipeline.discovery.discover import Case
+from aesi.pipeline.discovery.searchable import searchable
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.sections import DiscoverConfig
 from aesi.pipeline.experiment.sources import cell_path, discovery_records
@@ -38,7 +37,7 @@ def case_of_files(
     model: ModelName | None = None,
     soh: Soh | None = None,
 ) -> Case:
-    """A case of measurement files, thinned to what a search can be run on (`within_budget`).
+    """A case of measurement files, as `searchable` has it.
 
     data, tests, good : files of the records that are looked at, that choose nothing, and that are known to be good.
     reading, hold : how the files are read, and how the current runs between their rows; None tells by the rows.
@@ -63,7 +62,7 @@ def case_of_files(
         model=model,
         soh=soh,
     )
-    return with_cold_admitted(within_budget(case.checked()))
+    return searchable(case)
 
 
 def case_of_experiment(config: ExperimentConfig) -> Case:
@@ -98,6 +97,6 @@ def case_of_experiment(config: ExperimentConfig) -> Case:
         reader="experiment",
     )
     try:
-        return with_cold_admitted(within_budget(case.checked()))
+        return searchable(case)
     except DataError as error:
         raise DataError(with_keys(str(error))) from None

@@ -20,7 +20,6 @@ from aesi.physics.cell import Soh
 from aesi.physics.effects import CATALOGUE, Effect, known_effects, selected
 from aesi.physics.folded import folded
 from aesi.physics.simulation import ModelName
-from aesi.pipeline.distinct import check_distinct
 from aesi.pipeline.notes import soh_day_sentences, temperature_range_sentences, temperature_sentence, together
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
@@ -76,11 +75,6 @@ class Case:
     soh: Soh | None = None
     good: tuple[Measurement, ...] = ()
     reader: Reader = "command"
-
-    def checked(self) -> Case:
-        """The case as it is.  Raises DataError for a record that is given twice."""
-        check_distinct((*self.measurements, *self.good), self.tests, led=True)
-        return self
 
     @property
     def records(self) -> tuple[Measurement, ...]:
@@ -183,7 +177,7 @@ def run_case(case: Case, out: Path | None = None, progress: Progress | None = No
 
 def write_discovery(out: Path, case: Case, found: Discovery, mlflow_run_id: str = "") -> dict[str, Any]:
     """Write discovery.json, report.html and model/ to `out`; returns the content of discovery.json."""
-    from aesi.pipeline.report import write_discovery_report
+    from aesi.pipeline.report.write import write_discovery_report
 
     content = discovery_content(found, case.notes)
     write_whole(out / FINDING, json.dumps(content, indent=1, allow_nan=False) + "\n")

@@ -17,6 +17,7 @@ from aesi.pipeline.discovery.discover import (
 )
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.tracer import Discovery
+from aesi.tracer.report.outcome import Part
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,7 +35,7 @@ class Finding:
 
     def __repr__(self) -> str:
         kept_back = bool(self.content["before"]["test"])
-        part: Literal["fit", "test"] = "test" if kept_back else "fit"
+        part: Part = "test" if kept_back else "fit"
         where = "on held-out data" if kept_back else "on the fitted data"
         named = f" {', '.join(self.effects)}" if self.effects else ""
         errors = (
@@ -78,7 +79,7 @@ class Finding:
         state: Literal["before", "recalibrated", "after"] = "after",
         part: Literal["fit", "test"] = "test",
     ) -> float:
-        """RMS voltage error of a model, mV; NaN where there is no such part.
+        """RMS voltage error of a model, mV; NaN where there is no such part, or the model cannot be simulated on it.
 
         state : "before", the declared model; "recalibrated"; or "after", the written model.
         part : "test", to which nothing was fitted, or "fit".

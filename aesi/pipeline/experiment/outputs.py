@@ -20,10 +20,12 @@ from aesi.pipeline.experiment.load import Loaded
 from aesi.pipeline.experiment.physics_models import DECLARED, PHYSICS_NAMES, RECALIBRATED
 from aesi.pipeline.notes import together
 from aesi.pipeline.product.hybrid import HybridModel
-from aesi.pipeline.report import tables, write_figures, write_run_report
+from aesi.pipeline.report import tables
 from aesi.pipeline.report.figures import paper_figures
+from aesi.pipeline.report.page import write_figures
 from aesi.pipeline.report.views import BootstrapView, RecordTrace, RunView
 from aesi.pipeline.report.words.runs import run_finding
+from aesi.pipeline.report.write import write_run_report
 from aesi.pipeline.written import FIGURES, MODEL, PAPER_FIGURES, REPORT, SUMMARY, TABLES
 from aesi.records.failed import candidates_failed
 from aesi.sparse import ENSEMBLES, Candidate, Problem, SparseModel
@@ -117,7 +119,7 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
         "cell": result.loaded.cell_name,
         "data": result.loaded.config.data.kind,
         "fallback": result.loaded.fallback or None,
-        "notes": list(notes(result)),
+        "notes": list(view.notes),
         "models": rows,
     }
     # Predictions repeat the finding of the saved model; it is left out if it is about another model than the saved one.

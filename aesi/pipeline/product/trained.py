@@ -70,7 +70,7 @@ def trained_sentence(
     first_measured : whether the first voltage is measured, whose error a free run starts with.
     """
     share, kept = figures["outside_pct"], figures["kept_pct"]
-    head = f"{name}: {_percent_words(share)} of the rows lie outside the range the correction was trained on"
+    head = f"{name}: {percent_words(share)} of the rows lie outside the range the correction was trained on"
     where, beyond = "", figures["beyond_k"] or 0.0
     if abs(beyond) >= TELLING_K:
         side = "below" if beyond < 0 else "above"
@@ -80,7 +80,7 @@ def trained_sentence(
     if kept >= ALL_PCT:
         return f"{head}."
     if kept >= NONE_PCT:
-        share_kept = _percent_words(kept)
+        share_kept = percent_words(kept)
         return f"{head}; {where}the correction fades towards the physics, to {share_kept} of its size on average."
     alone = "the physics model"
     if one_step:
@@ -90,7 +90,7 @@ def trained_sentence(
     return f"{head}; {where}none of the correction is applied: this is {alone}."
 
 
-def _percent_words(percent: float) -> str:
+def percent_words(percent: float) -> str:
     """A share in per cent, as text: all of it from `ALL_PCT` on."""
     return f"{percent:.2g} %" if percent < ALL_PCT else "100 %"
 

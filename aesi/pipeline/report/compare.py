@@ -10,7 +10,7 @@ from typing import Any
 
 from aesi.advice import listed
 from aesi.constants import MV_PER_V
-from aesi.pipeline.report.page import write_plain_page
+from aesi.pipeline.report.page import beside, write_plain_page
 from aesi.pipeline.report.table_formats import ABSENT
 from aesi.sparse.search.genome import GENE_WORDS
 
@@ -114,7 +114,7 @@ def write_comparison(path: Path, runs: Sequence[ComparedRun]) -> Path:
         path,
         "compare.html",
         payload={"limit": limit, "maps": [content["mean_mv"] for _, content in maps]},
-        scripts={"compare_js": "compare.js"},
+        compare_js=beside("compare.js"),
         title=f"{counted_jobs(runs)} compared",
         heading=_finding(runs),
         what=counted_jobs(runs),
@@ -219,7 +219,7 @@ def _verdict_counts(runs: Sequence[ComparedRun]) -> str:
     if not verdicts:
         return ""
     told = ", ".join(f"{count} {verdict}" for verdict, count in verdicts.most_common())
-    return f"Of {verdicts.total()} {'discovery' if verdicts.total() == 1 else 'discoveries'}: {told}."
+    return f"Of {verdicts.total()} {_called('discovery', verdicts.total())}: {told}."
 
 
 def _unfinished(runs: Sequence[ComparedRun]) -> str:

@@ -57,10 +57,14 @@ def physics_maps(view: RunView) -> dict[str, Figure | None]:
         (maps.shared_limit(current, soc, [error], False) for current, soc, error in parts.values()),
         default=None,
     )
-    names = {"train": "training set", "valid": "validation set", "test": "test set"}
     return {
         f"error_map_espm_{role}": maps.map_figure(
-            current, soc, error, f"Error of the {view.corrected}, {names[role]}", False, limit
+            current,
+            soc,
+            error,
+            f"Error of the {view.corrected}, {records.ROLE_WORDS[role]} set",
+            False,
+            limit,
         )
         for role, (current, soc, error) in parts.items()
     }

@@ -22,51 +22,40 @@ HERE = Path(__file__).parent
 
 
 def write_page(path: str | Path, template: str, figures: Mapping[str, Figure], **context: Any) -> Path:
-    """Render `template` with its figures into one offline file.
-
-    The file replaces an older one in one step, so that an interrupted write leaves the old report readable.
-    """
+    """Render `template` with its figures into one offline file, and return its path."""
     from plotly.offline import get_plotlyjs
 
     store = ArrayStore()
     embedded = {name: embed(fig, store) for name, fig in figures.items()}
-    html = (
-        _environment()
-        .get_template(template)
-        .render(
-            **context,
-            figures={name: _describe(fig, embedded[name]) for name, fig in figures.items()},
-            payload=_script_safe(
-                {"figures": {n: e.data for n, e in embedded.items()}, "arrays": store.arrays}
-            ),
-            plotly_js=get_plotlyjs(),
-            style_css=(HERE / "report.css").read_text(encoding="utf-8"),
-            report_js=(HERE / "report.js").read_text(encoding="utf-8"),
-        )
+    return write_plain_page(
+        path,
+        template,
+        {"figures": {name: each.data for name, each in embedded.items()}, "arrays": store.arrays},
+        figures={name: _describe(fig, embedded[name]) for name, fig in figures.items()},
+        plotly_js=get_plotlyjs(),
+        report_js=beside("report.js"),
+        **context,
     )
-    write_whole(Path(path), html)
-    return Path(path)
 
 
-def write_plain_page(
-    path: str | Path, template: str, payload: Any, scripts: Mapping[str, str], **context: Any
-) -> Path:
-    """Render `template` into one offline file without plotly.js.
+def write_plain_page(path: str | Path, template: str, payload: Any, **context: Any) -> Path:
+    """Render `template` into one offline file, and return its path.
 
-    scripts : name in the template -> file beside it.
+    The file replaces an older one in one step, so that an interrupted write leaves the old page readable.
+    payload : what the page's script reads, as JSON.
     """
     html = (
         _environment()
         .get_template(template)
-        .render(
-            **context,
-            **{name: (HERE / file).read_text(encoding="utf-8") for name, file in scripts.items()},
-            payload=_script_safe(payload),
-            style_css=(HERE / "report.css").read_text(encoding="utf-8"),
-        )
+        .render(payload=_script_safe(payload), style_css=beside("report.css"), **context)
     )
     write_whole(Path(path), html)
     return Path(path)
+
+
+def beside(name: str) -> str:
+    """A file beside this module, as text."""
+    return (HERE / name).read_text(encoding="utf-8")
 
 
 def _environment() -> Environment:

@@ -4,7 +4,8 @@ A row is an entry of `models` in a run's summary.json. Every value is optional a
 in addition to the published schema a row may have
 
     validation_mser_pct   over training drives left out in turn
-    free_run   {train,valid,test}_{mser_pct,mser_recalibrated_pct,rmse_mv}, diverged (the number of records left behind)
+    free_run   {train,valid,test}_{mser_pct,mser_recalibrated_pct,rmse_mv}, until_ran_out_rmse_mv where one did;
+               diverged (the number of test records on which the correction diverged), outside_pct (test)
     one_step   {train,valid,test}_rmse_mv, persistence_rmse_mv (test)
     k_step     {"1": mV, "10": mV, ...}: test RMSE by horizon in seconds; likewise k_step_persistence
     intervals  nominal_pct, coverage_pct, average_width_v, winkler_v, worst_bin_coverage_pct, low_minutes_pct (one step

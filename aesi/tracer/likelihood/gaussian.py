@@ -253,8 +253,8 @@ class PredictiveScore:
     total : mean of the sum over blocks and of the mean over the partitions by condition, plus the log prior of the
     size, nats.  evidence : log marginal likelihood at that size, nats.
     shifts : partition -> (f, m) change of the coordinates when each fold is left out.  shift : (m,) change of the
-    coordinates from the point to the optimum of all data.  covariance : (m, m) posterior covariance there. Both are
-    zero for a parameter that is held on a bound.
+    coordinates from the point to the optimum of all data.  covariance : (m, m) posterior covariance there. A parameter
+    that is held on a bound is shifted to it in every fold, and has no covariance.
     """
 
     size: Size

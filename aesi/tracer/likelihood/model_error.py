@@ -4,8 +4,9 @@
 
 A model errs by a voltage, delta, and by a state of charge, zeta, which shows where the open-circuit voltage is
 steep. delta has a log-normal prior: tight for a cell whose file was measured on it, loose for another of its make. zeta
-is delta over 1 V where the balance of the electrodes is held as declared. Where the balance is free, it takes up errors
-of charge itself, and zeta is no larger than for the cell that was measured.
+follows from delta: it is delta over 1 V where the file is believed to be careful, `CHARGE_PER_V` of delta for a
+measured cell, and at most `LOOSE_CHARGE` where the balance of the electrodes is open and takes up errors of charge
+itself.
 
 For a measured cell only the size of this error and its correlation time are known. No stationary process describes it,
 and a process fitted to it would count its details as evidence. The likelihood is therefore coarsened: rows count as

@@ -56,8 +56,8 @@ class FileOutcome:
     that of `after`, with its 95 % block-bootstrap interval, V; NaN where one of them has no voltage.  emptied_s : state
     -> time at which its simulation ran out of lithium or salt, s; only states that did.
     start_slope_v : (n,) V, change of the voltage of `after` by one standard deviation of an initial state that was not
-    fitted; None where it was fitted.  at_its_temperature : whether the record has a temperature.  hold : how its
-    current was taken to run between its rows.
+    fitted; None where it was fitted, or `after` cannot be simulated with it.  at_its_temperature : whether the record
+    has a temperature.  hold : how its current was taken to run between its rows.
     """
 
     name: str

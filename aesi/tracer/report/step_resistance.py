@@ -26,7 +26,7 @@ STEP_SHARE = 0.05
 """Least change of the current from row to row that counts as a step, as a share of the range of the current. A
 convention."""
 LEAST_STEPS = 25
-"""Fewest steps in a bin, five for each unknown of its fit. A convention."""
+"""Fewest steps in a bin, five for each of the five rows of a second that its fit sums over. A convention."""
 LARGEST_ERROR = 0.1
 """Largest standard error of a resistance, as a share of it; a less certain one is left out. A convention."""
 SOC_EDGES = np.linspace(0.0, 1.0, 11)
@@ -49,7 +49,7 @@ class StepResistance:
 
 @dataclass(frozen=True, eq=False)
 class CurrentSteps:
-    """Changes from row to row of one or more records whose rows have the same length.
+    """Changes from row to row of one or more records that have as many rows within `WITHIN_S`.
 
     change_a : (n, lags) A, of the current in a row and in the rows before it.  change_v : name of a voltage -> (n,) V.
     current_a, soc : (n,) A and 0 to 1, means of both ends of the row.  is_step : (n,) whether the current steps in it.
@@ -92,7 +92,7 @@ class CurrentSteps:
 
     @classmethod
     def together(cls, records: Sequence[CurrentSteps]) -> CurrentSteps:
-        """The changes in those of several records (at least one) that have the commonest length of a row."""
+        """The changes in those of one or more records whose number of rows within `WITHIN_S` is the commonest."""
         lags = Counter(one.change_a.shape[1] for one in records).most_common(1)[0][0]
         alike = [one for one in records if one.change_a.shape[1] == lags]
         return cls(

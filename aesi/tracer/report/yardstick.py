@@ -43,8 +43,8 @@ SHOWN = 4
 
 @dataclass(frozen=True)
 class Pointer:
-    """One of POINTS_TO.  share : of the residual's mean square that its terms explain on left-out pieces, 0 to 1.
-    terms : names of the chosen terms."""
+    """One of POINTS_TO.  share : of the residual's mean square that its terms explain on left-out pieces, 0 to 1; for
+    the error's own past what it explains beyond all other terms.  terms : names of the chosen terms."""
 
     share: float
     terms: tuple[str, ...] = ()

@@ -298,7 +298,7 @@ def admissible(
     fit: FittedHypothesis,
     least_nats: float,
 ) -> bool:
-    """Whether an effect is admitted: it gains at least `least_nats` on unseen data, makes the hypothesis more
+    """Whether an effect is admitted: it gains more than `least_nats` on unseen data, makes the hypothesis more
     plausible, moves the voltage by more than approximations of the model do, and ends on no bound. It need not lower
     the error: the first of several effects may not lower it at all."""
     competing = len(problem.competing())

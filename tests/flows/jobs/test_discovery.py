@@ -186,7 +186,7 @@ def test_a_discovery_of_an_experiment_was_not_tracked_where_its_file_says(
     import shutil
 
     from aesi.pipeline.discovery import cases
-    from flows.jobs import discovery, prefect_flows, start
+    from flows.jobs import prefect_flows, start
     from flows.jobs.run_request import RunRequest
     from flows.jobs.stages import PlainStages
     from flows.tracking.store import Store
@@ -195,7 +195,8 @@ def test_a_discovery_of_an_experiment_was_not_tracked_where_its_file_says(
     (workspace / "told.yaml").write_text(EXPERIMENT)
     uri = f"sqlite:///{workspace}/elsewhere.db"
     monkeypatch.setattr(cases, "case_of_experiment", lambda config: case)
-    monkeypatch.setattr(discovery, "_run_discovery", _only_tracked)
+    for job in (start, prefect_flows):
+        monkeypatch.setattr(job, "run_discovery", _only_tracked)
     if prefect:
         monkeypatch.setattr(start, "_with_or_without", lambda under_prefect, plainly, use: under_prefect())
         monkeypatch.setattr(prefect_flows, "discovery", prefect_flows.discovery.fn)

@@ -24,13 +24,13 @@ def test_a_resumed_run_with_another_setting_lost_all_of_its_parameters(store, sa
 def test_a_resumed_run_took_other_data_for_those_it_was_begun_with(store, said):
     held = {"data_digest": "aa, bb", "cell_digest": "cc"}
     begun = Tracker(store, QUIET, said.append)
-    begun.as_begun(held, "records")  # nothing yet
+    begun.as_begun(held)  # nothing yet
     begun.parameters(held)
     assert begun.end("FAILED") == 0
     resumed = Tracker(store, QUIET, said.append, begun.run_id)
-    resumed.as_begun(held, "records")
+    resumed.as_begun(held)
     with pytest.raises(
-        BegunOtherwise, match=f"run {begun.run_id} was begun with records that are others now"
+        BegunOtherwise, match=f"run {begun.run_id} was begun with records or a cell file that are others"
     ):
-        resumed.as_begun(held | {"data_digest": "aa, bd"}, "records")
+        resumed.as_begun(held | {"data_digest": "aa, bd"})
     assert resumed.end("FAILED") == 0

@@ -196,6 +196,17 @@ def test_unknown_changes_and_values_are_refused(nmc, tmp_path):
         simulate_truth(Setup(bad, "SPMe"), short())
 
 
+def test_a_cell_file_that_is_refused_without_a_word_ended_in_an_index_error(nmc, monkeypatch):
+    import pybamm
+
+    def refuse(*given, **options):
+        raise AssertionError
+
+    monkeypatch.setattr(pybamm.ParameterValues, "create_from_bpx", refuse)
+    with pytest.raises(DataError, match="no usable BPX file: AssertionError"):
+        parameter_values(nmc, 0.5)
+
+
 def test_the_instrument_writes_noise_and_steps(rng):
     n = 20_000
     trace = TrueRun(np.arange(n) * 1.0, np.zeros(n), np.full(n, 3.7), np.full(n, 25.0))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from aesi.pipeline.report import (
+from aesi.pipeline.report.views import (
     BootstrapView,
     DiscoveryTrace,
     DiscoveryView,

@@ -13,7 +13,6 @@ from aesi.calibration import Conditions, calibrate
 from aesi.physics import Cell, simulate
 from aesi.pipeline.calibrate import calibrate_files, fit_traces
 from aesi.pipeline.impedance import SpectrumError
-from aesi.pipeline.report import DiscoveryTrace
 from aesi.pipeline.report.calibration import (
     CalibrationView,
     courses,
@@ -21,6 +20,7 @@ from aesi.pipeline.report.calibration import (
     pulse_figure,
     write_calibration_report,
 )
+from aesi.pipeline.report.views import DiscoveryTrace
 from aesi.records import Measurement, Spectrum
 
 START = Path(__file__).resolve().parents[3] / "experiments" / "cells" / "lg_m50_chen2020.bpx.json"

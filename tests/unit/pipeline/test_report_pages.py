@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aesi.pipeline.report import sections, write_discovery_report, write_figures, write_run_report
+from aesi.pipeline.report import sections
 from aesi.pipeline.report.arrays.embed import STORED, ArrayStore, embed
-from aesi.pipeline.report.page import FILTERS, _environment
+from aesi.pipeline.report.page import FILTERS, _environment, write_figures
 from aesi.pipeline.report.plots import records
 from aesi.pipeline.report.table_formats import Table
+from aesi.pipeline.report.write import write_discovery_report, write_run_report
 
 
 def payload(html):

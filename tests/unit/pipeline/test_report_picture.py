@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aesi.pipeline.report import write_discovery_report, write_run_report
+from aesi.pipeline.report.write import write_discovery_report, write_run_report
 
 HOOK = Path(__file__).resolve().parents[3] / "docs" / "hooks" / "picture.py"
 

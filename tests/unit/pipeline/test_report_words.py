@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from aesi.physics.effects import CATALOGUE
-from aesi.pipeline.report import write_discovery_report, write_run_report
 from aesi.pipeline.report.words import discoveries, runs
 from aesi.pipeline.report.words.sizes import finding_line
+from aesi.pipeline.report.write import write_discovery_report, write_run_report
 
 
 def test_a_gain_is_told_with_both_errors_and_the_regime(views):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,6 +31,7 @@ BESIDE_SERIES = 0.1
 BAND = "band"
 """Beginning of the name of a band, by which its traces are told from lines."""
 ROLE_NAMES = {"train": "I training", "valid": "II validation", "test": "III test"}
+ROLE_WORDS = {"train": "training", "valid": "validation", "test": "test"}
 
 
 def profile_figure(traces: Sequence[RecordTrace], quantity: str) -> Figure:
@@ -85,7 +87,7 @@ def voltage_figure(traces: Sequence[RecordTrace], chosen: str, physics: str) -> 
     )
     caption += _fit_error_axis(fig)
     return style.framed(
-        fig, f"Voltage on the {_role_word(role)} records", caption, 560, hovermode="x unified"
+        fig, f"Voltage on the {ROLE_WORDS[role]} records", caption, 560, hovermode="x unified"
     )
 
 
@@ -230,14 +232,8 @@ def _has_intervals(trace: RecordTrace, model: str) -> bool:
 
 def _liveliest(traces: Sequence[RecordTrace], window_s: float) -> RecordTrace:
     """The stretch of `window_s` in which the current travels furthest."""
-    best: tuple[float, RecordTrace, slice] | None = None
-    for trace in traces:
-        for window in _windows(trace, window_s):
-            travelled = float(np.abs(np.diff(trace.current_a[window])).sum())
-            if best is None or travelled > best[0]:
-                best = (travelled, trace, window)
-    assert best is not None
-    return cut(best[1], best[2])
+    windows = ((trace, rows) for trace in traces for rows in _windows(trace, window_s))
+    return cut(*max(windows, key=lambda found: float(np.abs(np.diff(found[0].current_a[found[1]])).sum())))
 
 
 def _windows(trace: RecordTrace, window_s: float) -> Iterator[slice]:
@@ -253,7 +249,6 @@ def _windows(trace: RecordTrace, window_s: float) -> Iterator[slice]:
 
 def cut(trace: RecordTrace, rows: slice) -> RecordTrace:
     """A piece of a record, predictions included."""
-    from dataclasses import fields, replace
 
     def piece(record: object) -> dict[str, Array]:
         values = {f.name: getattr(record, f.name) for f in fields(record)}  # type: ignore[arg-type]
@@ -261,7 +256,3 @@ def cut(trace: RecordTrace, rows: slice) -> RecordTrace:
 
     predictions = {name: replace(p, **piece(p)) for name, p in trace.predictions.items()}  # type: ignore[arg-type]
     return replace(trace, predictions=predictions, **piece(trace))  # type: ignore[arg-type]
-
-
-def _role_word(role: str) -> str:
-    return {"train": "training", "valid": "validation", "test": "test"}[role]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from aesi.advice import listed
+from aesi.constants import MV_PER_V
 from aesi.over_time import stamp
 from aesi.pipeline.product.trained import ALL_PCT, trained_sentence
 from aesi.pipeline.report.views import Row, RunView
@@ -277,19 +278,19 @@ def interval_finding(model: Row) -> str:
         return ""
     text = (
         f"{nominal:g} % intervals one step ahead cover {coverage:.1f} % of the test samples with "
-        f"{1e3 * width:.2f} mV average width"
+        f"{MV_PER_V * width:.2f} mV average width"
     )
     text += "." if worst is None else f"; {worst:.1f} % in the worst (current, SOC) bin."
     free, wide = (_figure(model, "free_run_intervals", key) for key in ("coverage_pct", "average_width_v"))
     if free is None or wide is None:
         return text
     start = _figure(model, "free_run_intervals", "start_v")
-    text += f" The band in free run covers {free:.1f} % of them and is {1e3 * wide:.1f} mV wide"
+    text += f" The band in free run covers {free:.1f} % of them and is {MV_PER_V * wide:.1f} mV wide"
     if start is None:
         return f"{text}."
     return (
         f"{text}. It includes the uncertainty of the initial state of charge, which is read from a voltage: one "
-        f"standard deviation is {1e3 * start:.1f} mV. Give cell.soc0 if it is known."
+        f"standard deviation is {MV_PER_V * start:.1f} mV. Give cell.soc0 if it is known."
     )
 
 
