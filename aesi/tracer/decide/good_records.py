@@ -149,7 +149,7 @@ def verdict_beside(path: Path, thresholds: Thresholds) -> Verdict:
         # The gain is too small for the error on these records: the verdict is on the model without an effect.
         named, left, allowed_error = (), before, AllowedError.of(path, path.base, thresholds)
     allowed = allowed_error.allowed_v
-    groups, margin = look_alikes(path, thresholds, max(allowed, left)) if named else ((), -best_gain(path))
+    groups, margin = look_alikes(path, thresholds) if named else ((), -best_gain(path))
     others = ", ".join(r.name for r in problem.records if not r.good)
     after = f" without the finding, {1e3 * left:.1f} mV with it" if named else ""
     reason = (

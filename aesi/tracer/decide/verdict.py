@@ -16,7 +16,7 @@ from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.fit import LinearForm, held_out_residual, prediction_sd_v
 from aesi.tracer.likelihood.growth import Explanation
-from aesi.tracer.likelihood.model_error import MEASURED_V, PRIORS
+from aesi.tracer.likelihood.model_error import PRIORS
 from aesi.tracer.search.path import Path, unseen_rmse_v
 from aesi.tracer.search.plausible import ALIKE_NATS, ALIKE_SDS, alike, score_lag, sds_behind
 
@@ -181,7 +181,7 @@ def verdict_on(path: Path, thresholds: Thresholds) -> Verdict:
             f"{100 * tested:.0f} % of the rows there; add a record with other currents"
         )
         return Verdict("unknown", (), (), 0.0, left, allowed, reason, 0.0)
-    groups, margin = look_alikes(path, thresholds, allowed)
+    groups, margin = look_alikes(path, thresholds)
     words = explained_words(path, left, allowed)
     return Verdict("found", path.chosen.hypothesis, groups, 0.0, left, allowed, words, margin)
 
@@ -215,7 +215,7 @@ def partly_explained(path: Path, verdict: Verdict, thresholds: Thresholds) -> Ve
     path : the search at the trust `measured`.
     """
     before, left = structured_v(path, path.base), structured_v(path, path.chosen)
-    groups, margin = look_alikes(path, thresholds, max(left, MEASURED_V))
+    groups, margin = look_alikes(path, thresholds)
     reason = (
         f"{' + '.join(path.chosen.hypothesis)} reduces the error on unseen data from {1e3 * before:.1f} to "
         f"{1e3 * left:.1f} mV beyond the noise, by more than the usual error of models of measured cells"
@@ -237,13 +237,10 @@ def best_gain(path: Path) -> float:
     return max((step.best_gain for step in path.steps if step.grown), default=0.0)
 
 
-def look_alikes(
-    path: Path, thresholds: Thresholds, allowed_v: float
-) -> tuple[tuple[tuple[str, ...], ...], float]:
+def look_alikes(path: Path, thresholds: Thresholds) -> tuple[tuple[tuple[str, ...], ...], float]:
     """(sets of effects that these data do not tell apart, margin as in `Verdict`).
 
     They are a model confidence set, Hansen, Lunde & Nason, Econometrica 79 (2011) 453, over paired block differences.
-    allowed_v : largest error that a right hypothesis may leave on unseen data beyond the noise, V RMS.
     """
     groups, margin = [], np.inf
     tried = {frozenset(e.hypothesis): e for e in path.explanations()}
@@ -254,8 +251,7 @@ def look_alikes(
             if without is not None and other.score.total - without.score.total < path.admission_nats:
                 continue
             nats, deviation = score_lag(anchor, other)
-            close = alike(anchor, other, thresholds.alike_sds, thresholds.alike_nats)
-            if close and _as_adequate(path, other, anchor, allowed_v):
+            if alike(anchor, other, thresholds.alike_sds, thresholds.alike_nats):
                 same.append((nats, added))
             else:
                 margin = min(margin, sds_behind(nats, deviation, thresholds.alike_nats))
@@ -280,12 +276,6 @@ def across_models(verdict: Verdict, other: Verdict) -> Verdict:
     sets = {one[0]: one for one in verdict.confidence_sets}
     sets[named] = tuple(dict.fromkeys((*sets.get(named, (named,)), *instead)))
     return replace(verdict, confidence_sets=tuple(sets[name] for name in verdict.effects if name in sets))
-
-
-def _as_adequate(path: Path, other: Explanation, anchor: Explanation, allowed_v: float) -> bool:
-    """Whether a rival leaves about as small an error, on the rows that it can predict, as its `anchor`."""
-    left_v = [unexplained_v(path.problem, path.blocks, one, allowed_v) for one in (other, anchor)]
-    return left_v[0] <= 1.2 * max(allowed_v, left_v[1])
 
 
 def _weakest_sds(path: Path, tried: Mapping[frozenset[str], Explanation]) -> float:
