@@ -25,10 +25,10 @@ from aesi.bench.scoring import proportion
 from aesi.calibration import calibrate
 from aesi.calibration.parameters import free_parameters, with_interfaces, with_parameters
 from aesi.calibration.uncertainty.pulse_resistance import (
-    PULSE_S,
     TEMPERATURES_DEGC,
     PulseResistance,
     log_resistance,
+    measured_pulses,
     pulse_resistance,
 )
 from aesi.constants import ZERO_CELSIUS_K
@@ -49,8 +49,6 @@ MEASURED: tuple[tuple[str, tuple[str, ...], dict[str, float | None]], ...] = (
 )
 """Data set, records that a file is calibrated on, and records of pulses with the time of their cut, s, or None;
 the one at -10 degC has a gap of nine hours there."""
-NEAR_1C, STEADY_C = 0.1, 0.03
-"""Largest deviation of a pulse's current from 1C and within the pulse, in C. Conventions."""
 NOISE_V, HOLD_S, REST_S = 1e-3, 30, 60
 """Of a virtual record: standard deviation of the noise, V; duration of each constant current and of the rest at the
 beginning, s. Conventions."""
@@ -98,28 +96,6 @@ def _mean_degc(cell: Cell, record: Measurement) -> float:
     if record.temperature_degc is None:
         return cell.initial_temperature_k - ZERO_CELSIUS_K
     return float(np.mean(record.temperature_degc))
-
-
-def measured_pulses(record: Measurement, soc0: float, capacity_ah: float) -> tuple[Array, Array]:
-    """(states of charge, resistances in ohm) of the 1C discharge pulses from rest of a record, (n,) each.
-
-    soc0 : state of charge at its first row.
-    """
-    time_s, current_a, voltage_v = record.time_s, record.current_a, record.voltage_v
-    c_rate = current_a / capacity_ah
-    soc = soc0 - record.discharged_ah(record.hold_taken) / capacity_ah
-    found = []
-    for k in np.flatnonzero((np.abs(c_rate[:-1]) < STEADY_C) & (np.abs(c_rate[1:] - 1.0) < NEAR_1C)):
-        end = int(
-            np.searchsorted(time_s, time_s[k] + PULSE_S[-1])
-        )  # of the pulse, whose last row is `end` - 1
-        pulse = c_rate[k + 1 : end]
-        if end < len(time_s) and len(pulse) > 1 and np.ptp(pulse[1:]) < STEADY_C:
-            found.append(
-                (soc[k], (voltage_v[k] - voltage_v[end - 1]) / float(np.mean(current_a[k + 1 : end])))
-            )
-    socs, ohm = np.array(found, dtype=float).reshape(-1, 2).T
-    return socs, ohm
 
 
 def _virtual(start: Cell, cells: int, rng: np.random.Generator) -> Iterator[dict[str, Any]]:

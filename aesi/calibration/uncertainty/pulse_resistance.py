@@ -23,12 +23,15 @@ from aesi.numerics.typing import Array, Numbers
 from aesi.physics.cell import Cell
 from aesi.physics.cell.energies import energy_priors
 from aesi.physics.simulation import ModelName, simulate
+from aesi.records import Measurement
 
 TEMPERATURES_DEGC = (-20.0, -10.0, 0.0, 10.0, 25.0, 40.0)
 SOCS = (0.8, 0.5, 0.2)
 """Conventions, as the pulse of (1): data sheets print resistances of such pulses, and pulse tests have them."""
 PULSE_S = (0.0, 1e-3, 2.0, 4.0, 6.0, 8.0, 10.0)
 """Rows of the pulse, s: the current steps up within the first interval."""
+NEAR_1C, STEADY_C = 0.1, 0.03
+"""Largest deviation of a measured pulse's current from 1C, and within rest and pulse, in C. Conventions."""
 STEP = 1e-2
 """Step of the slopes, in standard deviations of the priors."""
 
@@ -100,3 +103,21 @@ def log_resistance(cell: Cell, temperature_degc: Array, soc: Array, model_name: 
                 continue
             out[a, b] = np.log((run.voltage_v[0] - run.voltage_v[-1]) / cell.nominal_capacity_ah)
     return out
+
+
+def measured_pulses(record: Measurement, soc0: float, capacity_ah: float) -> tuple[Array, Array]:
+    """(states of charge (n,), resistances (1) in ohm (n,)) of the 1C discharges of 10 s and more from rest in a record.
+
+    soc0 : state of charge at its first row.  capacity_ah : of the cell at that time, Ah.
+    """
+    time_s, voltage_v, c_rate = record.time_s, record.voltage_v, record.current_a / capacity_ah
+    soc = soc0 - record.discharged_ah(record.hold_taken) / capacity_ah
+    found = []
+    for k in np.flatnonzero((np.abs(c_rate[:-1]) < STEADY_C) & (np.abs(c_rate[1:] - 1.0) < NEAR_1C)):
+        end = int(np.searchsorted(time_s, time_s[k] + PULSE_S[-1]))
+        pulse = c_rate[k + 1 : end]
+        if end < len(time_s) and len(pulse) > 1 and np.ptp(pulse[1:]) < STEADY_C:
+            current_a = capacity_ah * float(np.mean(pulse))
+            found.append((soc[k], (voltage_v[k] - voltage_v[end - 1]) / current_a))
+    socs, ohm = np.array(found, dtype=float).reshape(-1, 2).T
+    return socs, ohm

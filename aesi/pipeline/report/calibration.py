@@ -31,6 +31,8 @@ SIDES = {"negative": style.BLUE, "positive": style.VERMILLION}
 SHOWN = 0.999
 """Share of the fit's residuals that the figure over time shows. On five calibrations its axis then reaches 4 to 9 times
 their root mean square, and their largest is 1.1 to 1.9 times beyond; the start files' are 2 to 40 times beyond."""
+BESIDE = 0.05
+"""Largest distance of a measured pulse from a state of charge at which it is drawn beside the model's."""
 KNOT, PERCENT = "_at_", "_percent"
 
 
@@ -165,7 +167,8 @@ def pulse_figure(content: Mapping[str, Any]) -> dict[str, Figure]:
     told = content["pulse_resistance"]
     fig = style.figure(
         "Resistance of a pulse over temperature",
-        "Lines: as the file predicts. Bands: 95 %, as the records leave it. A dotted line: no record is near.",
+        "Lines: as the file predicts. Bands: 95 %, as the records leave it. A dotted line: no record is near. Crosses: "
+        "measured, pulses in the records within 5 points of that charge.",
         400,
     )
     for k, (soc, colour) in enumerate(zip(told["soc"], style.MODEL_COLOURS, strict=False)):
@@ -186,6 +189,12 @@ def pulse_figure(content: Mapping[str, Any]) -> dict[str, Figure]:
         fig.add_scatter(
             x=[row["temperature_degc"] for row in near], y=[row["mohm"][k] for row in near],
             mode="lines+markers", name=name, legendgroup=name, line={"color": colour},
+        )  # fmt: skip
+        beside = [pulse for pulse in told["measured"] if abs(pulse["soc"] - soc) <= BESIDE]
+        fig.add_scatter(
+            x=[pulse["temperature_degc"] for pulse in beside], y=[pulse["mohm"] for pulse in beside],
+            mode="markers", legendgroup=name, showlegend=False, text=[pulse["record"] for pulse in beside],
+            marker={"color": colour, "symbol": "x", "size": 9},
         )  # fmt: skip
     fig.update_xaxes(title_text="temperature, °C")
     fig.update_yaxes(title_text="resistance, mohm", type="log", dtick="D2")

@@ -4,8 +4,14 @@ import numpy as np
 import pytest
 
 from aesi.calibration import calibrate
-from aesi.calibration.uncertainty.pulse_resistance import PULSE_S, log_resistance, pulse_resistance
+from aesi.calibration.uncertainty.pulse_resistance import (
+    PULSE_S,
+    log_resistance,
+    measured_pulses,
+    pulse_resistance,
+)
 from aesi.physics import simulate
+from aesi.records import Measurement
 
 DEGC, SOC = (-10.0, 0.0, 25.0), (0.8, 0.5)
 
@@ -40,3 +46,30 @@ def test_a_record_in_the_cold_tells_the_resistance_there(at_25, start, records):
 def test_a_state_that_cannot_give_the_pulse_has_no_resistance(truth):
     got = log_resistance(truth, np.array([-20.0]), np.array([0.5, 0.0]))
     assert list(np.isfinite(got[0])) == [True, False]
+
+
+@pytest.mark.parametrize("hold", ["backward", "linear"])
+def test_the_pulses_of_a_record_show_the_resistance_of_its_cell(truth, hold):
+    """Two at 1C; one that is too short, one at 2C and a charge do not count."""
+    time_s = np.arange(0.0, 3600.0)
+    current_a = np.zeros(len(time_s))
+    one_c = truth.nominal_capacity_ah
+    for start, seconds, c_rate in (
+        (300, 30, 1.0),
+        (1000, 5, 1.0),
+        (1500, 30, 2.0),
+        (2000, 30, -1.0),
+        (2500, 12, 1.0),
+    ):
+        current_a[start : start + seconds] = c_rate * one_c
+    voltage_v = simulate(truth, time_s, current_a, 0.6, (), 25.0, hold).voltage_v
+    soc, ohm = measured_pulses(Measurement(time_s, current_a, voltage_v, hold=hold), 0.6, truth.capacity_ah)
+    charged_ah = (30.0 + 5.0 + 60.0 - 30.0) / 3600.0 * one_c
+    assert soc == pytest.approx([0.6, 0.6 - charged_ah / truth.capacity_ah], abs=3e-4)
+    assert ohm == pytest.approx(np.exp(log_resistance(truth, np.array([25.0]), soc))[0], rel=0.03)
+
+
+def test_a_record_without_pulses_shows_none(truth):
+    time_s = np.arange(0.0, 600.0)
+    flat = Measurement(time_s, np.zeros(600), np.full(600, 3.7))
+    assert [len(found) for found in measured_pulses(flat, 0.5, truth.capacity_ah)] == [0, 0]

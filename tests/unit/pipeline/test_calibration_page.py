@@ -70,6 +70,10 @@ def content():
                 pulse_row(0.0, False, 90.0, 110.0),
                 pulse_row(25.0, True, 42.0, 45.0),
             ],
+            "measured": [
+                {"record": "pulses", "temperature_degc": 24.0, "soc": soc, "mohm": 44.0}
+                for soc in (0.24, 0.5)
+            ],
         },
         "size_assumed": "",
         "undetermined": [{"weights": {}, "narrowed": 1.0, "sentence": "the data do not determine it"}],
@@ -157,10 +161,11 @@ def test_the_resistance_is_told_over_temperature_with_what_the_records_leave_ope
     assert re.search(r'<th scope="row">25</th><td>42 <small>\[37.8, 46.2\]</small></td>', html)
     assert html.count("none near: by the priors") == 2
     assert html.count("cannot give the pulse") == 1
-    bands, dotted, near = pulse_figure(content)["pulse_resistance"].data[3:]  # of 20 % charge
+    bands, dotted, near, measured = pulse_figure(content)["pulse_resistance"].data[4:]  # of 20 % charge
     assert list(bands.x) == [0.0, 25.0, 25.0, 0.0]
     assert list(dotted.y) == [110.0, 45.0]
     assert list(near.y) == [45.0]
+    assert list(zip(measured.x, measured.y, strict=True)) == [(24.0, 44.0)]
 
 
 def test_one_record_is_named_and_its_error_is_no_range(content):
