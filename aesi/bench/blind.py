@@ -26,6 +26,7 @@ from aesi.errors import SimulationError
 from aesi.physics import Cell
 from aesi.pipeline.discovery.discover import discovery_content
 from aesi.tracer import discover
+from aesi.tracer.report.outcome import STATES
 
 LIMIT_S = 180.0
 """Limit of the processor time of one case, s. A case that takes longer counts as not answered. A convention."""
@@ -120,7 +121,7 @@ MISSED: dict[str, Any] = {
 def _scored(case: BlindCase, content: Mapping[str, Any]) -> dict[str, Any]:
     kept = ("verdict", "effects", "indistinguishable", "confidence", "margin", "noise_floor_mv")
     row = {key: content[key] for key in kept}
-    for state in ("before", "recalibrated", "after"):
+    for state in STATES:
         row[f"{state}_test_mv"] = content[state]["test"]["rmse_mv"]
     judgement = judge(case.label, case.also, case.neutral, content)
     noise_mv = MV_PER_V * case.spec.voltage_noise_v

@@ -26,6 +26,7 @@ from aesi.pipeline.discovery.discover import discovery_content
 from aesi.records import Measurement
 from aesi.tracer import discover
 from aesi.tracer.decide.model_to_write import AS_GOOD
+from aesi.tracer.report.outcome import STATES
 
 LIMIT_S = 900.0
 """Limit of the processor time of one case, s. A convention; the slowest case took 390 s."""
@@ -125,7 +126,7 @@ def judged(case: LeftOutCase, cells: str, limit_s: float | None = LIMIT_S) -> Ca
     content = answer_of(lambda: discovery_content(discover(cell, list(records.values()), [test])), limit_s)
     if isinstance(content, NoAnswer):
         return row | content.row | spent.row
-    left = {f"{state}_mv": content[state]["test"]["rmse_mv"] for state in ("before", "recalibrated", "after")}
+    left = {f"{state}_mv": content[state]["test"]["rmse_mv"] for state in STATES}
     better = min(left["before_mv"], left["recalibrated_mv"])
     told = {"verdict": content["verdict"], "effects": content["effects"]}
     return row | told | left | {"times_better": left["after_mv"] / better, **spent.row}

@@ -18,6 +18,7 @@ from aesi.pipeline.batch.plan import Job, read_plan, without_records
 from aesi.pipeline.batch.summary import write_summary
 from aesi.pipeline.experiment.sections import TrackingConfig
 from aesi.pipeline.written import SUMMARY_PAGE, SUMMARY_TABLE
+from aesi.tracer.report.outcome import STATES
 from flows.base import environment
 from flows.base.console import Console, duration
 from flows.base.folder_lock import alone_in
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from flows.tracking.tracker import Tracker
 
 Runner = Literal["local", "dask"]
-ERRORS = {f"{state}_test_mv": f"{state}/test_rmse_mv" for state in ("before", "recalibrated", "after")}
+ERRORS = {f"{state}_test_mv": f"{state}/test_rmse_mv" for state in STATES}
 """Column of a batch's summary -> the metric by which a discovery tracks the same."""
 
 

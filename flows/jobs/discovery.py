@@ -86,9 +86,8 @@ def run_discovery(
             _track_case(tracker, case)
             follow = HypothesisTracker(tracker, console)
             found = run("hypotheses", lambda: run_case(case, out, follow))
-            content: dict[str, Any] = run(
-                "report", lambda: write_discovery(out, case, found, _run_id(tracker))
-            )
+            run_id = tracker.run_id if tracker is not None else ""
+            content: dict[str, Any] = run("report", lambda: write_discovery(out, case, found, run_id))
             _track_result(tracker, found, content, out)
         run.publish("discovery", _page(content, out, tracker), "What the model lacks")
         _say_result(console, content, (*case.restrictions, *case.assumed, *found.notes), out, started)
@@ -191,10 +190,6 @@ def _asked(case: Case) -> dict[str, Any]:
     return {name: value for name, value in asked.items() if value} | options
 
 
-def _run_id(tracker: Tracker | None) -> str:
-    return tracker.run_id if tracker is not None else ""
-
-
 def _track_case(tracker: Tracker | None, case: Case) -> None:
     """What was asked, from the start on: a search that fails or is stopped can be told from others too."""
     if tracker is None:
@@ -213,6 +208,7 @@ def _track_result(tracker: Tracker | None, found: Discovery, content: dict[str, 
         return
     from aesi.pipeline.report.words.discoveries import reason_finding, short_finding
     from aesi.pipeline.report.words.moved import moved_summary
+    from aesi.tracer.report.outcome import STATES
     from flows.tracking.view import NOTE
 
     tracker.parameters(
@@ -229,10 +225,9 @@ def _track_result(tracker: Tracker | None, found: Discovery, content: dict[str, 
             },
         },
     )
-    states = ("before", "recalibrated", "after")
     errors = {
         f"{state}/{part}_rmse_mv": content[state][part]["rmse_mv"]
-        for state in states
+        for state in STATES
         for part in ("fit", "test")
         if content[state].get(part)
     }

@@ -7,6 +7,7 @@ from typing import Any
 
 from aesi.physics.effects import CATALOGUE
 from aesi.tracer.case.free_parameter import STATE_OF_CHARGE
+from aesi.tracer.report.outcome import STATES
 
 GROUP_OF = 2
 """Most members of a group of look-alikes in which a right effect counts as named. A convention."""
@@ -33,7 +34,7 @@ def answer_scores(
     row: dict[str, Any] = {
         key: content[key] for key in ("verdict", "effects", "indistinguishable", "confidence", "margin")
     }
-    for state in ("before", "recalibrated", "after"):
+    for state in STATES:
         row[f"{state}_test_mv"] = content[state]["test"].get("rmse_mv")
     return row | {
         "named": named,

@@ -26,6 +26,7 @@ from aesi.pipeline.discovery.budget import MOST_ROWS
 from aesi.pipeline.discovery.discover import HOLDOUT, discovery_content
 from aesi.records import Measurement, Spectrum
 from aesi.tracer import Discovery, discover
+from aesi.tracer.report.outcome import STATES
 
 LIMIT_S = 600.0
 """Limit of the processor time of one case, s. A case that takes longer counts as not answered. A convention."""
@@ -177,7 +178,7 @@ def _residual(found: Discovery) -> dict[str, list[float]]:
     time_s = np.concatenate([f.time_s for f in found.files])
     kept = np.unique(np.linspace(0, len(time_s) - 1, DRAWN).astype(int))
     out = {"time_s": time_s[kept].round(1).tolist()}
-    for state in ("before", "recalibrated", "after"):
+    for state in STATES:
         residual = MV_PER_V * np.concatenate([f.residual_v(state) for f in found.files])
         out[f"{state}_mv"] = residual[kept].round(2).tolist()
     return out

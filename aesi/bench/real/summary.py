@@ -17,6 +17,7 @@ from aesi.bench.detectable import SEEN_NATS
 from aesi.bench.limit import NO_ANSWER, NOT_RUN, timed
 from aesi.bench.scoring import rate
 from aesi.tracer.decide.model_to_write import AS_GOOD
+from aesi.tracer.report.outcome import STATES
 
 NEAR_K = 2.0
 """Largest error, K, of a temperature that counts as near. A convention."""
@@ -169,7 +170,7 @@ def _by_kind(rows: Sequence[CaseRow]) -> dict[str, str]:
 
 def _has_errors(row: CaseRow) -> bool:
     """Whether all three models could be simulated on the held-out data."""
-    return all(row.get(f"{state}_test_mv") is not None for state in ("before", "recalibrated", "after"))
+    return all(row.get(f"{state}_test_mv") is not None for state in STATES)
 
 
 def _is_halved(row: CaseRow) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 from aesi.bench import CaseRow
 from aesi.bench.limit import NOT_RUN
 from aesi.bench.real.summary import SOC0, detectable
+from aesi.tracer.report.outcome import STATES
 
 NOUNS = {
     "withheld": "temperature withheld",
@@ -19,7 +20,6 @@ NOUNS = {
 }
 """Group of a case -> its name in the tables."""
 BESIDE = ("fault_beside", "control_beside")
-STATES = ("before", "recalibrated", "after")
 
 
 def table(rows: Sequence[CaseRow]) -> list[str]:

@@ -22,6 +22,7 @@ from aesi.pipeline.discovery.cases import case_of_files
 from aesi.pipeline.discovery.discover import run_case, write_discovery
 from aesi.pipeline.report.words.discoveries import short_finding
 from aesi.pipeline.written import CALIBRATED, EARLIER, FINDING, MODEL, REPORT, ROW, calibration_files
+from aesi.tracer.report.outcome import STATES
 
 
 @dataclass(frozen=True)
@@ -147,10 +148,7 @@ def _row(job: Job, folder: Path, settings: Settings) -> dict[str, Any]:
         "verdict": content["verdict"],
         "effects": ", ".join(content["effects"]),
         "finding": short_finding(content),
-        **{
-            f"{state}_test_mv": content[state]["test"].get("rmse_mv")
-            for state in ("before", "recalibrated", "after")
-        },
+        **{f"{state}_test_mv": content[state]["test"].get("rmse_mv") for state in STATES},
         "report": f"{job.name}/{REPORT}",
     }
     if job.specimen:

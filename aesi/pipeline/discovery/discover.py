@@ -30,13 +30,12 @@ from aesi.records import Measurement
 from aesi.tracer import Discovery, discover
 from aesi.tracer.discovery import Progress
 from aesi.tracer.report.candidate_effects import CandidateEffect
-from aesi.tracer.report.outcome import Errors, Part, State
+from aesi.tracer.report.outcome import STATES, Errors, Part, State
 from aesi.tracer.report.own_parameters import OwnParameter
 from aesi.tracer.report.step_resistance import MEASURED, CurrentSteps, StepResistance
 from aesi.tracer.report.yardstick import POINTS_TO, Pointer
 
 SCHEMA = "aesi.discovery/1"
-STATES: tuple[State, ...] = ("before", "recalibrated", "after")
 HOLDOUT = 0.3
 """Default share of the data, at the end, that is kept back where there are no test records."""
 ABBREVIATIONS = {"ocv": "OCV", "ocp": "OCP"}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from aesi.errors import InputError
 from aesi.pipeline.discovery.discover import (
@@ -17,7 +17,7 @@ from aesi.pipeline.discovery.discover import (
 )
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.tracer import Discovery
-from aesi.tracer.report.outcome import Part
+from aesi.tracer.report.outcome import Part, State
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -76,8 +76,8 @@ class Finding:
 
     def rmse_mv(
         self,
-        state: Literal["before", "recalibrated", "after"] = "after",
-        part: Literal["fit", "test"] = "test",
+        state: State = "after",
+        part: Part = "test",
     ) -> float:
         """RMS voltage error of a model, mV; NaN where there is no such part, or the model cannot be simulated on it.
 
@@ -108,7 +108,7 @@ class Finding:
         columns = ("effect", "kind", "score", "test_rmse_mv", "parameter", "value", "low", "high", "unit")
         return pd.DataFrame(rows, columns=list(columns))
 
-    def plot(self, part: Literal["fit", "test"] = "test") -> Figure:
+    def plot(self, part: Part = "test") -> Figure:
         """Measured voltage, current, and the residual of each model over time: a plotly figure.
 
         Raises InputError for the test part of a search that held none out.

@@ -8,6 +8,7 @@ from functools import cache, partial
 
 import numpy as np
 
+from aesi.constants import MV_PER_V
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.trust import MEASURED_CELL
@@ -140,11 +141,7 @@ def why_not_refit(
     other = next((one for one in options if one.state is taken), None)
     if other is None:
         return why
-    left_mv, before_mv = 1e3 * other.left_out.pooled_v, 1e3 * declared.left_out.pooled_v
-    return (
-        f"{why}; model/ holds another fit of its parameters, whose error on left-out data is {left_mv:.1f} mV "
-        f"({before_mv:.1f} mV with the declared model)"
-    )
+    return f"{why}; model/ holds another fit of its parameters, {_left_clause(other, declared)}"
 
 
 def stand_in_notes(state: ModelState, named: Sequence[str]) -> tuple[str, ...]:
@@ -171,10 +168,11 @@ def _fault(one: Option, declared: Option, rates_c: Sequence[float]) -> str | Non
 
 
 def _refit_instead(taken: Option, declared: Option) -> str:
-    left_mv, before_mv = 1e3 * taken.left_out.pooled_v, 1e3 * declared.left_out.pooled_v
     names = " + ".join(taken.state.hypothesis)
     beside = f" with {names}" if names else ""
-    return (
-        f"model/ holds the recalibrated model{beside}, whose error on left-out data is {left_mv:.1f} mV "
-        f"({before_mv:.1f} mV with the declared model)"
-    )
+    return f"model/ holds the recalibrated model{beside}, {_left_clause(taken, declared)}"
+
+
+def _left_clause(taken: Option, declared: Option) -> str:
+    left_mv, before_mv = (MV_PER_V * one.left_out.pooled_v for one in (taken, declared))
+    return f"whose error on left-out data is {left_mv:.1f} mV ({before_mv:.1f} mV with the declared model)"

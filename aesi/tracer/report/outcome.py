@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from aesi.tracer.case.records import PreparedRecord
 from aesi.tracer.likelihood.model_state import ModelState
 
 State = Literal["before", "recalibrated", "after"]
+STATES: tuple[State, ...] = get_args(State)
 Part = Literal["fit", "test"]
 States = Mapping[State, ModelState]
 NAMES: Mapping[State, str] = {

@@ -25,6 +25,7 @@ from aesi.pipeline.report.words.sizes import (
 from aesi.tracer.decide.model_to_write import AS_GOOD
 from aesi.tracer.decide.verdict import Thresholds, beyond_noise
 from aesi.tracer.likelihood.model_error import MEASURED_V
+from aesi.tracer.report.outcome import STATES
 
 LARGE_SHARE = 0.5
 """Share of the remaining error from which on a sentence says that a sparse correction could still explain more. A
@@ -107,8 +108,7 @@ def _worse_on_test(discovery: Mapping[str, Any]) -> str:
 
 def _left_mv(discovery: Mapping[str, Any], part: str) -> dict[str, float]:
     """State of the model -> RMSE on a part, mV, to the hundredth; without the states that have no figure there."""
-    states = ("before", "recalibrated", "after")
-    rows = {state: (discovery.get(state) or {}).get(part) or {} for state in states}
+    rows = {state: (discovery.get(state) or {}).get(part) or {} for state in STATES}
     return {state: round(row["rmse_mv"], 2) for state, row in rows.items() if row.get("rmse_mv") is not None}
 
 
