@@ -20,7 +20,7 @@ from aesi.physics.cell import Soh
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.impedance import slowest_diffusion_hz
 from aesi.physics.simulation import model_with
-from aesi.pipeline.notes import other_model_sentences, soh_day_sentences, temperature_range_sentences
+from aesi.pipeline.notes import other_model_sentences, soh_sentences, temperature_range_sentences
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.simulation import SayNotes, write_table
 from aesi.records import Spectrum
@@ -71,7 +71,7 @@ def impedance_file(
             [
                 *declared.cell.unread,
                 *other_model_sentences(declared, model),
-                *soh_day_sentences(given.cell, soh),
+                *soh_sentences(given, soh),
                 *cold,
                 *_missing_effect_sentences(active),
             ]
