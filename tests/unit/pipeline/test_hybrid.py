@@ -883,6 +883,14 @@ def test_a_temperature_that_was_found_was_told_to_be_in_a_record_of_another(mode
     assert not [note for note in said if "ambient_temperature" in note]
 
 
+def test_an_impedance_was_not_at_the_temperature_that_was_found_without_a_word(model, tmp_path):
+    shift = CATALOGUE["ambient_temperature"].activate(shift_k=-17.0)
+    found = HybridModel(folded(model.cell, [shift]).cell, held=(repr(shift),)).save(tmp_path / "found")
+    said: list[str] = []
+    impedance_file(found, 0.5, "0.1:1:3", tmp_path / "z.csv", say_notes=said.extend)
+    assert "ambient_temperature: not in the impedance, which is at the temperature that is given." in said
+
+
 def test_an_unknown_target_of_an_export_ended_in_a_key_error(model, tmp_path):
     with pytest.raises(InputError, match="to = 'foo' is not known; give 'bpx' or 'pybamm'"):
         export(model.save(tmp_path / "alone"), tmp_path / "o.json", to="foo")
