@@ -95,7 +95,8 @@ def discover(
     soc0 = checked_soc(soc0)
     _check_asked(holdout, max_effects, seed)
     folder = None if out is None else _folder(out)
-    given, parts = declared_model(cell).with_soh(soh), [_listed(part) for part in (data, tests, good)]
+    given, parts = declared_model(cell), [_listed(part) for part in (data, tests, good)]
+    given.with_soh(soh)  # refused before a record is read
     asked = [one for part in parts for one in part]
     found = iter(_read_all(asked, hold))
     measurements, judged, known = (tuple(islice(found, len(part))) for part in parts)
@@ -113,6 +114,7 @@ def discover(
         _names("only", only),
         _names("without", without),
         model,
+        soh,
         good=known,
         reader="python",
     )

@@ -20,9 +20,11 @@ from aesi.physics.cell import Soh
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.impedance import slowest_diffusion_hz
 from aesi.physics.simulation import model_with
-from aesi.pipeline.notes import other_model_sentences, soh_day_sentences, temperature_range_sentences
+from aesi.pipeline.notes import other_model_sentences, soh_sentences, temperature_range_sentences
 from aesi.pipeline.product.declared import declared_model
+from aesi.pipeline.product.hybrid import id_in
 from aesi.pipeline.simulation import SayNotes, write_table
+from aesi.pipeline.simulation_words import INFERRING
 from aesi.records import Spectrum
 
 INSTANT_HZ = 10.0
@@ -73,9 +75,9 @@ def impedance_file(
             [
                 *declared.cell.unread,
                 *other_model_sentences(declared, model),
-                *soh_day_sentences(given.cell, soh),
+                *soh_sentences(given, soh),
                 *cold,
-                *_missing_effect_sentences(active),
+                *_missing_effect_sentences(active, declared.held),
             ]
         )
         say_notes(_repeated_sentences(hz, soc, temperature_degc))
@@ -118,10 +120,13 @@ def _count_clause(count: int) -> str:
     return f"{count:,} of the frequencies {'lies' if count == 1 else 'lie'}"
 
 
-def _missing_effect_sentences(effects: Sequence[ActiveEffect]) -> list[str]:
+def _missing_effect_sentences(effects: Sequence[ActiveEffect], held: Sequence[str]) -> list[str]:
     """Sentences on the effects that an impedance lacks, in whole or in part: those that act on a record, a reading
     or a given temperature alone, and those on the voltage, which may go on to answer after the current is there, as
-    `ohmic` ones do not."""
+    `ohmic` ones do not.
+
+    held : effects in the values of the cell, in words; of these a temperature alone is not in the impedance.
+    """
     warm = [one.id for one in effects if one.effect.infers == "temperature"]
     acting = (one for one in effects if one.id not in warm)
     names = [one.id for one in acting if one.effect.on_model is None and one.effect.on_voltage is None]
@@ -129,8 +134,9 @@ def _missing_effect_sentences(effects: Sequence[ActiveEffect]) -> list[str]:
     later = [one.id for one in effects if one.effect.on_voltage is not None and not one.effect.ohmic]
     if later:
         said.append(f"{', '.join(later)}: only what it answers to a current at once is in the impedance.")
-    if warm:
-        said.append(f"{', '.join(warm)}: not in the impedance, which is at the temperature that is given.")
+    stated = dict.fromkeys([*warm, *(id for id in map(id_in, held) if id in INFERRING)])
+    if stated:
+        said.append(f"{', '.join(stated)}: not in the impedance, which is at the temperature that is given.")
     return said
 
 

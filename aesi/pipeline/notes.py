@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Sequence
 from datetime import date
+from numbers import Real
 
 import numpy as np
 
@@ -150,16 +152,25 @@ def contradiction_sentences(
     return () if found is None else (found.sentence(record.name),)
 
 
-def soh_day_sentences(cell: Cell, soh: Soh | None) -> tuple[str, ...]:
-    """A sentence on the share of capacity that a state of health stands for which is a day; empty for a share.
+def soh_sentences(given: HybridModel, soh: Soh | None) -> tuple[str, ...]:
+    """A sentence on the state of health that a saved model was made at, since a share that is asked for is of that, and
+    one on the share that a day stands for.
 
-    cell : of the file, before it is taken at that state.
+    given : what is declared, before it is taken at the state of health that is asked for.
     """
-    if not isinstance(soh, date):
-        return ()
-    return (
-        f"the cell as of {soh}: {cell.soh_on(soh):.3f} of its file's capacity, by the records that it was fitted to.",
-    )
+    said = []
+    if not math.isclose(given.soh, 1.0):
+        share = isinstance(soh, Real)
+        further = f", and is taken at {float(soh):.3f} of that, as asked" if share else ""  # type: ignore[arg-type]
+        said.append(
+            f"the saved model's cell has {given.soh:.3f} of its file's capacity, at which it was made{further}."
+        )
+    if isinstance(soh, date):
+        said.append(
+            f"the cell as of {soh}: {given.cell.soh_on(soh):.3f} of its file's capacity, by the records that it was "
+            "fitted to."
+        )
+    return tuple(said)
 
 
 def fitted_record_sentences(

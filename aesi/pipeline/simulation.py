@@ -30,7 +30,7 @@ from aesi.pipeline.notes import (
     dry_collector_sentences,
     fitted_record_sentences,
     other_model_sentences,
-    soh_day_sentences,
+    soh_sentences,
     temperature_range_sentences,
     temperature_sentence,
 )
@@ -106,7 +106,7 @@ def simulate_file(
     if declared.correction is not None:
         say(["the saved model's learnt correction is no part of a simulation; `aesi predict` has it."])
         declared = replace(declared, finding="")  # it is of the model with its correction
-    say([*other_model_sentences(declared, model), *soh_day_sentences(given.cell, asked.soh)])
+    say([*other_model_sentences(declared, model), *soh_sentences(given, asked.soh)])
     used = replace(declared, effects=(*declared.effects, *effects), model=model or declared.model)
     profiled = _profiled_model(used, profile, current, asked, say)
     used = profiled.model
@@ -189,7 +189,7 @@ def predict_file(
         raise DataError(f"{current.name} has no voltage_v; leave out --measured for a free run.")
     given = HybridModel.load(model)
     saved = given.with_soh(asked.soh)
-    say(soh_day_sentences(given.cell, asked.soh))
+    say(soh_sentences(given, asked.soh))
     profiled = _profiled_model(saved, profile, current, asked, say)
     hybrid, record = profiled.model, profiled.record
     start, soc0_sd = profiled.start, profiled.start.read_sd if asked.soc0_sd is None else asked.soc0_sd

@@ -144,6 +144,7 @@ def save(rebuilt: Rebuilt, out: Path) -> Path:
         model=rebuilt.declared.model,
         held=rebuilt.declared.held,
         beside=rebuilt.declared.beside,
+        soh=rebuilt.declared.soh,
     )
     model.save(out / MODEL)
     content = {

@@ -76,6 +76,7 @@ def track_start(tracker: Tracker, config: ExperimentConfig, loaded: Loaded, fold
         model=loaded.model,
         held=() if config.cell.start == "recalibrated" else loaded.held,
         beside=loaded.beside,
+        soh=loaded.soh,
     ).save(folder / INPUTS / DECLARED)
     tracker.files(folder / INPUTS, INPUTS)
     tracker.datasets(

@@ -20,7 +20,7 @@ from aesi.physics.cell import Soh
 from aesi.physics.effects import CATALOGUE, Effect, known_effects, selected
 from aesi.physics.folded import folded
 from aesi.physics.simulation import ModelName
-from aesi.pipeline.notes import soh_day_sentences, temperature_range_sentences, temperature_sentence, together
+from aesi.pipeline.notes import soh_sentences, temperature_range_sentences, temperature_sentence, together
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.report.views import DiscoveryTrace, DiscoveryView, EffectView
@@ -125,7 +125,7 @@ class Case:
         return (
             *given.cell.unread,
             *filter(None, [sizes_sentence(given.cell, self.records, given.cell.capacity_ah)]),
-            *soh_day_sentences(declared_model(self.cell).cell, self.soh),
+            *soh_sentences(declared_model(self.cell), self.soh),
             *temperature_range_sentences(
                 given.cell, (m.temperature_degc for m in self.records), given.effects
             ),
@@ -209,6 +209,7 @@ def found_model(found: Discovery, given: HybridModel | None = None) -> HybridMod
         held=(*said.held, *map(repr, held)),
         beside=(*said.beside, *(repr(one) for one in fitted if one.id not in found.written)),
         finding=" ".join(map(capitalised, found.warnings)),
+        soh=said.soh,
     )
 
 

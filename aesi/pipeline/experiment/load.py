@@ -42,7 +42,7 @@ from aesi.pipeline.experiment.sources import (
 )
 from aesi.pipeline.notes import (
     contradiction_sentences,
-    soh_day_sentences,
+    soh_sentences,
     temperature_range_sentences,
     temperature_sentence,
 )
@@ -74,7 +74,7 @@ class Loaded:
     as resampling, dropped rows, a fallback.
     config : the experiment as it is run; with the data and cell of the fallback if `fallback` is not empty.
     fallback : why the fallback is used, one sentence.  model : kind of the physics.  files : hash of the files that
-    declare the cell.  held, beside : of the declared model, see `HybridModel`.
+    declare the cell.  held, beside, soh : of the declared model, see `HybridModel`.
     """
 
     cell: Cell
@@ -92,6 +92,7 @@ class Loaded:
     cells: Mapping[str, Cell] = field(default_factory=dict)
     held: tuple[str, ...] = ()
     beside: tuple[str, ...] = ()
+    soh: float = 1.0
 
     @property
     def setting(self) -> str:
@@ -152,7 +153,7 @@ def _load(config: ExperimentConfig) -> Loaded:
     split = by_role(config.data, series, sources.roles)
     notes = [
         *given.cell.unread,
-        *soh_day_sentences(declared.cell, config.cell.soh),
+        *soh_sentences(declared, config.cell.soh),
         *_start_sentences(physics, records, starts, config.data.hold),
         *grid_notes,
         *_repeat_sentences(config, records),
@@ -180,6 +181,7 @@ def _load(config: ExperimentConfig) -> Loaded:
         cells={name: variant.cell for name, variant in physics.by_name.items()},
         held=given.held,
         beside=given.beside,
+        soh=given.soh,
     )
 
 

@@ -181,6 +181,7 @@ def hybrid(result: Result) -> HybridModel:
         model=result.loaded.model,
         held=result.loaded.held if physics == DECLARED else (),  # a refit moves the values
         beside=result.loaded.beside,
+        soh=result.loaded.soh,
     )
 
 

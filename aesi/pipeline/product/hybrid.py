@@ -57,6 +57,7 @@ class HybridModel:
     held : effects that are contained in values of the cell, in words.  beside : effects, held or active, that were
     fitted together with the found ones and are no finding themselves, in the same words, or by their ids.
     finding : its errors on test records, in words; '' where they are not known.
+    soh : share of the capacity of the file that it was made from, which its cell has.
     """
 
     cell: Cell
@@ -71,6 +72,7 @@ class HybridModel:
     held: tuple[str, ...] = ()
     beside: tuple[str, ...] = ()
     finding: str = ""
+    soh: float = 1.0
 
     def __post_init__(self) -> None:
         """Raises InputError for a wrong cell, effects, step, hold, state of charge or model, and for a correction that
@@ -95,7 +97,10 @@ class HybridModel:
 
     def with_soh(self, soh: Soh | None) -> Self:
         """A copy with the cell at a state of health, see `Cell.with_soh`; unchanged for None."""
-        return self if soh is None else replace(self, cell=self.cell.with_soh(soh))
+        if soh is None:
+            return self
+        cell = self.cell.with_soh(soh)
+        return replace(self, cell=cell, soh=self.soh * cell.capacity_ah / self.cell.capacity_ah)
 
     def was_beside(self, words: str) -> bool:
         """Whether an effect, in the words of `held`, was fitted together with the found ones and is no finding."""
@@ -215,7 +220,7 @@ class HybridModel:
             part = getattr(self, name)
             if part is not None:
                 parts[name] = part.to_dict()
-        own = {name: getattr(self, name) for name in ("dt_s", "hold", "soc0", "model", "finding")}
+        own = {name: getattr(self, name) for name in ("dt_s", "hold", "soc0", "model", "finding", "soh")}
         files = {name: code for _, beside in saved for name, code in beside.items()}
         write_model(folder, own | {"held": list(self.held), "beside": list(self.beside)}, parts, files)
         return folder
@@ -248,6 +253,7 @@ class HybridModel:
                 held=tuple(head.get("held", ())),
                 beside=tuple(head.get("beside", ())),
                 finding=head.get("finding", ""),
+                soh=head.get("soh", 1.0),
                 **read,
             )
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from small_experiment import BPX, SOC0, experiment, write_record
 
+import aesi
 from aesi.calibration import Conditions
 from aesi.data import read_measurement
 from aesi.errors import CellError, ConfigError, DataError, InputError
@@ -199,6 +200,14 @@ def test_an_experiment_has_a_cell_of_the_day_of_its_test(tmp_path, dated_file):
     whole, aged = (load(experiment(record, cell=c)) for c in (cell, cell | {"soh": date(2018, 1, 6)}))
     assert aged.cell.capacity_ah == pytest.approx(0.95 * whole.cell.capacity_ah)
     assert "the cell as of 2018-01-06: 0.950 of its file's capacity" in " ".join(aged.notes)
+
+
+def test_python_was_not_told_what_share_a_day_stands_for(tmp_path, dated_file, monkeypatch):
+    kept = []
+    monkeypatch.setattr("aesi.pipeline.api.run_case", lambda case, *rest: kept.append(case))
+    aesi.discover(dated_file(BPX, 0.9, 20180111), write_record(tmp_path), soh=date(2018, 1, 6))
+    assert "the cell as of 2018-01-06: 0.950 of its file's capacity" in " ".join(kept[0].notes)
+    assert kept[0].declared().soh == pytest.approx(0.95)
 
 
 def test_a_discovery_of_an_experiment_advised_options_that_it_does_not_have(tmp_path, monkeypatch):

@@ -19,6 +19,7 @@ from aesi.physics.folded import folded
 from aesi.pipeline.discovery.cases import case_of_files
 from aesi.pipeline.experiment.load import load
 from aesi.pipeline.export import export
+from aesi.pipeline.impedance import impedance_file
 from aesi.pipeline.product.error_series import error_series
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.product.model_folder import SCHEMA
@@ -852,6 +853,34 @@ def test_an_effect_beside_the_models_own_of_that_name_was_told_alone(model, reco
     assert any(note.endswith(words) for note in said)
 
 
+def test_a_model_that_was_made_at_a_state_of_health_was_taken_at_a_share_of_it_without_a_word(
+    model, tmp_path
+):
+    """--soh 0.95 of a model that was found with --soh 0.95 left 0.9025 of the file's capacity."""
+    profile, made = tmp_path / "profile.csv", HybridModel(model.cell).with_soh(0.95)
+    pd.DataFrame({"time_s": [0.0, 60.0], "current_a": [1.0, 1.0]}).to_csv(profile, index=False)
+    saved, at = (
+        made.save(tmp_path / "made"),
+        "the saved model's cell has 0.950 of its file's capacity, at which it was",
+    )
+    for soh, words in ((None, f"{at} made."), (0.9, f"{at} made, and is taken at 0.900 of that, as asked.")):
+        told: list[list[str]] = [[], []]
+        asked = ProfileRequest(soc0=0.5, soh=soh)
+        simulate_file(saved, profile, tmp_path / "o.csv", asked, say_notes=told[0].extend)
+        impedance_file(saved, 0.5, "0.1:1:3", tmp_path / "z.csv", soh=soh, say_notes=told[1].extend)
+        assert all(words in said for said in told)
+        new: list[str] = []
+        simulate_file(
+            HybridModel(model.cell).save(tmp_path / "new"),
+            profile,
+            tmp_path / "o.csv",
+            asked,
+            say_notes=new.extend,
+        )
+        assert not [note for note in new if "saved model's cell" in note]
+    assert HybridModel.load(saved).with_soh(0.9).soh == pytest.approx(0.855)
+
+
 def test_a_temperature_that_was_found_was_told_to_be_in_a_record_of_another(model, data, tmp_path):
     shift = CATALOGUE["ambient_temperature"].activate(shift_k=-17.0)
     found = HybridModel(folded(model.cell, [shift]).cell, held=(repr(shift),)).save(tmp_path / "found")
@@ -860,6 +889,14 @@ def test_a_temperature_that_was_found_was_told_to_be_in_a_record_of_another(mode
     said: list[str] = []
     simulate_file(found, record, tmp_path / "o.csv", say_notes=said.extend)
     assert not [note for note in said if "ambient_temperature" in note]
+
+
+def test_an_impedance_was_not_at_the_temperature_that_was_found_without_a_word(model, tmp_path):
+    shift = CATALOGUE["ambient_temperature"].activate(shift_k=-17.0)
+    found = HybridModel(folded(model.cell, [shift]).cell, held=(repr(shift),)).save(tmp_path / "found")
+    said: list[str] = []
+    impedance_file(found, 0.5, "0.1:1:3", tmp_path / "z.csv", say_notes=said.extend)
+    assert "ambient_temperature: not in the impedance, which is at the temperature that is given." in said
 
 
 def test_an_unknown_target_of_an_export_ended_in_a_key_error(model, tmp_path):

@@ -39,7 +39,9 @@ def test_what_a_saved_model_had_was_told_as_fitted_beside_the_next_finding(cell,
     """The contacts that a first search had found were no more told, and a gain only as one of many parameters."""
     gain = CATALOGUE["current_sensor_gain"].activate(gain=1.02)
     offset = CATALOGUE["voltage_sensor_offset"].activate(offset_v=1e-4)
-    given = HybridModel(cell, (offset, gain), held=("porosity(factor=1.01)",), beside=(repr(offset),))
+    given = HybridModel(
+        cell, (offset, gain), held=("porosity(factor=1.01)",), beside=(repr(offset),), soh=0.9
+    )
     found = discover(cell, [make((gain,))], soc0=0.9, effects=few, given=given.effects)
     written = found_model(found, given)
     assert written.held[0] == "porosity(factor=1.01)"
@@ -47,6 +49,7 @@ def test_what_a_saved_model_had_was_told_as_fitted_beside_the_next_finding(cell,
     assert not written.was_beside(repr(gain))
     assert written.was_beside(repr(offset))
     assert all(map(written.was_beside, written.held[1:]))
+    assert written.soh == 0.9
 
 
 def test_a_cell_as_declared_lacks_nothing(cell, few, make):
