@@ -54,9 +54,10 @@ def _chosen(store: Store, wanted: Sequence[str]) -> list[tuple[str, Any]]:
             if len(matching) > 1:
                 raise InputError(f"{name!r} is the beginning of {len(matching)} run ids; give more of it.")
         if not matching:
-            there = ", ".join(sorted(set(by_name) - {"Default"})) or "none"
+            ended = (run for run in store.all_jobs() if run.info.status == FINISHED)
+            there = ", ".join(sorted({experiments[run.info.experiment_id] for run in ended})) or "none"
             raise InputError(
-                f"{name!r} is no tracked run and no experiment with a finished run; experiments: {there}."
+                f"{name!r} is no tracked run and no experiment with a finished run; experiments with one: {there}."
             )
         found |= {run.info.run_id: (experiments[run.info.experiment_id], run) for run in matching}
     return list(found.values())

@@ -154,6 +154,7 @@ def _load(config: ExperimentConfig) -> Loaded:
     notes = [
         *given.cell.unread,
         *soh_sentences(declared, config.cell.soh),
+        *_declared_sentences(declared, sources),
         *_start_sentences(physics, records, starts, config.data.hold),
         *grid_notes,
         *_repeat_sentences(config, records),
@@ -198,6 +199,25 @@ def _training(
     for name, rows in drives:
         opened[name].rows[rows] = True
     return TrainingDrives(config, {**records, **opened}, drives, roles)
+
+
+def _declared_sentences(declared: HybridModel, sources: Sources) -> list[str]:
+    """Sentences on a correction of the saved model that is declared, and on test records that the cell's file was
+    fitted to. `data.record` has test rows as well."""
+    said = []
+    if declared.correction is not None:
+        said.append(
+            "the saved model's learnt correction is left out: what is declared is its cell with its effects."
+        )
+    judged = sources.roles["test"] or tuple(sources.records)
+    fitted = {name for name, _ in declared.cell.capacity_shares}
+    names = [record.name for record, _ in (sources.records[name] for name in judged)]
+    return said + [
+        f"{name}: the cell's file was fitted to a record of this name, so that no model of this run has it held out; "
+        "the error of a record that the file was not fitted to says more."
+        for name in names
+        if name in fitted
+    ]
 
 
 def _start_sentences(

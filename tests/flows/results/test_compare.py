@@ -224,6 +224,16 @@ def test_the_page_explains_what_is_on_it(tmp_path):
         assert word in write_comparison(tmp_path / "runs.html", [run_of(1), run_of(2)]).read_text()
 
 
+def test_an_experiment_without_a_finished_run_was_offered_to_be_compared(tmp_path):
+    uri = f"sqlite:///{tmp_path / 'mlflow.db'}"
+    store = Store(uri)
+    for name, status in (("ended", "FINISHED"), ("stopped", "FAILED")):
+        run = store.client.create_run(store.client.create_experiment(name), tags={KIND: "run"})
+        store.client.set_terminated(run.info.run_id, status)
+    with pytest.raises(InputError, match=r"'stopped' is no tracked run .*; experiments with one: ended\.$"):
+        compare(["stopped"], tmp_path / "page.html", uri)
+
+
 def test_tracked_runs_are_found_by_the_beginning_of_their_id(finished, tmp_path):
     uri = f"sqlite:///{finished / 'mlflow.db'}"
     store = Store(uri)

@@ -1,10 +1,12 @@
 """Records of an experiment: what is refused of a file names the key of the experiment that says it."""
 
+import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from small_experiment import BPX, PERIOD_S, SOC0, experiment, write_record
+from small_experiment import BPX, PERIOD_S, SOC0, experiment, fitted, write_record
 
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.read import read
@@ -17,6 +19,7 @@ from aesi.pipeline.experiment import sources
 from aesi.pipeline.experiment.config import parse_experiment
 from aesi.pipeline.experiment.load import load
 from aesi.pipeline.experiment.sources import _record, discovery_records, sources_of
+from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Measurement
 
 
@@ -215,3 +218,33 @@ def test_a_run_took_a_dead_temperature_without_a_word(tmp_path, column_degc, tol
     for note in said:
         assert note.startswith("drive: its voltage contradicts its temperature. The error of ")
         assert note.endswith("(in an experiment file: data.columns, data.units).")
+
+
+def test_a_test_record_that_the_cell_file_was_fitted_to_was_called_held_out(tmp_path):
+    one, other = (write_record(tmp_path, f"{name}.csv", seed) for seed, name in enumerate(("one", "other")))
+    calibrated = replace(Cell.from_bpx(BPX), capacity_shares=(("one", 0.98),))
+    (tmp_path / "cell.json").write_text(json.dumps(calibrated.to_bpx()))
+
+    def said(train, test):
+        data = {"kind": "files", "train": [str(train)], "test": [str(test)]}
+        cell = {"bpx": str(tmp_path / "cell.json"), "soc0": SOC0, "start": "declared"}
+        notes = load(experiment(one, data=data, cell=cell, models=["ESPM"])).notes
+        return [note for note in notes if "was fitted to a record of this name" in note]
+
+    assert said(one, other) == []
+    (note,) = said(other, one)
+    assert note.startswith(
+        "one: the cell's file was fitted to a record of this name, so that no model of this run"
+    )
+
+
+def test_the_correction_of_a_saved_model_was_dropped_by_a_run_without_a_word(tmp_path):
+    path = write_record(tmp_path)
+    correction = next(one.model for one in fitted(path)[2] if one.model.name == "AESI I")
+    told = "the saved model's learnt correction is left out"
+    for number, model in enumerate((None, correction)):
+        folder = HybridModel(Cell.from_bpx(BPX), correction=model, dt_s=1.0).save(
+            tmp_path / f"model_{number}"
+        )
+        notes = load(experiment(path, cell={"bpx": str(folder), "soc0": SOC0, "start": "declared"})).notes
+        assert sum(told in note for note in notes) == number
