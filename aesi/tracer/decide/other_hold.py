@@ -27,8 +27,8 @@ def inferred_holds(path: Path) -> dict[int, InferredHold]:
 
     Rows of 1 s whose current was held, taken as straight lines, have been explained by a wrong electrolyte and porosity
     where the contact resistance was wrong. Where neither explains the record, its hold cannot be told from what else
-    the model lacks: on a drive of the NMC cell with an offset put in a held current is likelier by more than that and
-    leaves 2.49 instead of 2.60 mV, on the HG2's 1C discharge at -8 degC straight lines leave 2.37 instead of 2.39.
+    the model lacks: on a drive of the NMC cell with an offset put in, a held current is likelier by more than that and
+    leaves 2.49 instead of 2.60 mV; on the HG2's 1C discharge at -8 degC straight lines leave 2.37 instead of 2.39.
     """
     told = ((k, _better_hold(path, k)) for k in _undeclared(path.problem))
     return {k: better for k, better in told if better is not None}
