@@ -272,7 +272,7 @@ def _with_provenance(
         fitted_with=model.model_name,
         capacity_shares=tuple(shares.items()),
         tested_on=tuple((name, day_of(days[name])) for name in shares if name in days),
-        fitted_at_k=tuple((r.name, round(_mean_kelvin(declared, r), 2)) for r in model.records),
+        fitted_at_k=tuple((r.name, round(kelvin_taken(declared, r), 2)) for r in model.records),
     )
 
 
@@ -505,10 +505,10 @@ def _degc(record: Prepared) -> float | None:
 
 def _span_k(cell: Cell, records: Sequence[Prepared], spectra: Sequence[Spectrum]) -> float:
     """K between the coldest and the warmest record's mean, or spectrum."""
-    means = [_mean_kelvin(cell, r) for r in records] + [degc_of(s) + ZERO_CELSIUS_K for s in spectra]
+    means = [kelvin_taken(cell, r) for r in records] + [degc_of(s) + ZERO_CELSIUS_K for s in spectra]
     return max(means) - min(means)
 
 
-def _mean_kelvin(cell: Cell, record: Prepared) -> float:
+def kelvin_taken(cell: Cell, record: Prepared) -> float:
     """Mean temperature of a record, K; the file's where the record tells none."""
     return cell.initial_temperature_k if record.mean_kelvin is None else record.mean_kelvin

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from aesi.calibration import Calibration, Conditions, calibrate
-from aesi.calibration.fit import OnStep
+from aesi.calibration.fit import OnStep, kelvin_taken
 from aesi.calibration.parameters import check_names
 from aesi.calibration.records.prepared import Prepared, with_temperatures
 from aesi.calibration.records.sizes import sizes_sentence
@@ -371,11 +371,11 @@ def _pulse_resistance(found: Calibration) -> dict[str, Any]:
 
 def _measured_pulses(found: Calibration, record: Prepared) -> list[dict[str, Any]]:
     """The pulses in one record, as its rows were measured."""
-    kelvin = found.declared.initial_temperature_k if record.mean_kelvin is None else record.mean_kelvin
+    degc = kelvin_taken(found.declared, record) - ZERO_CELSIUS_K
     capacity_ah = found.cell.capacity_ah * found.capacities[record.name]
     socs, ohm = measured_pulses(record.data, found.starts[record.name], capacity_ah)
     return [
-        {"record": record.name, "temperature_degc": kelvin - ZERO_CELSIUS_K, "soc": soc, "mohm": MILLI * r}
+        {"record": record.name, "temperature_degc": degc, "soc": soc, "mohm": MILLI * r}
         for soc, r in zip(socs.tolist(), ohm.tolist(), strict=True)
     ]
 

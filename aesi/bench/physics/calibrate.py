@@ -24,6 +24,7 @@ from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
 from aesi.physics import Cell, simulate
 from aesi.physics.cell.relations import scaled
+from aesi.physics.simulation import ModelName
 from aesi.records import Measurement
 
 CONTACT_OHM = 8e-3
@@ -52,10 +53,10 @@ def run(
     truth = truth.with_negative(diffusivity=scaled(truth.negative.diffusivity, SLOWER))
     rng = np.random.default_rng(seed)
     fitted = [
-        _record(truth, "drive", _drive(rng, start.capacity_ah), 0.9, rng),
-        _record(truth, "1C", _discharge(start.capacity_ah), 1.0, rng),
+        virtual_record(truth, "drive", random_drive(rng, start.capacity_ah), 0.9, rng),
+        virtual_record(truth, "1C", discharge(start.capacity_ah), 1.0, rng),
     ]
-    unseen = _record(truth, "unseen drive", _drive(rng, start.capacity_ah), 0.7, rng)
+    unseen = virtual_record(truth, "unseen drive", random_drive(rng, start.capacity_ah), 0.7, rng)
     spent = Stopwatch()
     found = calibrate(start, fitted, evaluations=evaluations)
     spent_row = spent.row
@@ -80,7 +81,7 @@ def run(
     }
 
 
-def _drive(rng: np.random.Generator, capacity_ah: float) -> Array:
+def random_drive(rng: np.random.Generator, capacity_ah: float) -> Array:
     """A random drive, (2400,) A at 1 Hz, discharge positive: a rest, then constant currents of HOLD_S each, with a mean
     of 0.6C, between a charge at 1C and a discharge at 2.4C."""
     current = np.repeat(rng.normal(0.6, 0.8, 80), HOLD_S).clip(-1.0, 2.4) * capacity_ah
@@ -88,16 +89,24 @@ def _drive(rng: np.random.Generator, capacity_ah: float) -> Array:
     return current
 
 
-def _discharge(capacity_ah: float) -> Array:
+def discharge(capacity_ah: float) -> Array:
     """A 1C discharge between two rests, (3000,) A at 1 Hz."""
     current = np.full(3000, capacity_ah)
     current[:REST_S] = current[-300:] = 0.0
     return current
 
 
-def _record(truth: Cell, name: str, current: Array, soc0: float, rng: np.random.Generator) -> Measurement:
+def virtual_record(
+    truth: Cell,
+    name: str,
+    current: Array,
+    soc0: float,
+    rng: np.random.Generator,
+    model: ModelName = "dfn",
+) -> Measurement:
+    """A record at 1 Hz, with noise.  current : (n,) A, constant since the row before.  model : of the true cell."""
     time_s = np.arange(float(len(current)))
-    run = simulate(truth, time_s, current, soc0, hold="backward", model="dfn")
+    run = simulate(truth, time_s, current, soc0, hold="backward", model=model)
     noise = NOISE_V * rng.standard_normal(len(current))
     return Measurement(time_s, current, run.voltage_v + noise, name=name, hold="backward")
 

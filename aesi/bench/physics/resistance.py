@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from pydantic import NonNegativeInt
 
+from aesi.bench.physics.calibrate import discharge, random_drive, virtual_record
 from aesi.bench.physics.cells import START
 from aesi.bench.scoring import proportion
 from aesi.calibration import calibrate
@@ -36,7 +37,7 @@ from aesi.data.catalogue import M50T, PANASONIC, locate
 from aesi.data.read import read_measurement
 from aesi.errors import AesiError, DataError
 from aesi.numerics.typing import Array
-from aesi.physics import Cell, initial_state, simulate
+from aesi.physics import Cell, initial_state
 from aesi.records import Measurement
 
 MEASURED: tuple[tuple[str, tuple[str, ...], dict[str, float | None]], ...] = (
@@ -49,9 +50,6 @@ MEASURED: tuple[tuple[str, tuple[str, ...], dict[str, float | None]], ...] = (
 )
 """Data set, records that a file is calibrated on, and records of pulses with the time of their cut, s, or None;
 the one at -10 degC has a gap of nine hours there."""
-NOISE_V, HOLD_S, REST_S = 1e-3, 30, 60
-"""Of a virtual record: standard deviation of the noise, V; duration of each constant current and of the rest at the
-beginning, s. Conventions."""
 BALANCE = ("capacity", "full_stoichiometry")
 """Last parts of the names of parameters that are not drawn, since hardly any draw of them is a cell."""
 
@@ -104,8 +102,12 @@ def _virtual(start: Cell, cells: int, rng: np.random.Generator) -> Iterator[dict
     true_ohm: list[Array] = []
     while len(predicted) < cells:
         cell = _drawn(start, rng)
+        loads = {0.9: random_drive(rng, start.capacity_ah), 0.95: discharge(start.capacity_ah)}
         try:
-            records = [_record(cell, current, soc0, rng) for current, soc0 in _loads(start.capacity_ah, rng)]
+            records = [
+                virtual_record(cell, f"from {soc0:g}", load, soc0, rng, "espm")
+                for soc0, load in loads.items()
+            ]
         except AesiError:
             continue  # it runs empty under these loads
         told = pulse_resistance(calibrate(start, records))
@@ -123,22 +125,6 @@ def _drawn(start: Cell, rng: np.random.Generator) -> Cell:
     """A cell with parameters drawn from the priors of a calibration."""
     free = [one for one in free_parameters(start, np.inf) if not one.name.endswith(BALANCE)]
     return with_parameters(start, {one.name: one.value(float(rng.standard_normal())) for one in free})
-
-
-def _loads(capacity_ah: float, rng: np.random.Generator) -> tuple[tuple[Array, float], ...]:
-    """(current in A at 1 Hz, state of charge at its start) of a random drive of constant currents with a mean of 0.6C,
-    and of a 1C discharge."""
-    drive = np.repeat(rng.normal(0.6, 0.8, 80), HOLD_S).clip(-1.0, 2.4) * capacity_ah
-    discharge = np.full(3000, capacity_ah)
-    drive[:REST_S] = discharge[:REST_S] = discharge[-300:] = 0.0
-    return (drive, 0.9), (discharge, 0.95)
-
-
-def _record(truth: Cell, current_a: Array, soc0: float, rng: np.random.Generator) -> Measurement:
-    time_s = np.arange(float(len(current_a)))
-    voltage_v = simulate(truth, time_s, current_a, soc0, hold="backward").voltage_v
-    noise_v = NOISE_V * rng.standard_normal(len(time_s))
-    return Measurement(time_s, current_a, voltage_v + noise_v, name=f"from {soc0:g}", hold="backward")
 
 
 def _figures(ohm: Array, low_ohm: Array, high_ohm: Array, true_ohm: Array) -> dict[str, Any]:

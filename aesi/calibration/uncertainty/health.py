@@ -8,12 +8,10 @@ from dataclasses import astuple, dataclass, fields
 import numpy as np
 
 from aesi.calibration.result import NINETY_FIVE, Calibration
-from aesi.calibration.written_cell import written_cell
+from aesi.calibration.uncertainty.propagated import propagated_variance
 from aesi.constants import MILLI
 from aesi.physics.cell import Cell
 
-STEP = 1e-2
-"""Step of the slopes, in standard deviations of the priors."""
 HEALTH_WORDS = {
     "resistance_mohm": "resistance of contacts and films, mohm",
     "inventory_ah": "cyclable lithium, Ah",
@@ -53,16 +51,8 @@ def health_of(cell: Cell) -> Health:
 
 
 def health_intervals(found: Calibration) -> Mapping[str, tuple[float, float]]:
-    """Quantity -> its 95 % interval, by linear propagation of the fit's covariance. A parameter on an upper bound has
-    its slope taken towards the inside."""
-    at = np.array(astuple(health_of(written_cell(found.model, found.x))))
-    slopes = np.zeros((len(at), len(found.x)))
-    for j in range(len(found.x)):
-        h = STEP if found.x[j] + STEP <= found.model.high[j] else -STEP
-        there = found.x.copy()
-        there[j] += h
-        slopes[:, j] = (np.array(astuple(health_of(written_cell(found.model, there)))) - at) / h
-    reach = NINETY_FIVE * np.sqrt(np.einsum("ij,jk,ik->i", slopes, found.covariance, slopes))
+    """Quantity -> its 95 % interval, by linear propagation of the fit's covariance."""
+    reach = NINETY_FIVE * np.sqrt(propagated_variance(found, lambda cell: np.array(astuple(health_of(cell)))))
     middle = np.array(astuple(health_of(found.cell)))
     return {
         field.name: (float(max(m - r, 0.0)), float(m + r))

@@ -17,6 +17,7 @@ import numpy as np
 
 from aesi.calibration.parameters import with_parameters
 from aesi.calibration.result import NINETY_FIVE, Calibration
+from aesi.calibration.uncertainty.propagated import STEP, propagated_variance
 from aesi.calibration.written_cell import written_cell
 from aesi.errors import AesiError
 from aesi.numerics.typing import Array, Numbers
@@ -32,8 +33,6 @@ PULSE_S = (0.0, 1e-3, 2.0, 4.0, 6.0, 8.0, 10.0)
 """Rows of the pulse, s: the current steps up within the first interval."""
 NEAR_1C, STEADY_C = 0.1, 0.03
 """Largest deviation of a measured pulse's current from 1C, and within rest and pulse, in C. Conventions."""
-STEP = 1e-2
-"""Step of the slopes, in standard deviations of the priors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,16 +58,9 @@ def pulse_resistance(
     temperature_degc : (m,) or one value, degC.  soc : (k,) or one value, state of charge before the pulse, 0 to 1.
     """
     degc, socs = np.atleast_1d(temperature_degc).astype(float), np.atleast_1d(soc).astype(float)
-    model, x = found.model, found.x
+    model = found.model
     log_ohm = partial(log_resistance, temperature_degc=degc, soc=socs, model_name=model.model_name)
-    at = log_ohm(written_cell(model, x))
-    slopes = np.zeros((len(x), *at.shape))
-    for j in range(len(model.free)):  # the other parameters belong to a record, and are not in the file
-        h = STEP if x[j] + STEP <= model.high[j] else -STEP
-        there = x.copy()
-        there[j] += h
-        slopes[j] = (log_ohm(written_cell(model, there)) - at) / h
-    variance = np.einsum("iab,ij,jab->ab", slopes, found.covariance, slopes)
+    at, variance = log_ohm(written_cell(model, found.x)), propagated_variance(found, log_ohm)
     for moved in _with_other_energies(found):
         variance += ((log_ohm(moved) - at) / STEP) ** 2
     ohm, factor = np.exp(at), np.exp(NINETY_FIVE * np.sqrt(variance))

@@ -32,7 +32,8 @@ SHOWN = 0.999
 """Share of the fit's residuals that the figure over time shows. On five calibrations its axis then reaches 4 to 9 times
 their root mean square, and their largest is 1.1 to 1.9 times beyond; the start files' are 2 to 40 times beyond."""
 BESIDE = 0.05
-"""Largest distance of a measured pulse from a state of charge at which it is drawn beside the model's."""
+"""Largest distance of a measured pulse from a state of charge at which it is drawn beside the model's. A convention:
+half of what pulse tests step by."""
 KNOT, PERCENT = "_at_", "_percent"
 
 
@@ -168,7 +169,7 @@ def pulse_figure(content: Mapping[str, Any]) -> dict[str, Figure]:
     fig = style.figure(
         "Resistance of a pulse over temperature",
         "Lines: as the file predicts. Bands: 95 %, as the records leave it. A dotted line: no record is near. Crosses: "
-        "measured, pulses in the records within 5 points of that charge.",
+        f"measured, pulses in the records within {100.0 * BESIDE:g} points of that charge.",
         400,
     )
     for k, (soc, colour) in enumerate(zip(told["soc"], style.MODEL_COLOURS, strict=False)):
