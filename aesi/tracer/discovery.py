@@ -226,10 +226,11 @@ def discover(
     while others := inferred_holds(evidence.paths.get("tight", evidence.path)):
         inferred |= others
         evidence, choice = with_model(problem_with(inferred=inferred), model, search, archive_of, max_effects)
+        tested = tests_with(inferred)
     found = _discovery_of(
         evidence,
         choice,
-        tests_with(inferred),
+        tested,
         spent.simulations,
         np.random.default_rng(seed),
         time.perf_counter() - began,
