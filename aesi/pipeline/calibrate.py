@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 
 from aesi.calibration import Calibration, Conditions, calibrate
-from aesi.calibration.fit import OnStep, kelvin_taken
+from aesi.calibration.fit import OnStep
 from aesi.calibration.parameters import check_names
-from aesi.calibration.records.prepared import Prepared, with_temperatures
+from aesi.calibration.records.prepared import with_temperatures
 from aesi.calibration.records.sizes import sizes_sentence
 from aesi.calibration.records.spectra import BAND_HZ, check_spectra
 from aesi.calibration.result import RecordError
 from aesi.calibration.start import full_discharge_numbers, scaled_to_discharge
 from aesi.calibration.uncertainty.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.uncertainty.posterior import PosteriorSamples, check_posterior, sample_posterior
-from aesi.calibration.uncertainty.pulse_resistance import PULSE_S, measured_pulses, pulse_resistance
+from aesi.calibration.uncertainty.pulse_resistance import PULSE_S, pulse_resistance
 from aesi.calibration.written_cell import start_soc
 from aesi.constants import CM_PER_M, MILLI, MV_PER_V, ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError
@@ -365,19 +365,17 @@ def _pulse_resistance(found: Calibration) -> dict[str, Any]:
         }
         for k, degc in enumerate(told.temperature_degc.tolist())
     ]
-    measured = [pulse for record in found.model.records for pulse in _measured_pulses(found, record)]
-    return {"seconds": PULSE_S[-1], "soc": told.soc.tolist(), "rows": rows, "measured": measured}
-
-
-def _measured_pulses(found: Calibration, record: Prepared) -> list[dict[str, Any]]:
-    """The pulses in one record, as its rows were measured."""
-    degc = kelvin_taken(found.declared, record) - ZERO_CELSIUS_K
-    capacity_ah = found.cell.capacity_ah * found.capacities[record.name]
-    socs, ohm = measured_pulses(record.data, found.starts[record.name], capacity_ah)
-    return [
-        {"record": record.name, "temperature_degc": degc, "soc": soc, "mohm": MILLI * r}
-        for soc, r in zip(socs.tolist(), ohm.tolist(), strict=True)
+    measured = [
+        {"record": p.record, "temperature_degc": p.temperature_degc, "soc": p.soc, "mohm": MILLI * p.ohm}
+        for p in told.measured
     ]
+    return {
+        "seconds": PULSE_S[-1],
+        "soc": told.soc.tolist(),
+        "rows": rows,
+        "measured": measured,
+        "model_error_pct": None if told.model_error is None else 100.0 * told.model_error,
+    }
 
 
 def _posterior_bounds(posterior: PosteriorSamples | None, name: str) -> dict[str, float]:

@@ -2,24 +2,30 @@
 
     R = (V(0) - V(10 s)) / I        I of 1C, a discharge from rest                       (1)
 
-An interval is of the logarithm of R, by linear propagation of the fit's covariance and, where the records'
-temperatures are too close together for a fit to move activation energies, of the priors of these. It leaves out what
-the model itself is off by.
+An interval is of the logarithm of R. Its variance is that of the parameters, by linear propagation of the fit's
+covariance and, where the records' temperatures are too close together for a fit to move activation energies, of the
+priors of these; and that of the model, the mean square of what it is off by at the pulses (1) within the fitted
+records. Without such pulses it leaves out what the model is off by.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import groupby
 
 import numpy as np
 
+from aesi.calibration.fit import kelvin_taken
 from aesi.calibration.parameters import with_parameters
+from aesi.calibration.records.prepared import Prepared
 from aesi.calibration.result import NINETY_FIVE, Calibration
 from aesi.calibration.uncertainty.propagated import STEP, propagated_variance
 from aesi.calibration.written_cell import written_cell
+from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import AesiError
+from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, Numbers
 from aesi.physics.cell import Cell
 from aesi.physics.cell.energies import energy_priors
@@ -40,7 +46,9 @@ class PulseResistance:
     """Resistance (1) of a cell.
 
     temperature_degc : (m,) degC.  soc : (k,) state of charge.  ohm, low_ohm, high_ohm : (m, k), value and 95 %
-    interval; NaN where the cell cannot give the pulse.
+    interval; NaN where the cell cannot give the pulse.  measured : the pulses within the fitted records.
+    model_error : RMS of ln(measured / predicted) over those of them that the cell can give; None without any, and then
+    the intervals are without it.
     """
 
     temperature_degc: Array
@@ -48,6 +56,22 @@ class PulseResistance:
     ohm: Array
     low_ohm: Array
     high_ohm: Array
+    measured: tuple[MeasuredPulse, ...]
+    model_error: float | None
+
+
+@dataclass(frozen=True)
+class MeasuredPulse:
+    """A pulse (1) within a fitted record.
+
+    record : its name.  temperature_degc : of the record, mean, degC.  soc : state of charge before the pulse, 0 to 1.
+    ohm : measured.
+    """
+
+    record: str
+    temperature_degc: float
+    soc: float
+    ohm: float
 
 
 def pulse_resistance(
@@ -63,8 +87,31 @@ def pulse_resistance(
     at, variance = log_ohm(written_cell(model, found.x)), propagated_variance(found, log_ohm)
     for moved in _with_other_energies(found):
         variance += ((log_ohm(moved) - at) / STEP) ** 2
+    measured = tuple(pulse for record in found.model.records for pulse in _fitted_pulses(found, record))
+    model_error = _model_error(found, measured)
+    variance += (model_error or 0.0) ** 2
     ohm, factor = np.exp(at), np.exp(NINETY_FIVE * np.sqrt(variance))
-    return PulseResistance(degc, socs, ohm, ohm / factor, ohm * factor)
+    return PulseResistance(degc, socs, ohm, ohm / factor, ohm * factor, measured, model_error)
+
+
+def _fitted_pulses(found: Calibration, record: Prepared) -> Iterator[MeasuredPulse]:
+    """The pulses in a fitted record, as its rows were measured."""
+    degc = kelvin_taken(found.declared, record) - ZERO_CELSIUS_K
+    capacity_ah = found.cell.capacity_ah * found.capacities[record.name]
+    socs, ohm = measured_pulses(record.data, found.starts[record.name], capacity_ah)
+    for soc, resistance_ohm in zip(socs.tolist(), ohm.tolist(), strict=True):
+        yield MeasuredPulse(record.name, degc, soc, resistance_ohm)
+
+
+def _model_error(found: Calibration, measured: Sequence[MeasuredPulse]) -> float | None:
+    """`model_error` of the calibrated cell, from measured pulses."""
+    cell, off = written_cell(found.model, found.x), []
+    for degc, pulses in groupby(measured, key=lambda pulse: pulse.temperature_degc):
+        socs, ohm = np.array([(pulse.soc, pulse.ohm) for pulse in pulses]).T
+        off.append(np.log(ohm) - log_resistance(cell, np.array([degc]), socs, found.model.model_name)[0])
+    all_off = np.concatenate([np.empty(0), *off])
+    told = all_off[np.isfinite(all_off)]
+    return rms(told) if len(told) else None
 
 
 def _with_other_energies(found: Calibration) -> Iterator[Cell]:

@@ -1,5 +1,7 @@
 """The resistance that a calibrated cell predicts where no record was, with its intervals."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -14,6 +16,22 @@ from aesi.physics import simulate
 from aesi.records import Measurement
 
 DEGC, SOC = (-10.0, 0.0, 25.0), (0.8, 0.5)
+
+
+def pulse_test(cell, hold="backward"):
+    """An hour from 60 % charge, a row a second."""
+    time_s = np.arange(0.0, 3600.0)
+    current_a = np.zeros(len(time_s))
+    for start, seconds, c_rate in (
+        (300, 30, 1.0),
+        (1000, 5, 1.0),
+        (1500, 30, 2.0),
+        (2000, 30, -1.0),
+        (2500, 12, 1.0),
+    ):
+        current_a[start : start + seconds] = c_rate * cell.nominal_capacity_ah
+    voltage_v = simulate(cell, time_s, current_a, 0.6, (), 25.0, hold).voltage_v
+    return Measurement(time_s, current_a, voltage_v, hold=hold)
 
 
 @pytest.fixture(scope="module")
@@ -51,20 +69,9 @@ def test_a_state_that_cannot_give_the_pulse_has_no_resistance(truth):
 @pytest.mark.parametrize("hold", ["backward", "linear"])
 def test_the_pulses_of_a_record_show_the_resistance_of_its_cell(truth, hold):
     """Two at 1C; one that is too short, one at 2C and a charge do not count."""
-    time_s = np.arange(0.0, 3600.0)
-    current_a = np.zeros(len(time_s))
-    one_c = truth.nominal_capacity_ah
-    for start, seconds, c_rate in (
-        (300, 30, 1.0),
-        (1000, 5, 1.0),
-        (1500, 30, 2.0),
-        (2000, 30, -1.0),
-        (2500, 12, 1.0),
-    ):
-        current_a[start : start + seconds] = c_rate * one_c
-    voltage_v = simulate(truth, time_s, current_a, 0.6, (), 25.0, hold).voltage_v
-    soc, ohm = measured_pulses(Measurement(time_s, current_a, voltage_v, hold=hold), 0.6, truth.capacity_ah)
-    charged_ah = (30.0 + 5.0 + 60.0 - 30.0) / 3600.0 * one_c
+    record = pulse_test(truth, hold)
+    soc, ohm = measured_pulses(record, 0.6, truth.capacity_ah)
+    charged_ah = (30.0 + 5.0 + 60.0 - 30.0) / 3600.0 * truth.nominal_capacity_ah
     assert soc == pytest.approx([0.6, 0.6 - charged_ah / truth.capacity_ah], abs=3e-4)
     assert ohm == pytest.approx(np.exp(log_resistance(truth, np.array([25.0]), soc))[0], rel=0.03)
 
@@ -73,3 +80,19 @@ def test_a_record_without_pulses_shows_none(truth):
     time_s = np.arange(0.0, 600.0)
     flat = Measurement(time_s, np.zeros(600), np.full(600, 3.7))
     assert [len(found) for found in measured_pulses(flat, 0.5, truth.capacity_ah)] == [0, 0]
+
+
+def test_intervals_are_as_wide_as_the_file_is_off_at_measured_pulses(at_25, start, records, truth):
+    """The second pulse of a test shows 3 mohm that no other record does, so that no parameter can explain it."""
+    test = pulse_test(truth)
+    lower_v = np.where((test.time_s >= 2500.0) & (test.current_a > 0.0), 3e-3 * test.current_a, 0.0)
+    odd = replace(test, voltage_v=test.voltage_v - lower_v, name="odd")
+    got = pulse_resistance(calibrate(start, [records[0], odd]), DEGC, SOC)
+    assert [pulse.record for pulse in got.measured] == ["odd", "odd"]
+    first, second = got.measured
+    assert second.ohm - first.ohm == pytest.approx(3e-3, rel=0.1)
+    least = abs(np.log(second.ohm / first.ohm)) / 2.0  # the predicted two are equal to within a percent
+    assert least - 0.01 <= got.model_error <= 2.0 * least
+    assert np.all(np.log(got.high_ohm / got.ohm) >= 1.96 * got.model_error)
+    assert at_25.measured == ()
+    assert at_25.model_error is None

@@ -74,6 +74,7 @@ def content():
                 {"record": "pulses", "temperature_degc": 24.0, "soc": soc, "mohm": 44.0}
                 for soc in (0.24, 0.5)
             ],
+            "model_error_pct": 2.34,
         },
         "size_assumed": "",
         "undetermined": [{"weights": {}, "narrowed": 1.0, "sentence": "the data do not determine it"}],

@@ -1,5 +1,7 @@
 """What a calibration says of parameters that its records do not tell."""
 
+import pytest
+
 from aesi.pipeline.report.words.calibrations import _with_interval, open_line, to_text
 
 
@@ -32,7 +34,16 @@ def test_an_interval_is_told_with_the_digits_that_show_its_width():
     assert _with_interval({"value": 1.061, "low": 1.044, "high": 1.077}) == "1.061 | 1.044 to 1.077"
 
 
-def test_a_report_says_at_what_a_record_was_taken_and_what_the_records_tell_of_each_parameter():
+@pytest.mark.parametrize(
+    ("model_error_pct", "off"),
+    [
+        (2.34, "and what the file is off by at such pulses in them, 2.3 % RMS."),
+        (None, "without what the model itself is off by, since no record has such a pulse."),
+    ],
+)
+def test_a_report_says_at_what_a_record_was_taken_and_what_the_records_tell_of_each_parameter(
+    model_error_pct, off
+):
     file = {"before_rmse_mv": 2.0, "after_rmse_mv": 1.0, "as_simulated_rmse_mv": 1.5, "capacity_share": 1.0}
     told = {"low": 0.9, "high": 1.1, "unit": "factor", "prior_from": "convention", "value": 1.0}
     text = to_text(
@@ -57,6 +68,7 @@ def test_a_report_says_at_what_a_record_was_taken_and_what_the_records_tell_of_e
                         "high_mohm": [199.2, None],
                     }
                 ],
+                "model_error_pct": model_error_pct,
             },
             "size_assumed": "no record tells it.",
             "parameters": {
@@ -73,6 +85,7 @@ def test_a_report_says_at_what_a_record_was_taken_and_what_the_records_tell_of_e
     assert "**Warning:** a starts elsewhere." in text
     assert "| degC | at 80 % charge | at 20 % charge |" in text
     assert "| -10 * | 120 [76, 199] | cannot give the pulse |" in text
+    assert f"95 % intervals: what these records leave open, {off}" in text
     assert "\n\\* no record within 8 K: " in text
     assert "\nNo record tells it.\n" in text
     assert "| a | 25.0, as declared | 2.00 |" in text

@@ -97,9 +97,16 @@ OUTSIDE = (
 
 def pulse_sentence(content: Mapping[str, Any]) -> str:
     """What the resistances and their intervals are."""
+    told = content["pulse_resistance"]
+    model_error_pct = told["model_error_pct"]
+    off = (
+        "without what the model itself is off by, since no record has such a pulse"
+        if model_error_pct is None
+        else f"and what the file is off by at such pulses in them, {model_error_pct:.2g} % RMS"
+    )
     return (
-        f"Resistance of a discharge at 1C for {content['pulse_resistance']['seconds']:g} s from rest, mohm, with 95 % "
-        "intervals: what these records leave open, without what the model itself is off by."
+        f"Resistance of a discharge at 1C for {told['seconds']:g} s from rest, mohm, with 95 % intervals: what these "
+        f"records leave open, {off}."
     )
 
 
