@@ -22,6 +22,7 @@ CELLS = Path(__file__).resolve().parents[2] / "experiments" / "cells"
     [
         ("hg2", "lg_18650hg2", "lg_18650hg2"),
         ("hg2_25degc", "lg_18650hg2_25degc", "lg_18650hg2"),
+        ("hg2_mixed2", "lg_18650hg2_mixed2", "lg_18650hg2"),
         ("panasonic", "panasonic_ncr18650pf", "panasonic_ncr18650pf"),
         ("panasonic_25degc", "panasonic_ncr18650pf_25degc", "panasonic_ncr18650pf"),
         ("hg2_cold", "lg_18650hg2_cold", "lg_18650hg2"),

@@ -4,7 +4,8 @@ In every split a hybrid model is trained on some drives of a cell and predicts d
 
     nmc        trains on three, or on two, of the five parts of the NMC pouch cell's drive; the other parts test
     lfp        the same with the LFP cell's drive, on which no rule or default was chosen
-    hg2        one drive of the LG HG2 at 25 degC tests, the others train; each drive in turn
+    hg2        one drive of the LG HG2 at 25 degC tests, the others train; each drive in turn, with a cell file that was
+               fitted to one of the others
     panasonic  the same with the Panasonic NCR18650PF
     m50t       trains on the odd repeats of the LG M50T's UDDS and tests on the even ones, and the reverse
 
@@ -78,6 +79,8 @@ EXPERIMENTS = {
     "m50t": "lg_m50t_udds.yaml",
 }
 """Cell -> file name of the experiment with its settings."""
+OTHER_FILES = {"25degC_mixed1": "cells/lg_18650hg2_mixed2.bpx.json"}
+"""Drive -> the cell file with which it is the test, where that of the experiment was fitted to it."""
 DRIVE_PARTS = (1, 2, 3, 4, 5)
 """Numbers of the parts of the published drives of the NMC and the LFP cell, DRIVE_PART_S long each."""
 DRIVE_PART_S = 1800.0
@@ -233,6 +236,7 @@ def _by_drive(cell: str) -> Iterator[SplitCase]:
                 f"data.train=[{train}]",
                 "data.valid=[]",
                 f"data.test=[{', '.join((drive, *abroad))}]",
+                *([f"cell.bpx={OTHER_FILES[drive]}"] if drive in OTHER_FILES else []),
             ),
             abroad=abroad,
             development=development,

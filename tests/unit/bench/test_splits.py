@@ -10,6 +10,7 @@ import yaml
 from aesi.bench.hybrid.split_figures import summary, table
 from aesi.bench.hybrid.splits import EXPERIMENTS, against, all_splits, chosen_splits, judged
 from aesi.errors import InputError
+from aesi.physics import Cell
 from aesi.pipeline.experiment.config import read_experiment
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.records import ErrorSeries
@@ -36,6 +37,15 @@ def test_no_drive_trains_and_tests(split):
     assert not set(roles[0]) & set(roles[1])
     assert set(split.abroad) <= set(roles[1])
     assert not data.valid
+
+
+@pytest.mark.parametrize("split", chosen_splits(["hg2", "panasonic"]), ids=lambda split: split.name)
+def test_a_cell_file_was_fitted_to_the_drive_that_tests(split):
+    """A recalibration by the other drives could but lose there, against a file that had seen the test."""
+    config = read_experiment(EXPERIMENT_FILES / split.experiment, split.overrides)
+    fitted = {name for name, _ in Cell.from_bpx(EXPERIMENT_FILES / config.cell.bpx).fitted_at_k}
+    assert fitted
+    assert not fitted & set(config.data.test)
 
 
 def test_the_measured_experiments_differ_in_no_setting_that_a_test_could_have_chosen():
