@@ -210,6 +210,12 @@ class Measurement:
         again."""
         return self.examined_digest == self.digest
 
+    @property
+    def file_digest(self) -> str:
+        """Content hash of the rows as they were read, also of a record that was thinned or cut since; of the rows
+        themselves where no reader examined them."""
+        return self.examined_digest or self.digest
+
     def held(self, hold: Hold | None) -> Measurement:
         """The record with this hold as the declared one; None declares none."""
         return replace(self, hold=hold)

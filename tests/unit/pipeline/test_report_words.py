@@ -194,6 +194,18 @@ def test_errors_that_are_told_apart_late_have_more_digits(views):
     assert "removes 0.5 % of the mean squared error" in said
 
 
+def test_a_headline_called_records_held_out_that_the_declared_model_had_seen(views):
+    seen = replace(views.run_view(200), seen=("SC03",))
+    assert runs.run_finding(seen).startswith(
+        "On test records, of which the declared model has seen SC03, in free run, the RMSE is 4.1 mV"
+    )
+    view = views.discovery_view(200)
+    assert " RMSE on held-out data: " in discoveries.discovery_consequence(view)
+    seen = replace(view, discovery=view.discovery | {"seen": ["SC03", "NEDC"]})
+    words = " RMSE on test data, of which the declared model has seen SC03 and NEDC: "
+    assert words in discoveries.discovery_consequence(seen)
+
+
 def test_the_correction_was_credited_with_what_the_recalibration_does(views, tmp_path):
     """A pouch cell's drive: 18.9 mV as declared, 9.1 recalibrated, 6.5 corrected were told as 88.2 % less."""
     view = views.run_view(200)
