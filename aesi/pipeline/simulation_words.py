@@ -7,7 +7,7 @@ import numpy as np
 from aesi.constants import MV_PER_V
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, BoolArray
-from aesi.over_time import stamp
+from aesi.over_time import range_words, stamp
 from aesi.physics import Cell
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.rest.open_circuit import GIVEN_SD
@@ -132,7 +132,7 @@ def changed_cell_sentences(record: Measurement, model: HybridModel, soc0: float,
 
 
 def _range_v(voltage_v: Array) -> str:
-    return f"{np.min(voltage_v):.3f} to {np.max(voltage_v):.3f} V"
+    return f"{range_words(f'{np.min(voltage_v):.3f}', f'{np.max(voltage_v):.3f}')} V"
 
 
 def first_error_sentences(

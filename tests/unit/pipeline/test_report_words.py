@@ -610,9 +610,11 @@ def test_the_range_that_the_data_cover_is_told(views):
     soc, current_a = np.linspace(0.9, 0.2, 3601), np.linspace(-5.0, 12.5, 3601)
     text = discoveries.span_finding(replace(view, traces=(replace(t, soc=soc, current_a=current_a),)))
     assert "span 1.0 h, 20 to 90 % state of charge" in text
-    assert "from -5 to 12.5 A" in text
+    assert "of -5 to 12.5 A" in text
     idle = replace(view, traces=(replace(t, current_a=np.linspace(-0.00163, 12.6, 3601)),))
-    assert "from 0 to 12.6 A" in discoveries.span_finding(idle)
+    assert "currents of 0 to 12.6 A" in discoveries.span_finding(idle)
+    still = replace(view, traces=(replace(t, soc=soc[:1], current_a=np.full(1, 5.0)),))
+    assert " h, 90 % state of charge and currents of 5 A (" in discoveries.span_finding(still)
     assert discoveries.span_finding(replace(view, traces=())) == ""
 
 

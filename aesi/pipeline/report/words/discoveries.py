@@ -10,6 +10,7 @@ import numpy as np
 from aesi.advice import listed
 from aesi.constants import MV_PER_V, SECONDS_PER_HOUR
 from aesi.numerics.typing import Array
+from aesi.over_time import range_words
 from aesi.pipeline.digits import decimals
 from aesi.pipeline.report.views import DiscoveryView, Row
 from aesi.pipeline.report.words.sizes import (
@@ -262,9 +263,10 @@ def span_finding(view: DiscoveryView) -> str:
     least, most = (
         round(end, digits) + 0.0 for end in (least, most)
     )  # + 0.0: a rounded-away minus says nothing
+    percent = range_words(*(f"{round(100 * end)}" for end in soc))
     return (
-        f"The data span {hours:.1f} h, {round(100 * soc[0])} to {round(100 * soc[1])} % state of charge and currents "
-        f"from {least:g} to {most:g} A (discharge positive); the verdict holds only within these ranges."
+        f"The data span {hours:.1f} h, {percent} % state of charge and currents of "
+        f"{range_words(f'{least:g}', f'{most:g}')} A (discharge positive); the verdict holds only within these ranges."
     )
 
 
