@@ -1,4 +1,4 @@
-"""A quick look at columns over time: one panel a quantity, drawn by plotly, which is imported where it is used."""
+"""Columns over time in a few words, and drawn, one panel a quantity, by plotly, which is imported where it is used."""
 
 from __future__ import annotations
 
@@ -31,6 +31,11 @@ def time_unit(span_s: float) -> tuple[str, float]:
 def stamp(time_s: float) -> str:
     """A row's time for a sentence, in s: six digits, of stamps since 1970 all that tell one row from the next."""
     return f"{time_s:.{6 if abs(time_s) < LONGEST_STAMP_S else 12}g}"
+
+
+def range_words(low: str, high: str) -> str:
+    """A range for a sentence, '2.5 to 4.1'; its one figure where both ends, as they are written, are the same."""
+    return low if low == high else f"{low} to {high}"
 
 
 def extent(time_s: Array) -> str:

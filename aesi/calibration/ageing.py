@@ -29,6 +29,7 @@ from scipy.special import ndtr, ndtri
 from aesi.calibration.records.prepared import Prepared
 from aesi.errors import DataError
 from aesi.numerics.typing import Array, BoolArray
+from aesi.over_time import range_words
 from aesi.physics.cell.health import day_of
 
 SLOW_SD, LOADED_SD = 0.03, 0.002
@@ -132,8 +133,9 @@ def _file_day(records: Sequence[Prepared], days: Sequence[date | None], as_of: d
     """
     dated = [d for d in days if d is not None]
     if as_of is not None and not min(dated) <= as_of <= max(dated):
+        of_days = range_words(f"{min(dated)}", f"{max(dated)}")
         raise DataError(
-            f"as of {as_of}: the dated records are of {min(dated)} to {max(dated)}, and nothing shows what the cell "
+            f"as of {as_of}: the dated records are of {of_days}, and nothing shows what the cell "
             "was on another day; give a day from the first to the last of them."
         )
     loaded = [d for r, d in zip(records, days, strict=True) if d is not None and not r.slow]

@@ -16,7 +16,7 @@ from aesi.data.reading import Reading
 from aesi.errors import DataError
 from aesi.numerics.files.whole import write_whole
 from aesi.numerics.typing import Array
-from aesi.over_time import extent
+from aesi.over_time import extent, range_words
 from aesi.records import Measurement
 
 if TYPE_CHECKING:
@@ -118,4 +118,4 @@ def _plain(value: float, digits: int) -> str:
 
 
 def _range(values: Array, unit: str) -> str:
-    return f"{np.min(values):.4g} to {np.max(values):.4g} {unit}"
+    return f"{range_words(f'{np.min(values):.4g}', f'{np.max(values):.4g}')} {unit}"

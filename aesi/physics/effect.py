@@ -291,6 +291,12 @@ class ActiveEffect:
         """Values by name."""
         return dict(self.values)
 
+    @property
+    def vanishes(self) -> bool:
+        """Whether it changes nothing: it has neutral values, and all parameters that have one are at it."""
+        neutral = {name: p.neutral for name, p in self.effect.parameters.items() if p.neutral is not None}
+        return bool(neutral) and all(self.parameters[name] == value for name, value in neutral.items())
+
     def act(self, function: Callable[..., Acted], given: object) -> Acted:
         """The result of one of the effect's functions for the input `given`.
 

@@ -13,7 +13,7 @@ from aesi.physics.model import EspmModel
 @dataclass(frozen=True)
 class Folded:
     """cell : with all effects that a cell file can hold; its description names them.
-    held, left : the effects that are in the cell now, and those that are not."""
+    held, left : the effects that are in the cell now, and those that are not; without those that change nothing."""
 
     cell: Cell
     held: tuple[ActiveEffect, ...]
@@ -38,7 +38,7 @@ def folded(
     """
     held: list[ActiveEffect] = []
     left: list[ActiveEffect] = []
-    for active in materials_first(effects):
+    for active in materials_first(effect for effect in effects if not effect.vanishes):
         changed = None if stays(active) else _on_cell_alone(cell, active)
         if changed is None:
             left.append(active)

@@ -14,8 +14,6 @@ import numpy as np
 
 from aesi.advice import advises_python, with_arguments
 from aesi.calibration import Calibration, Conditions
-from aesi.calibration import calibrate as fit_cell
-from aesi.calibration.records.spectra import check_spectra
 from aesi.data.read import Reading, examined, read
 from aesi.data.reading import record_names
 from aesi.data.spectra import read_spectra
@@ -24,17 +22,10 @@ from aesi.over_time import stamp
 from aesi.physics import ModelName
 from aesi.physics.arguments import check_choice, checked_soc
 from aesi.physics.cell import Soh
-from aesi.pipeline.calibrate import (
-    body_sentences,
-    check_records,
-    omitted_effect_sentences,
-    start_at_size,
-    start_cell,
-)
+from aesi.pipeline.calibrate import Request, calibrate_declared, check_request
 from aesi.pipeline.discovery.discover import Case, run_case
 from aesi.pipeline.discovery.finding import Finding
 from aesi.pipeline.discovery.searchable import searchable
-from aesi.pipeline.distinct import check_distinct_spectra
 from aesi.pipeline.product.declared import Declared, declared_model
 from aesi.records import Hold, Measurement, Spectrum
 from aesi.records.checked import check_whole_number, row_words
@@ -173,25 +164,26 @@ def calibrate(
     if cut_offs_v is not None and not _is_row(cut_offs_v, 2):
         raise InputError(f"cut_offs_v = {cut_offs_v!r}: give (lower, upper) V, as in (2.5, 4.2).")
     given = declared_model(cell)
-    declared = start_cell(given.cell, cut_offs_v, body_mm, mass_g)
-    measurements = _read_all(_listed(data), hold)
-    check_records(measurements, temperatures_degc)
-    scaled = start_at_size(declared, measurements, temperatures_degc)  # refused before anything is fitted
-    body = body_sentences(given.cell, scaled)
     conditions = Conditions(
         soc0,
         temperatures_degc or {},
         dates or {},
         as_of,
-        model or given.model,
+        model,
         spectra=_read_spectra(spectra),
         priors=priors or {},
     )
-    check_distinct_spectra(conditions.spectra, ())
-    check_spectra(scaled, conditions.spectra)
-    found = fit_cell(declared, measurements, conditions, starts=starts, seed=seed)
-    notes = (*omitted_effect_sentences(given), *body, *found.notes)
-    return replace(found, notes=tuple(map(with_arguments, notes)))
+    request = Request(
+        conditions,
+        cut_offs_v=cut_offs_v,
+        starts=starts,
+        seed=seed,
+        body_mm=body_mm,
+        mass_g=mass_g,
+    )
+    check_request(given, request)  # refused before a record is read
+    found = calibrate_declared(given, _read_all(_listed(data), hold), request)
+    return replace(found, notes=tuple(map(with_arguments, found.notes)))
 
 
 def _read_spectra(given: Spectra) -> tuple[Spectrum, ...]:

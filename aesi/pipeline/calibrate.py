@@ -35,7 +35,7 @@ from aesi.physics.simulation import MODEL_WORDS
 from aesi.pipeline.distinct import check_distinct, check_distinct_spectra
 from aesi.pipeline.impedance import SpectrumError, compared_spectra
 from aesi.pipeline.notes import together
-from aesi.pipeline.product.declared import declared_model
+from aesi.pipeline.product.declared import Declared, declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.report.views import DiscoveryTrace
 from aesi.pipeline.report.words.calibrations import open_line, to_text
@@ -69,11 +69,11 @@ class Request:
     starts: int = 1
     seed: int = 0
     title: str | None = None
-    body_mm: tuple[float, ...] | None = None
+    body_mm: Sequence[float] | None = None
     mass_g: float | None = None
 
 
-def check_request(cell: Path, request: Request) -> None:
+def check_request(cell: Declared, request: Request) -> None:
     """Raises CellError, DataError or InputError, one sentence, for a request that can be refused without a record."""
     check_posterior(request.posterior)
     check_distinct_spectra(request.conditions.spectra, request.impedance)
@@ -116,6 +116,34 @@ def body_sentences(cell: Cell, start: Cell) -> tuple[str, ...]:
     return (f"the body of the cell as given: {', '.join(values)}.",)
 
 
+def calibrate_declared(
+    given: HybridModel, measurements: Sequence[Measurement], asked: Request, on_step: OnStep | None = None
+) -> Calibration:
+    """Calibrate the cell of a declared model to records, after every check that needs no fit; its notes begin with what
+    is left out of what is declared, and with the body that was given.
+
+    on_step : told at each step of the fit.
+
+    Raises CellError, DataError or InputError, one sentence, for what cannot be used.
+    """
+    check_request(given, asked)
+    conditions = asked.conditions
+    check_records(measurements, conditions.temperatures_degc)
+    declared = start_cell(given.cell, asked.cut_offs_v, asked.body_mm, asked.mass_g)
+    start = start_at_size(declared, measurements, conditions.temperatures_degc)
+    body = body_sentences(given.cell, start)
+    check_spectra(start, (*conditions.spectra, *asked.impedance))
+    found = calibrate(
+        declared,
+        measurements,
+        replace(conditions, model=conditions.model or given.model),
+        starts=asked.starts,
+        seed=asked.seed,
+        on_step=on_step,
+    )
+    return replace(found, notes=(*omitted_effect_sentences(given), *body, *found.notes))
+
+
 def calibrate_files(
     cell: Path,
     measurements: Sequence[Measurement],
@@ -130,30 +158,15 @@ def calibrate_files(
     Raises CellError, DataError or InputError, one sentence, for what cannot be used.
     """
     asked = request or Request()
-    conditions = asked.conditions
-    check_records(measurements, conditions.temperatures_degc)
-    check_posterior(asked.posterior)
-    check_distinct_spectra(conditions.spectra, asked.impedance)
-    given = declared_model(cell)
-    declared = start_cell(given.cell, asked.cut_offs_v, asked.body_mm, asked.mass_g)
-    model = conditions.model or given.model
-    start = start_at_size(declared, measurements, conditions.temperatures_degc)
-    body = body_sentences(given.cell, start)
-    check_spectra(start, (*conditions.spectra, *asked.impedance))
-    conditions = replace(conditions, model=model)
-    found = calibrate(
-        declared, measurements, conditions, starts=asked.starts, seed=asked.seed, on_step=on_step
-    )
-    name = declared.name if asked.title is None else asked.title
+    found = calibrate_declared(declared_model(cell), measurements, asked, on_step)
+    name = found.declared.name if asked.title is None else asked.title
     found = replace(found, cell=replace(found.cell, name=name, description=_provenance(found)))
     posterior = sample_posterior(found, asked.posterior, asked.seed) if asked.posterior else None
     spectra, spectrum_notes = compared_spectra(
-        found.cell, asked.impedance, model=model, fitted=conditions.spectra
+        found.cell, asked.impedance, model=found.model.model_name, fitted=asked.conditions.spectra
     )
     read = [note for m in measurements for note in m.notes]
-    content = calibration_content(
-        found, [*omitted_effect_sentences(given), *body, *read, *spectrum_notes], posterior, spectra
-    )
+    content = calibration_content(found, [*read, *spectrum_notes], posterior, spectra)
     cell_file, data, text, page = calibration_files(out)
     write_whole(cell_file, json.dumps(found.cell.to_bpx(), indent=1, allow_nan=False) + "\n")
     write_whole(data, json.dumps(content, indent=1, allow_nan=False) + "\n")
@@ -270,7 +283,7 @@ def calibration_content(
 ) -> dict[str, Any]:
     """The report: errors by file, parameters with intervals, what stays open.
 
-    read : notes before those of the fit: what it leaves out of the file, and what a reader dropped, mapped or averaged.
+    read : notes before those of the fit: what a reader dropped, mapped or averaged.
     """
     sampled_notes = () if posterior is None else (posterior.sentence,)
     told = (note for note in (*read, *found.notes, *sampled_notes) if note != found.size_assumed)

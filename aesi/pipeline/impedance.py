@@ -77,7 +77,7 @@ def impedance_file(
                 *other_model_sentences(declared, model),
                 *soh_sentences(given, soh),
                 *cold,
-                *_missing_effect_sentences(active, declared.held),
+                *_missing_effect_sentences([one for one in active if not one.vanishes], declared.held),
             ]
         )
         say_notes(_repeated_sentences(hz, soc, temperature_degc))

@@ -202,6 +202,44 @@ def fitted_record_sentences(
     return tuple(said)
 
 
+def seen_names(declared: HybridModel, judging: Iterable[Measurement]) -> tuple[str, ...]:
+    """Names of the records, of those that judge, that the declared model was fitted to: by their content where it is
+    a saved model, by their names where it is the file of a cell."""
+    digests = {digest for _, digest in declared.fitted_to}
+    of_file = dict(declared.cell.capacity_shares)
+    return tuple(one.name for one in judging if one.file_digest in digests or one.name in of_file)
+
+
+def seen_sentences(declared: HybridModel, judging: Iterable[Measurement]) -> tuple[str, ...]:
+    """Sentences on the records, of those that judge, that the declared model was fitted to."""
+    said: list[str] = []
+    for record in judging:
+        said += saved_model_sentences(declared, record)
+        if record.name in dict(declared.cell.capacity_shares):
+            said.append(
+                f"{record.name}: the cell's file was fitted to a record of this name, so that no model has it held "
+                "out; the error of a record that the file was not fitted to says more."
+            )
+    return tuple(said)
+
+
+def saved_model_sentences(model: HybridModel, record: Measurement) -> tuple[str, ...]:
+    """A sentence where a saved model was fitted to a record that may judge it, or to one of its name."""
+    if not np.any(np.isfinite(record.voltage_v)):
+        return ()
+    if record.file_digest in {digest for _, digest in model.fitted_to}:
+        return (
+            f"{record.name}: the saved model was fitted to this very record, or to a part of it: its error there is "
+            "not that of a held-out record.",
+        )
+    if record.name in dict(model.fitted_to):
+        return (
+            f"{record.name}: the saved model was fitted to a record of this name with other rows; if both are of one "
+            "test, its error there is not that of a held-out record.",
+        )
+    return ()
+
+
 def dry_collector_sentences(name: str, run: Run | Prediction, model: ModelName) -> tuple[str, ...]:
     """A sentence where a single particle model depleted the salt at a collector, with the time; empty for others."""
     salt_mol_m3 = run.collector_mol_m3

@@ -30,6 +30,7 @@ from aesi.pipeline.notes import (
     dry_collector_sentences,
     fitted_record_sentences,
     other_model_sentences,
+    saved_model_sentences,
     soh_sentences,
     temperature_range_sentences,
     temperature_sentence,
@@ -246,6 +247,7 @@ def _profiled_model(
     say(
         [
             *model.cell.unread,
+            *saved_model_sentences(model, record),
             *fitted_record_sentences(model.cell, record, asked.soh, model.effects),
             start.sentence,
             hold_sentence(record.name, hold, asked.hold is not None, why=saved),

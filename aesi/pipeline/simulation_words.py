@@ -7,7 +7,7 @@ import numpy as np
 from aesi.constants import MV_PER_V
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, BoolArray
-from aesi.over_time import stamp
+from aesi.over_time import range_words, stamp
 from aesi.physics import Cell
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.rest.open_circuit import GIVEN_SD
@@ -28,9 +28,11 @@ TOLD_SD = 0.01
 
 def effect_sentences(record: Measurement, model: HybridModel) -> list[str]:
     """A sentence on the effects that act, or that the cell holds, with their values, which may be defaults; of those
-    that were fitted beside what was found the names alone. Of one name several may act: each is told."""
+    that were fitted beside what was found the names alone. Of one name several may act: each is told. So are those
+    that change nothing at their values, unless they were fitted beside what was found."""
     measured = record.temperature_degc is not None
-    acting = [repr(one) for one in model.effects if not (measured and one.effect.infers == "temperature")]
+    given = [one for one in model.effects if not (measured and one.effect.infers == "temperature")]
+    acting = [repr(one) for one in given if not one.vanishes]
     held = [words for words in model.held if not (measured and id_in(words) in INFERRING)]
     told, inside = ([words for words in each if not model.was_beside(words)] for each in (acting, held))
     beside = dict.fromkeys(id_in(words) for words in (*acting, *held) if model.was_beside(words))
@@ -38,6 +40,8 @@ def effect_sentences(record: Measurement, model: HybridModel) -> list[str]:
     said += [f"the saved model includes {', '.join(inside)}"] if inside else []
     which = "and other" if said else "the saved model includes"
     said += [f"{which} parameters that were fitted together: {', '.join(beside)}"] if beside else []
+    idle = [repr(one) for one in given if one.vanishes and not model.was_beside(repr(one))]
+    said += [f"without effect, since of no size: {', '.join(idle)}"] if idle else []
     return [f"{record.name}: {'; '.join(said)}."] if said else []
 
 
@@ -132,7 +136,7 @@ def changed_cell_sentences(record: Measurement, model: HybridModel, soc0: float,
 
 
 def _range_v(voltage_v: Array) -> str:
-    return f"{np.min(voltage_v):.3f} to {np.max(voltage_v):.3f} V"
+    return f"{range_words(f'{np.min(voltage_v):.3f}', f'{np.max(voltage_v):.3f}')} V"
 
 
 def first_error_sentences(

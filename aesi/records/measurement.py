@@ -12,7 +12,7 @@ import numpy as np
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import DataError
 from aesi.numerics.typing import AnyArray, Array, ComplexArray, Numbers
-from aesi.over_time import extent, over_time
+from aesi.over_time import extent, over_time, range_words
 from aesi.records.checked import check_row, check_times, complex_numbers, numbers, row_words
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def at_its_temperature(temperature_degc: Array) -> str:
     low, high = float(np.min(temperature_degc)), float(np.max(temperature_degc))
     if not measured_on_case(temperature_degc):
         return f"at {low:.4g} degC in every row, as its column states"
-    return f"at its measured temperature, {low:.1f} to {high:.1f} degC"
+    return f"at its measured temperature, {range_words(f'{low:.1f}', f'{high:.1f}')} degC"
 
 
 def digest(*arrays: Array | None) -> str:
@@ -210,6 +210,12 @@ class Measurement:
         again."""
         return self.examined_digest == self.digest
 
+    @property
+    def file_digest(self) -> str:
+        """Content hash of the rows as they were read, also of a record that was thinned or cut since; of the rows
+        themselves where no reader examined them."""
+        return self.examined_digest or self.digest
+
     def held(self, hold: Hold | None) -> Measurement:
         """The record with this hold as the declared one; None declares none."""
         return replace(self, hold=hold)
@@ -286,8 +292,8 @@ class Spectrum:
         return digest(self.frequency_hz, self.z_ohm.real, self.z_ohm.imag)
 
     def __repr__(self) -> str:
-        low, high = float(self.frequency_hz.min()), float(self.frequency_hz.max())
-        return f"Spectrum({self.name!r}, {len(self.frequency_hz)} points, {low:.3g} to {high:.3g} Hz)"
+        across = range_words(f"{self.frequency_hz.min():.3g}", f"{self.frequency_hz.max():.3g}")
+        return f"Spectrum({self.name!r}, {len(self.frequency_hz)} points, {across} Hz)"
 
     def to_frame(self) -> pd.DataFrame:
         """Frequency and impedance as a table, one row a point."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aesi.numerics.typing import Array
-from aesi.over_time import extent, over_time
+from aesi.over_time import extent, over_time, range_words
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,8 +36,8 @@ class Run:
         return len(self.time_s)
 
     def __repr__(self) -> str:
-        low, high = float(self.voltage_v.min()), float(self.voltage_v.max())
-        return f"Run({extent(self.time_s)}, {low:.3f} to {high:.3f} V, states {', '.join(self.series)})"
+        across = range_words(f"{self.voltage_v.min():.3f}", f"{self.voltage_v.max():.3f}")
+        return f"Run({extent(self.time_s)}, {across} V, states {', '.join(self.series)})"
 
     def to_frame(self) -> pd.DataFrame:
         """Time, current, voltage and states as a table, one row per sample."""

@@ -12,7 +12,7 @@ from typing import Any, get_type_hints
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from aesi.bench import BENCHMARKS as OF_THE_PACKAGE
-from aesi.errors import InputError, wanted
+from aesi.errors import InputError, did_you_mean, wanted
 from aesi.numerics.files.whole import check_writable
 from flows.benchmarks.page import check_marks
 
@@ -57,8 +57,11 @@ def run(name: str, **options: Any) -> Iterator[dict[str, Any]]:
     known.pop("return")
     for option, value in options.items():
         if option not in known:
+            near = did_you_mean(option, known).removesuffix(".")
             there = ", ".join(known) or "none"
-            raise InputError(f"--set {option}: `aesi bench {name}` has no such option; it has: {there}.")
+            raise InputError(
+                f"--set {option}: `aesi bench {name}` has no such option{near}{' I' if near else '; i'}t has: {there}."
+            )
         try:
             options[option] = TypeAdapter(known[option], config=AS_WRITTEN).validate_python(value)
         except ValidationError as error:

@@ -76,7 +76,7 @@ class SplitRun:
 
 def run(
     experiments: str = "experiments",
-    cells: Sequence[str] = tuple(EXPERIMENTS),
+    of_cells: Sequence[str] = tuple(EXPERIMENTS),
     whole: bool = False,
     a_cell: PositiveInt | None = None,
     only: str | None = None,
@@ -96,7 +96,7 @@ def run(
 
     experiments : folder of the experiment files.  whole : every split, three seeds, candidates, resamples and step as
     the files have them; otherwise five splits of a cell, one seed, few candidates and rows of 1 s.
-    cells, a_cell, only, development : which splits.  models : which rows of Table 1.  overrides : KEY=VALUE that
+    of_cells, a_cell, only, development : which splits.  models : which rows of Table 1.  overrides : KEY=VALUE that
     replace keys of all experiment files.
     workers, address : processes here, or a Dask scheduler.  write : a page whose part between the two marks becomes
     the table.  keep : a folder for what each split gave; one that is in it is not run again by the same program, as it
@@ -114,7 +114,7 @@ def run(
             experiments,
             merged_overrides(_split_overrides(split, seed, settings, models), overrides),
         )
-        for split in chosen_splits(cells, settings.get("a_cell"), only, development)
+        for split in chosen_splits(of_cells, settings.get("a_cell"), only, development)
         for seed in range(int(settings["seeds"]))
     ]
     if write is not None:

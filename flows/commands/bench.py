@@ -27,7 +27,7 @@ def bench(
         list[str] | None,
         options.key_value(
             "Option of the benchmark as KEY=VALUE, the value in JSON; may be repeated. Examples: seed=1, "
-            "'cells=[\"nmc\"]'. An unknown key lists those of the benchmark."
+            "'of_cells=[\"nmc\"]'. An unknown key lists those of the benchmark."
         ),
     ] = None,
     compare: Annotated[

@@ -270,6 +270,7 @@ def impedance(
 ) -> None:
     """Compute the impedance of the physics model at rest."""
     outputs.check_table(out, [cell, Path(frequencies), *(effect_file or [])])
+    from aesi.over_time import range_words
     from aesi.pipeline.impedance import impedance_file
 
     z = impedance_file(
@@ -284,7 +285,8 @@ def impedance(
         record_options.say_notes,
     )
     size = MILLI * abs(z)
-    typer.echo(f"{out}: {len(z):,} frequencies, |Z| {size.min():.4g} to {size.max():.4g} mOhm", err=True)
+    across = range_words(f"{size.min():.4g}", f"{size.max():.4g}")
+    typer.echo(f"{out}: {len(z):,} frequencies, |Z| {across} mOhm", err=True)
 
 
 @record_options.reads_files

@@ -145,6 +145,7 @@ def save(rebuilt: Rebuilt, out: Path) -> Path:
         held=rebuilt.declared.held,
         beside=rebuilt.declared.beside,
         soh=rebuilt.declared.soh,
+        fitted_to=rebuilt.declared.fitted_to,
     )
     model.save(out / MODEL)
     content = {

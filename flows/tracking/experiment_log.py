@@ -77,6 +77,7 @@ def track_start(tracker: Tracker, config: ExperimentConfig, loaded: Loaded, fold
         held=() if config.cell.start == "recalibrated" else loaded.held,
         beside=loaded.beside,
         soh=loaded.soh,
+        fitted_to=loaded.fitted_to,
     ).save(folder / INPUTS / DECLARED)
     tracker.files(folder / INPUTS, INPUTS)
     tracker.datasets(

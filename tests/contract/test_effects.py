@@ -161,6 +161,15 @@ def test_it_vanishes_at_its_neutral_values(effect, model):
         pytest.skip("has no point at which it vanishes")
     moved = run(effect.activate_only(), model=model).voltage_v - BASES[model].voltage_v
     assert np.abs(moved).max() < NEUTRAL_V
+    assert effect.activate_only().vanishes
+
+
+@each
+def test_what_has_a_size_does_not_vanish(effect):
+    assert not effect.activate().vanishes
+    for name, parameter in effect.parameters.items():
+        if parameter.neutral not in (None, parameter.default):
+            assert not effect.activate_only(**{name: parameter.default}).vanishes
 
 
 @each

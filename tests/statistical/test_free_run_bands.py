@@ -20,7 +20,7 @@ their range."""
 @pytest.fixture(scope="module")
 def lines(request):
     cell = request.config.rootpath / "experiments" / "cells" / "nmc_30ah.bpx.json"
-    return list(run(cell=str(cell), cells=CELLS, seed=5))
+    return list(run(cell=str(cell), virtual=CELLS, seed=5))
 
 
 def figures(lines, method, key):

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import aesi
+from aesi.data.convert import record_lines
 from aesi.errors import DataError, InputError
-from aesi.records import Measurement, Spectrum
+from aesi.records import Measurement, Run, Spectrum, at_its_temperature
 from aesi.records.checked import checked_dt
 
 BPX = Path(__file__).resolve().parents[2] / "experiments" / "cells" / "nmc_30ah.bpx.json"
@@ -25,6 +26,18 @@ def test_the_charge_of_a_pulse_between_far_rows_depends_on_how_the_current_runs(
         "in straight lines, where all else took it as a logger's"
     )
     assert straight[-1] == pytest.approx(record.held("linear").charge_ah)
+
+
+def test_a_range_was_told_by_two_figures_that_read_the_same():
+    assert at_its_temperature(np.array([25.01, 25.02])) == "at its measured temperature, 25.0 degC"
+    assert at_its_temperature(np.array([25.0, 26.0])) == "at its measured temperature, 25.0 to 26.0 degC"
+    still = np.array([3.7, 3.7001])
+    assert ", 3.700 V, " in repr(Run(np.arange(2.0), np.zeros(2), still, {}))
+    assert repr(Spectrum("z", [1.0], [1e-3])).endswith("1 points, 1 Hz)")
+    record = Measurement(np.arange(2.0), [1.0, 1.0], still, np.array([25.0, 25.001]))
+    described = " ".join(record_lines(record, of_cell=True))
+    assert "1 A, positive" in described
+    assert "Temperature 25 degC" in described
 
 
 @pytest.mark.parametrize(

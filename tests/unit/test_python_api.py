@@ -16,7 +16,6 @@ from aesi.data.read import examined
 from aesi.data.spectra import read_spectra
 from aesi.errors import AesiError, CellError, DataError, InputError
 from aesi.physics.effects import CATALOGUE
-from aesi.pipeline import api
 from aesi.records import Spectrum
 
 CELL = Path(__file__).resolve().parents[2] / "experiments" / "cells" / "nmc_30ah.bpx.json"
@@ -330,6 +329,11 @@ def test_a_calibration_says_what_cannot_be_meant_before_it_fits(cell, record, ch
         aesi.calibrate(cell, record, **changes)
 
 
+def test_a_prior_of_no_parameter_was_told_by_python_once_the_records_were_read(cell, tmp_path):
+    with pytest.raises(InputError, match="no_such_factor"):
+        aesi.calibrate(cell, tmp_path / "missing.csv", priors={"no_such_factor": (1.0, 0.1)})
+
+
 @pytest.mark.parametrize("source", [[], 3, None])
 def test_what_is_no_file_of_a_cell_is_told(source):
     with pytest.raises(CellError, match="is no cell; give the path of a BPX file, or its content as a dict"):
@@ -444,11 +448,11 @@ def test_spectra_were_fitted_by_the_command_line_alone(cell, record, tmp_path, m
     (read,) = read_spectra(tmp_path / "eis.csv")
     asked = []
 
-    def fitted(cell, records, conditions, *, starts, seed):
+    def fitted(cell, records, conditions, **_):
         asked.append(conditions)
         return Answer()
 
-    monkeypatch.setattr(api, "fit_cell", fitted)
+    monkeypatch.setattr("aesi.pipeline.calibrate.calibrate", fitted)
     for given in (tmp_path / "eis.csv", str(tmp_path / "eis.csv"), read, [read]):
         aesi.calibrate(cell, record, spectra=given)
     assert [[one.digest for one in each.spectra] for each in asked] == 4 * [[read.digest]]
@@ -493,7 +497,7 @@ def test_a_type_checker_lets_through_what_the_functions_take():
 def test_the_effects_of_a_saved_model_were_left_out_of_its_calibration_without_a_word(
     cell, record, monkeypatch
 ):
-    monkeypatch.setattr("aesi.pipeline.api.fit_cell", partial(fit_cell, evaluations=1))
+    monkeypatch.setattr("aesi.pipeline.calibrate.calibrate", partial(fit_cell, evaluations=1))
     model = aesi.HybridModel(cell, (CATALOGUE["ocv_hysteresis"].activate(),))
     assert (
         aesi.calibrate(model, record)
@@ -504,7 +508,7 @@ def test_the_effects_of_a_saved_model_were_left_out_of_its_calibration_without_a
 
 
 def test_files_of_one_name_in_two_folders_had_one_name_in_python(cell, record, monkeypatch, tmp_path):
-    monkeypatch.setattr("aesi.pipeline.api.fit_cell", partial(fit_cell, evaluations=1))
+    monkeypatch.setattr("aesi.pipeline.calibrate.calibrate", partial(fit_cell, evaluations=1))
     files = [tmp_path / folder / "drive.csv" for folder in ("cold", "warm")]
     for file, shift in zip(files, (0.0, 1e-3), strict=True):
         file.parent.mkdir()
@@ -514,7 +518,7 @@ def test_files_of_one_name_in_two_folders_had_one_name_in_python(cell, record, m
 
 def test_a_file_from_one_of_another_body_kept_that_body(cell, record, monkeypatch):
     """Volume, surface and density of the start file, since a fit moves their products alone."""
-    monkeypatch.setattr("aesi.pipeline.api.fit_cell", partial(fit_cell, evaluations=1))
+    monkeypatch.setattr("aesi.pipeline.calibrate.calibrate", partial(fit_cell, evaluations=1))
     made = aesi.calibrate(cell, record, body_mm=(200.0, 150.0, 9.0), mass_g=600.0)
     found = made.cell
     assert (found.volume_m3, found.surface_area_m2) == pytest.approx((270e-6, 663e-4))
@@ -529,7 +533,7 @@ def test_a_file_from_one_of_another_body_kept_that_body(cell, record, monkeypatc
 
 
 def test_a_cell_with_other_cut_offs_needed_a_start_file_of_its_own(cell, record, monkeypatch):
-    monkeypatch.setattr("aesi.pipeline.api.fit_cell", partial(fit_cell, evaluations=1))
+    monkeypatch.setattr("aesi.pipeline.calibrate.calibrate", partial(fit_cell, evaluations=1))
     found = aesi.calibrate(cell, record, cut_offs_v=(2.6, 4.15)).cell
     assert (found.lower_voltage_v, found.upper_voltage_v) == (2.6, 4.15)
     assert aesi.calibrate(cell, record).cell.upper_voltage_v == cell.upper_voltage_v

@@ -61,7 +61,7 @@ USEFUL_PCT = 45.0
 
 def run(
     cell: str = "experiments/cells/nmc_30ah.bpx.json",
-    cells: PositiveInt = 4,
+    virtual: PositiveInt = 4,
     candidates: PositiveInt = 40,
     settings: AtLeastOne[str] = tuple(SETTINGS),
     seed: NonNegativeInt = 0,
@@ -69,12 +69,12 @@ def run(
 ) -> Iterator[dict[str, Any]]:
     """One row per setting: the reduction of the mean squared error in free run on the test cycles, over all cells.
 
-    cell : BPX file of the declared cell.  cells : number of virtual cells.  candidates : genomes that each search
+    cell : BPX file of the declared cell.  virtual : number of virtual cells.  candidates : genomes that each search
     evaluates.  settings : names in SETTINGS.  seed : of the virtual cells.  sindy : whether SINDy-C is included.
     Raises InputError for an unknown setting.
     """
     check_listed("settings", settings, SETTINGS)
-    splits = list(virtual_splits(Cell.from_bpx(Path(cell)), "repeats", cells, seed))
+    splits = list(virtual_splits(Cell.from_bpx(Path(cell)), "repeats", virtual, seed))
     for name in settings:
         options = replace(BASE, **SETTINGS[name])
         started = process_time()
@@ -82,7 +82,7 @@ def run(
             _reductions(split, replace(options, seed=k), candidates, sindy) for k, split in enumerate(splits)
         ]
         spent = process_time() - started
-        line = {"setting": name, "cells": cells, "candidates": candidates, "cpu_s": round(spent, 1)}
+        line = {"setting": name, "cells": virtual, "candidates": candidates, "cpu_s": round(spent, 1)}
         yield line | _summary(reductions)
 
 

@@ -118,13 +118,13 @@ DESIGNS: dict[str, Callable[[_Errors], HalfWidths]] = {
 
 def run(
     cell: str = "experiments/cells/nmc_30ah.bpx.json",
-    cells: PositiveInt = 40,
+    virtual: PositiveInt = 40,
     layouts: AtLeastOne[SplitLayout] = LAYOUTS,
     seed: NonNegativeInt = 0,
 ) -> Iterator[dict[str, Any]]:
     """One row per layout, horizon and design.
 
-    cell : BPX file of the declared cell.  cells : virtual cells of each layout.  layouts : see `SplitLayout`.
+    cell : BPX file of the declared cell.  virtual : virtual cells of each layout.  layouts : see `SplitLayout`.
     seed : of the virtual cells.  Widths and scores are in mV; `horizon_s` is null for the whole drive.
     """
     from threadpoolctl import threadpool_limits
@@ -132,7 +132,7 @@ def run(
     with threadpool_limits(1):
         everywhere: dict[tuple[str, float], list[Array]] = {}
         for layout in layouts:
-            splits = virtual_splits(Cell.from_bpx(cell), layout, cells, seed)
+            splits = virtual_splits(Cell.from_bpx(cell), layout, virtual, seed)
             errors = [e for e in (_errors(split, cuts_of(layout)) for split in splits) if e is not None]
             for name, design in DESIGNS.items():
                 started = process_time()

@@ -31,8 +31,9 @@ write the end of a step and the start of the next with one stamp: at most 0.4 % 
 CLOCK_JUMPS_S = (SECONDS_PER_HOUR, 24 * SECONDS_PER_HOUR)
 """Steps by which a time of day runs back: at the end of daylight saving time, and at midnight."""
 FEW_TURNS = 0.05
-"""Largest share of intervals that run back in a file of ordered pieces written one after the other. Where the rows
-themselves are unordered it is about half of them. A convention: pieces of twenty rows and more."""
+"""Largest share of intervals that run back, or at which rows in the order of their time were apart in the file, in a
+file of ordered pieces. Where the rows themselves are unordered it is about half of them. A convention: pieces of twenty
+rows and more."""
 MOST_RELAXED_V = 0.5
 """No cell's voltage changes by more than this without a current: relaxation after a load is about 0.3 V at most."""
 
@@ -161,6 +162,11 @@ def _disorder_clause(time_s: Array, step: Array) -> str:
         )
     if len(first) == 1 and step[-1] < 0:
         return "; it is the last row alone, as a line of sums or means below a table is: remove it."
+    if _fits_when_sorted(time_s):
+        return (
+            ": blocks of rows are out of order, since by their time all rows follow one another as elsewhere in the "
+            "file; sort the rows by it."
+        )
     if len(first) == 1:
         again = ", and starts again there, as that of a second test does"
         return (
@@ -179,6 +185,19 @@ def _disorder_clause(time_s: Array, step: Array) -> str:
             "whole test, or put them one after the other, or split the file into its tests."
         )
     return f", and {len(first)} times in all: sort the rows by their time, or split the file into its tests."
+
+
+def _fits_when_sorted(time_s: Array) -> bool:
+    """Whether the rows (n,) s are blocks of one test in another order: put in order, they are no closer and no further
+    apart where two blocks meet than within one. Tests with clocks of their own leave a gap, or mix row by row."""
+    order = np.argsort(time_s, kind="stable")
+    interval = np.diff(time_s[order])
+    meets = np.diff(order) != 1
+    if meets.all() or np.sum(meets) > FEW_TURNS * len(meets):
+        return False
+    within, round_off = interval[~meets], 2.0 * np.spacing(np.max(np.abs(time_s)))
+    least, most = np.min(within) - round_off, np.max(within) + round_off
+    return bool(np.all((interval[meets] >= least) & (interval[meets] <= most)))
 
 
 def check_ranges(columns: Columns, context: Context) -> None:

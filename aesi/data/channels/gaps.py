@@ -14,6 +14,7 @@ from aesi.data.channels.checks import Columns, Context
 from aesi.data.channels.load_columns import keep_rows
 from aesi.errors import DataError
 from aesi.numerics.typing import AnyArray, Array
+from aesi.over_time import range_words
 from aesi.records.measurement import Hold, assumed_hold
 
 GAP_FLOOR_S = 5.0
@@ -86,9 +87,9 @@ def _stretch_notes(stretches: Sequence[tuple[float, float]], words: str) -> list
     if len(stretches) <= FEW_STRETCHES:
         return [f"No rows for {length:.6g} s from {start:.10g} s on; {words}." for start, length in stretches]
     lengths = [length for _, length in stretches]
+    seconds = range_words(f"{min(lengths):.3g}", f"{max(lengths):.3g}")
     return [
-        f"No rows for {min(lengths):.3g} to {max(lengths):.3g} s at {len(stretches)} places, the first at "
-        f"{stretches[0][0]:.10g} s; {words}."
+        f"No rows for {seconds} s at {len(stretches)} places, the first at {stretches[0][0]:.10g} s; {words}."
     ]
 
 

@@ -17,6 +17,7 @@ from aesi.data.reading import Duplicates, Reading, bounds
 from aesi.data.state import directions, has_both_directions, with_directions
 from aesi.errors import DataError
 from aesi.numerics.typing import AnyArray, Array
+from aesi.over_time import range_words
 
 ZERO_SHARE = 0.01
 """Share of the largest current up to which a negative current is the offset of a cycler, not a direction."""
@@ -167,9 +168,13 @@ def _with_number(
     keep = np.flatnonzero((numbers >= low) & (numbers <= high))
     if len(keep) < 2:
         there = numbers[~np.isnan(numbers)]
-        runs = f"runs from {there.min():g} to {there.max():g}" if len(there) else "is empty in every row"
+        held = (
+            f"holds {range_words(f'{there.min():g}', f'{there.max():g}')}"
+            if len(there)
+            else "is empty in every row"
+        )
         raise DataError(
-            f"{context.file}: {len(keep)} rows are of {name} {text}; column {context.header[name]!r} {runs}."
+            f"{context.file}: {len(keep)} rows are of {name} {text}; column {context.header[name]!r} {held}."
         )
     notes.append(f"{name} {text}: {len(keep):,} of {len(numbers):,} rows were taken as asked.")
     holes = np.flatnonzero(np.diff(keep) > 1)

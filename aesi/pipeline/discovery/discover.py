@@ -20,7 +20,14 @@ from aesi.physics.cell import Soh
 from aesi.physics.effects import CATALOGUE, Effect, known_effects, selected
 from aesi.physics.folded import folded
 from aesi.physics.simulation import ModelName
-from aesi.pipeline.notes import soh_sentences, temperature_range_sentences, temperature_sentence, together
+from aesi.pipeline.notes import (
+    seen_names,
+    seen_sentences,
+    soh_sentences,
+    temperature_range_sentences,
+    temperature_sentence,
+    together,
+)
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.report.views import DiscoveryTrace, DiscoveryView, EffectView
@@ -114,9 +121,20 @@ class Case:
         }
         return tuple(sentence for sentence, holds in said.items() if holds)
 
+    @property
+    def judging(self) -> tuple[Measurement, ...]:
+        """The records with rows that choose nothing; those that are looked at where their end is kept back."""
+        return self.tests or (self.measurements if self.kept_back else ())
+
+    @property
+    def seen(self) -> tuple[str, ...]:
+        """Names of the records that judge, and that the declared model was fitted to."""
+        return seen_names(declared_model(self.cell), self.judging)
+
     @cached_property
     def assumed(self) -> tuple[str, ...]:
-        """Sentences on the temperature of records that hold none, and on what of the declared cell is left out."""
+        """Sentences on the temperature of records that hold none, on what of the declared cell is left out, and on
+        records that judge a model which was fitted to them."""
         given = self.declared()
         untold = (m for m in self.records if m.temperature_degc is None)
         without = "the saved model's learnt correction is left out: what is sought is what its physics lacks."
@@ -126,6 +144,7 @@ class Case:
             *given.cell.unread,
             *filter(None, [sizes_sentence(given.cell, self.records, given.cell.capacity_ah)]),
             *soh_sentences(declared_model(self.cell), self.soh),
+            *seen_sentences(given, self.judging),
             *temperature_range_sentences(
                 given.cell, (m.temperature_degc for m in self.records), given.effects
             ),
@@ -178,12 +197,17 @@ def write_discovery(out: Path, case: Case, found: Discovery, mlflow_run_id: str 
     """Write discovery.json, report.html and model/ to `out`; returns the content of discovery.json."""
     from aesi.pipeline.report.write import write_discovery_report
 
-    content = discovery_content(found, case.notes)
+    content = discovery_content(found, case.notes, case.seen)
     write_whole(out / FINDING, json.dumps(content, indent=1, allow_nan=False) + "\n")
-    found_model(found, case.declared()).save(out / MODEL)
+    case_model(case, found).save(out / MODEL)
     title = ", ".join(m.name for m in case.measurements)
     write_discovery_report(out / REPORT, discovery_view(found, content, title, mlflow_run_id))
     return content
+
+
+def case_model(case: Case, found: Discovery) -> HybridModel:
+    """The model that a discovery writes: `found_model`, with the records that it was fitted to."""
+    return found_model(found, case.declared()).with_fitted((*case.measurements, *case.good))
 
 
 def found_model(found: Discovery, given: HybridModel | None = None) -> HybridModel:
@@ -210,12 +234,18 @@ def found_model(found: Discovery, given: HybridModel | None = None) -> HybridMod
         beside=(*said.beside, *(repr(one) for one in fitted if one.id not in found.written)),
         finding=" ".join(map(capitalised, found.warnings)),
         soh=said.soh,
+        fitted_to=said.fitted_to,
     )
 
 
-def discovery_content(found: Discovery, asked: Sequence[str] = ()) -> dict[str, Any]:
-    """The content of discovery.json.  asked : sentences on effects not tried, options not used and changes by a
-    reader."""
+def discovery_content(
+    found: Discovery, asked: Sequence[str] = (), seen: Sequence[str] = ()
+) -> dict[str, Any]:
+    """The content of discovery.json.
+
+    asked : sentences on effects not tried, options not used and changes by a reader.  seen : names of the records of
+    the test part that the declared model was fitted to.
+    """
     verdict, explained_v = found.verdict, found.after.yardstick.explained_v
     return {
         "schema": SCHEMA,
@@ -248,6 +278,7 @@ def discovery_content(found: Discovery, asked: Sequence[str] = ()) -> dict[str, 
         "contradicted": found.contradicted,
         "other_temperature": list(found.other_temperature),
         "good": list(found.good),
+        "seen": list(seen),
         "warnings": list(found.warnings),
         "seconds": round(found.seconds, 2),
         "simulations": found.simulations,

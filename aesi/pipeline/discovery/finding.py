@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 from aesi.errors import InputError
 from aesi.pipeline.discovery.discover import (
     Case,
+    case_model,
     discovery_content,
     discovery_view,
-    found_model,
     write_discovery,
 )
 from aesi.pipeline.product.hybrid import HybridModel
+from aesi.pipeline.report.words.discoveries import part_words
 from aesi.tracer import Discovery
 from aesi.tracer.report.outcome import Part, State
 
@@ -36,7 +37,7 @@ class Finding:
     def __repr__(self) -> str:
         kept_back = bool(self.content["before"]["test"])
         part: Part = "test" if kept_back else "fit"
-        where = "on held-out data" if kept_back else "on the fitted data"
+        where = part_words(part, self.content)
         named = f" {', '.join(self.effects)}" if self.effects else ""
         errors = (
             f"{self.rmse_mv('before', part):.2f} mV as declared, {self.rmse_mv('after', part):.2f} mV after"
@@ -89,12 +90,12 @@ class Finding:
     @cached_property
     def content(self) -> dict[str, Any]:
         """The content of discovery.json."""
-        return discovery_content(self.found, self.case.notes)
+        return discovery_content(self.found, self.case.notes, self.case.seen)
 
     @cached_property
     def model(self) -> HybridModel:
         """The written model, with the effects that were found, for `predict` and `save`."""
-        return found_model(self.found, self.case.declared())
+        return case_model(self.case, self.found)
 
     def to_frame(self) -> pd.DataFrame:
         """The candidates, best first: one row per parameter, with its 90 % interval."""

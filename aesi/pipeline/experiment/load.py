@@ -42,6 +42,8 @@ from aesi.pipeline.experiment.sources import (
 )
 from aesi.pipeline.notes import (
     contradiction_sentences,
+    seen_names,
+    seen_sentences,
     soh_sentences,
     temperature_range_sentences,
     temperature_sentence,
@@ -75,6 +77,8 @@ class Loaded:
     config : the experiment as it is run; with the data and cell of the fallback if `fallback` is not empty.
     fallback : why the fallback is used, one sentence.  model : kind of the physics.  files : hash of the files that
     declare the cell.  held, beside, soh : of the declared model, see `HybridModel`.
+    fitted_to : (name, digest) of the records that train or validate, and of those that the declared model was fitted
+    to.  seen : names of the test records that the declared model was fitted to.
     """
 
     cell: Cell
@@ -93,6 +97,8 @@ class Loaded:
     held: tuple[str, ...] = ()
     beside: tuple[str, ...] = ()
     soh: float = 1.0
+    fitted_to: tuple[tuple[str, str], ...] = ()
+    seen: tuple[str, ...] = ()
 
     @property
     def setting(self) -> str:
@@ -183,6 +189,8 @@ def _load(config: ExperimentConfig) -> Loaded:
         held=given.held,
         beside=given.beside,
         soh=given.soh,
+        fitted_to=given.with_fitted(_fitted(sources)).fitted_to,
+        seen=seen_names(declared, _judging(sources)),
     )
 
 
@@ -202,22 +210,25 @@ def _training(
 
 
 def _declared_sentences(declared: HybridModel, sources: Sources) -> list[str]:
-    """Sentences on a correction of the saved model that is declared, and on test records that the cell's file was
-    fitted to. `data.record` has test rows as well."""
+    """Sentences on a correction of the saved model that is declared, and on test records that it, or the cell's file,
+    was fitted to."""
     said = []
     if declared.correction is not None:
         said.append(
             "the saved model's learnt correction is left out: what is declared is its cell with its effects."
         )
-    judged = sources.roles["test"] or tuple(sources.records)
-    fitted = {name for name, _ in declared.cell.capacity_shares}
-    names = [record.name for record, _ in (sources.records[name] for name in judged)]
-    return said + [
-        f"{name}: the cell's file was fitted to a record of this name, so that no model of this run has it held out; "
-        "the error of a record that the file was not fitted to says more."
-        for name in names
-        if name in fitted
-    ]
+    return [*said, *seen_sentences(declared, _judging(sources))]
+
+
+def _judging(sources: Sources) -> list[Measurement]:
+    """The records with test rows; `data.record` has training rows as well."""
+    return [sources.records[name][0] for name in sources.roles["test"] or sources.records]
+
+
+def _fitted(sources: Sources) -> list[Measurement]:
+    """The records with rows that a model is fitted to, or chosen by."""
+    named = {*sources.roles["train"], *sources.roles["valid"]} or sources.records
+    return [record for name, (record, _) in sources.records.items() if name in named]
 
 
 def _start_sentences(

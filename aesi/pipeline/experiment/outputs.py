@@ -182,6 +182,7 @@ def hybrid(result: Result) -> HybridModel:
         held=result.loaded.held if physics == DECLARED else (),  # a refit moves the values
         beside=result.loaded.beside,
         soh=result.loaded.soh,
+        fitted_to=result.loaded.fitted_to,
     )
 
 
@@ -219,6 +220,7 @@ def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
         physics=shown(DECLARED),
         corrected=shown(result.corrected),
         fallback=result.loaded.fallback,
+        seen=result.loaded.seen,
     )
 
 

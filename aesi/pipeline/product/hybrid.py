@@ -6,7 +6,7 @@ back to its own rows. The files of a saved model: `aesi.pipeline.product.model_f
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -58,6 +58,8 @@ class HybridModel:
     fitted together with the found ones and are no finding themselves, in the same words, or by their ids.
     finding : its errors on test records, in words; '' where they are not known.
     soh : share of the capacity of the file that it was made from, which its cell has.
+    fitted_to : (name, `Measurement.file_digest`) of the records that it was fitted to, in whole or in part, or chosen
+    by; those of the models that it was made from among them.
     """
 
     cell: Cell
@@ -73,6 +75,7 @@ class HybridModel:
     beside: tuple[str, ...] = ()
     finding: str = ""
     soh: float = 1.0
+    fitted_to: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
         """Raises InputError for a wrong cell, effects, step, hold, state of charge or model, and for a correction that
@@ -101,6 +104,11 @@ class HybridModel:
             return self
         cell = self.cell.with_soh(soh)
         return replace(self, cell=cell, soh=self.soh * cell.capacity_ah / self.cell.capacity_ah)
+
+    def with_fitted(self, records: Iterable[Measurement]) -> Self:
+        """A copy that was fitted to these records as well."""
+        added = ((record.name, record.file_digest) for record in records)
+        return replace(self, fitted_to=tuple(dict.fromkeys((*self.fitted_to, *added))))
 
     def was_beside(self, words: str) -> bool:
         """Whether an effect, in the words of `held`, was fitted together with the found ones and is no finding."""
@@ -220,9 +228,13 @@ class HybridModel:
             part = getattr(self, name)
             if part is not None:
                 parts[name] = part.to_dict()
-        own = {name: getattr(self, name) for name in ("dt_s", "hold", "soc0", "model", "finding", "soh")}
+        own: dict[str, Any] = {
+            name: getattr(self, name) for name in ("dt_s", "hold", "soc0", "model", "finding", "soh")
+        }
         files = {name: code for _, beside in saved for name, code in beside.items()}
-        write_model(folder, own | {"held": list(self.held), "beside": list(self.beside)}, parts, files)
+        own |= {"held": list(self.held), "beside": list(self.beside)}
+        own |= {"fitted_to": [{"name": name, "digest": digest} for name, digest in self.fitted_to]}
+        write_model(folder, own, parts, files)
         return folder
 
     @staticmethod
@@ -254,6 +266,7 @@ class HybridModel:
                 beside=tuple(head.get("beside", ())),
                 finding=head.get("finding", ""),
                 soh=head.get("soh", 1.0),
+                fitted_to=tuple((one["name"], one["digest"]) for one in head.get("fitted_to", ())),
                 **read,
             )
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from aesi.numerics.typing import Array, BoolArray
-from aesi.over_time import over_time
+from aesi.over_time import over_time, range_words
 from aesi.records import ErrorSeries
 
 if TYPE_CHECKING:
@@ -50,8 +50,8 @@ class Prediction:
         outside = (
             f", {100 * self.outside.mean():.0f} % outside the trained range" if self.outside.any() else ""
         )
-        low, high = float(self.voltage_v.min()), float(self.voltage_v.max())
-        return f"Prediction({len(self):,} rows, {low:.3f} to {high:.3f} V, {band}{outside})"
+        across = range_words(f"{self.voltage_v.min():.3f}", f"{self.voltage_v.max():.3f}")
+        return f"Prediction({len(self):,} rows, {across} V, {band}{outside})"
 
     def plot(self) -> Figure:
         """Voltage with its band beside the physics alone, and state of charge, over time: a plotly figure."""

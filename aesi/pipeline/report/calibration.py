@@ -11,6 +11,7 @@ import numpy as np
 
 from aesi.calibration.result import NOTABLY
 from aesi.constants import MV_PER_V
+from aesi.over_time import range_words
 from aesi.pipeline.report import style
 from aesi.pipeline.report.nyquist import nyquist_figures
 from aesi.pipeline.report.page import write_page
@@ -95,7 +96,7 @@ def finding(content: Mapping[str, Any]) -> str:
 
 def _range(values: Sequence[float]) -> str:
     least, most = (f"{each:.1f}" for each in (min(values), max(values)))
-    return least if least == most else f"{least} to {most}"
+    return range_words(least, most)
 
 
 def _fit_figures(traces: Sequence[DiscoveryTrace]) -> dict[str, Figure]:

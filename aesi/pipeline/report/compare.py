@@ -10,6 +10,7 @@ from typing import Any
 
 from aesi.advice import listed
 from aesi.constants import MV_PER_V
+from aesi.over_time import range_words
 from aesi.pipeline.report.page import beside, write_plain_page
 from aesi.pipeline.report.table_formats import ABSENT
 from aesi.sparse.search.genome import GENE_WORDS
@@ -293,7 +294,7 @@ def _figure(run: ComparedRun, name: str) -> ComparedCell:
     ends = known.get(figure)
     if name in COLUMNS and name.endswith("_v"):
         value *= MV_PER_V
-    return ComparedCell(_text(value), value, f"{_text(ends[0])} to {_text(ends[1])}" if ends else "")
+    return ComparedCell(_text(value), value, range_words(*map(_text, ends)) if ends else "")
 
 
 def _verdicts(runs: Sequence[ComparedRun]) -> PageTable | None:
@@ -326,7 +327,7 @@ def _parameters(run: ComparedRun) -> dict[str, ComparedCell]:
         if candidate["effect"] in run.discovery["effects"]:
             for name, given in candidate["parameters"].items():
                 low, high = given.get("low"), given.get("high")
-                ends = f"{_text(low)} to {_text(high)}" if low is not None and high is not None else ""
+                ends = range_words(_text(low), _text(high)) if low is not None and high is not None else ""
                 cells[f"{candidate['effect']}.{name}"] = ComparedCell(
                     f"{_text(given['value'])} {given.get('unit', '')}".strip(), given["value"], ends
                 )
@@ -413,4 +414,7 @@ def _limit(maps: Sequence[Sequence[Sequence[float | None]]]) -> float:
 
 def _range_of(content: Mapping[str, Any]) -> str:
     current, soc = content["current_a"], content["soc"]
-    return f"{current[0]:.3g} to {current[-1]:.3g} A, {100 * soc[0]:.3g} to {100 * soc[-1]:.3g} % of charge"
+    amperes, percent = (
+        range_words(f"{each[0]:.3g}", f"{each[-1]:.3g}") for each in (current, [100 * share for share in soc])
+    )
+    return f"{amperes} A, {percent} % of charge"

@@ -75,6 +75,7 @@ class RunView:
     terms : rows with term and, where known, importance (SVD), bagging, stability, inclusion.
     settings : what the search picked (lambda1, lambda2, tau, ...), as text.
     fallback : why the run is not on the data that were asked for; empty where it is.
+    seen : names of the test records that the declared model was fitted to.
     """
 
     experiment: str
@@ -94,6 +95,7 @@ class RunView:
     physics: str = "ESPM"
     corrected: str = "ESPM"
     fallback: str = ""
+    seen: tuple[str, ...] = ()
 
     def of(self, role: Role) -> tuple[RecordTrace, ...]:
         """The records of one role, in order."""

@@ -5,7 +5,9 @@ import os
 import signal
 import time
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
+from typing import get_type_hints
 
 import pytest
 
@@ -58,8 +60,13 @@ def test_tracking_costs_something_and_leaves_the_workspace_alone(workspace):
         ("ensemble", {"peer_models": 0}, "peer_models=0: it has to be greater than 0"),
         ("real", {"every": 0}, "every=0: it has to be greater than 0"),
         ("blind", {"workers": "many"}, "workers=many: it has to be a valid integer"),
-        ("splits", {"cells": "nmc"}, r"cells=nmc: it has to be a list, in \[ \]"),
+        ("splits", {"of_cells": "nmc"}, r"of_cells=nmc: it has to be a list, in \[ \]"),
         ("left_out", {"seed": 1}, "has no such option"),
+        (
+            "splits",
+            {"cells": ["nmc"]},
+            r"has no such option; did you mean 'of_cells'\? It has: experiments, of_cells, ",
+        ),
         ("spci", {"methods": ["foo"]}, r"methods: there is no 'foo'\. There are: "),
         ("design", {"settings": ["fold 10"]}, "settings: there is no 'fold 10'; did you mean 'fold 100'"),
         (
@@ -87,6 +94,17 @@ def test_tracking_costs_something_and_leaves_the_workspace_alone(workspace):
 def test_an_option_that_a_benchmark_cannot_take_is_refused_before_it_runs(name, options, said):
     with pytest.raises(InputError, match=said):
         next(benchmarks.run(name, **options))
+
+
+def test_the_cells_of_one_benchmark_were_a_folder_and_of_others_a_list_or_a_number():
+    """`--set cells=experiments/cells` was no list in one benchmark, and no number in two."""
+    of_cells = {
+        name: hints["cells"]
+        for name in benchmarks.BENCHMARKS
+        if "cells" in (hints := get_type_hints(import_module(benchmarks.BENCHMARKS[name]).run))
+    }
+    assert len(of_cells) > 3
+    assert set(of_cells.values()) == {str}
 
 
 def test_a_name_that_looks_like_a_number_is_a_name():
@@ -232,7 +250,7 @@ def test_a_case_that_was_lost_with_its_process_is_a_miss(monkeypatch):
     one = left_out.lost(left_out_case)
     assert left_out.summary([one])["failed"] == 1
     assert "memory" in left_out.table([one])[-1]
-    (run,) = asked_splits(monkeypatch, cells=["hg2"], a_cell=1)
+    (run,) = asked_splits(monkeypatch, of_cells=["hg2"], a_cell=1)
     assert split_figures.summary([splits._lost(run)])["failed"] == 1
 
 
@@ -485,7 +503,7 @@ def test_a_split_without_its_data_was_one_of_the_virtual_cell_and_stayed_so(tmp_
     def away(name):
         raise DataAway(f"{name} is not here, and there is no network.")
 
-    (run,) = asked_splits(monkeypatch, cells=[cell], a_cell=1)
+    (run,) = asked_splits(monkeypatch, of_cells=[cell], a_cell=1)
     monkeypatch.setattr("aesi.data.catalogue.get", away)
     keep = tmp_path / "kept"
     row = judged_once(run, splits._row, str(keep), splits._files)
@@ -512,7 +530,7 @@ def test_a_table_of_kept_splits_mixed_settings(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(splits, "tracked", lambda cases, *_: [*map(cases.judge, cases.specs), {}])
     for candidates, cells, seeds in ((60, ["hg2"], 2), (8, ["hg2"], 1), (8, ["nmc"], 1)):
         monkeypatch.setattr(splits, "_row", of(candidates))
-        asked = {"cells": cells, "a_cell": 1, "seeds": seeds, "candidates": candidates}
+        asked = {"of_cells": cells, "a_cell": 1, "seeds": seeds, "candidates": candidates}
         list(benchmarks.run("splits", experiments=folder, keep=keep, write=str(page), **asked))
     assert [line for line in page.read_text().splitlines() if "failed" in line] == [
         "hg2 without 25degC_us06, seed 0 failed: 8 candidates",
@@ -531,9 +549,9 @@ def test_a_table_of_splits_without_one_of_its_models_ended_in_a_traceback_after_
     page = tmp_path / "page.md"
     page.write_text(f"{splits.BEGIN}\n{splits.END}\n")
     with pytest.raises(InputError, match=r"its table has columns of ESPM recalibrated.*add them to models"):
-        asked_splits(monkeypatch, cells=["hg2"], a_cell=1, write=str(page), **asked)
+        asked_splits(monkeypatch, of_cells=["hg2"], a_cell=1, write=str(page), **asked)
     assert asked_splits(
-        monkeypatch, cells=["hg2"], a_cell=1, **asked
+        monkeypatch, of_cells=["hg2"], a_cell=1, **asked
     )  # without a table there is nothing to miss
 
 
@@ -549,7 +567,7 @@ def test_what_a_split_lays_over_its_file_could_not_be_asked_for_otherwise(
     monkeypatch, override, section, key, value
 ):
     """It was refused as overridden twice."""
-    asked = {"cells": ["hg2"], "a_cell": 1}
+    asked = {"of_cells": ["hg2"], "a_cell": 1}
     (plain,) = asked_splits(monkeypatch, **asked)
     (run,) = asked_splits(monkeypatch, **asked, overrides=[override])
     assert getattr(getattr(run.config, section), key) == value

@@ -11,7 +11,7 @@ CELL = Path(__file__).parents[3] / "experiments" / "cells" / "nmc_30ah.bpx.json"
 
 def test_a_line_for_each_setting():
     names = ["fold 200", "fold 1800"]
-    lines = list(run(cell=str(CELL), cells=1, candidates=6, settings=names, sindy=False))
+    lines = list(run(cell=str(CELL), virtual=1, candidates=6, settings=names, sindy=False))
     assert [line["setting"] for line in lines] == names
     assert set(names) <= set(SETTINGS)
     for line in lines:
@@ -24,7 +24,7 @@ def test_a_line_for_each_setting():
 
 def test_a_setting_gives_the_same_figures_again():
     once, again = (
-        next(run(cell=str(CELL), cells=1, candidates=4, settings=["fold 200"], sindy=False)) for _ in "ab"
+        next(run(cell=str(CELL), virtual=1, candidates=4, settings=["fold 200"], sindy=False)) for _ in "ab"
     )
     assert {**once, "cpu_s": 0} == pytest.approx({**again, "cpu_s": 0})
 

@@ -16,7 +16,7 @@ def cell(request):
 
 
 def test_every_horizon_and_design_has_a_line(cell) -> None:
-    lines = list(run(cell=str(cell), cells=1, layouts=["repeats"]))
+    lines = list(run(cell=str(cell), virtual=1, layouts=["repeats"]))
     assert len(lines) == len(DESIGNS) * (len(HORIZONS_S) + 1)
     for line in lines:
         assert 0 < line["coverage_pct"] <= 100

@@ -318,7 +318,7 @@ def test_many_sparsely_logged_rests_are_one_note(tmp_path):
     path = tmp_path / "rests.csv"
     path.write_text("\n".join(["time_s,current_a,voltage_v", *rows(time, current, 3.7 - 0.03 * current), ""]))
     notes = [note for note in read_measurement(path).notes if "rested" in note]
-    assert notes == ["rests.csv: No rows for 901 to 901 s at 5 places, the first at 99 s; the cell rested."]
+    assert notes == ["rests.csv: No rows for 901 s at 5 places, the first at 99 s; the cell rested."]
 
 
 def test_a_temperature_of_zero_everywhere_is_told_of(tmp_path):

@@ -238,11 +238,36 @@ def test_a_unit_in_a_cell_with_a_decimal_comma_was_taken_for_a_wrong_decimal_sig
         pytest.param(
             np.arange(N) % 50, "begins anew 3 times, as the time of a step does", id="time of a step"
         ),
-        pytest.param((np.arange(N) - 150) % N, "split it there", id="two tests"),
+        pytest.param(np.arange(N) % 150 + np.arange(N) // 150, "split it there", id="two tests"),
     ],
 )
 def test_times_that_run_back_are_told_by_what_they_are(tmp_path, order, words):
     assert words in refusal(tmp_path, text(time=TIME[order]))
+
+
+@pytest.mark.parametrize("bounds", [(50, 100, 150), (3, 8, 12), (0, 60, N)])
+@pytest.mark.parametrize("start_s", [0.0, 1.7e9 + 0.1])
+def test_a_block_of_rows_that_stood_behind_another_was_to_be_split_into_two_tests(tmp_path, bounds, start_s):
+    first, second, end = bounds
+    rows = np.arange(N)
+    swapped = np.concatenate([rows[:first], rows[second:end], rows[first:second], rows[end:]])
+    uneven = start_s + TIME + 0.2 * np.sin(TIME)
+    for clock in (start_s + TIME, uneven):
+        assert "out of order, since by their time" in refusal(tmp_path, text(time=clock[swapped]))
+    moved = np.concatenate([rows[:40], rows[120:], rows[80:120], rows[40:80]])
+    assert "sort the rows by it" in refusal(tmp_path, text(time=TIME[moved]))
+
+
+@pytest.mark.parametrize(
+    "clock",
+    [
+        pytest.param(np.where(TIME < 100, TIME, TIME - 1.5), id="a clock that was put back a little"),
+        pytest.param(np.where(TIME < 100, TIME + 500.0, TIME), id="an earlier test behind a later one"),
+        pytest.param(np.where(TIME < 100, TIME, TIME - 99.5), id="two tests of one length"),
+    ],
+)
+def test_tests_with_clocks_of_their_own_are_not_to_be_sorted(tmp_path, clock):
+    assert "split it there" in refusal(tmp_path, text(time=clock))
 
 
 def test_pieces_with_clocks_of_their_own_were_to_be_sorted_into_one_another(tmp_path):

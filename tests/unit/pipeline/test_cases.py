@@ -1,5 +1,6 @@
 """Cases of the tracer from experiment files."""
 
+import json
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
@@ -18,6 +19,7 @@ from aesi.pipeline.discovery.cases import case_of_experiment, case_of_files
 from aesi.pipeline.discovery.discover import run_case
 from aesi.pipeline.experiment.config import read_experiment
 from aesi.pipeline.experiment.load import load
+from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Spectrum
 
 EXPERIMENTS = Path(__file__).resolve().parents[3] / "experiments"
@@ -65,6 +67,38 @@ def test_a_record_that_is_fitted_cannot_judge(tmp_path):
         case_of_files(BPX, [record], [copy])
     with pytest.raises(DataError, match="is there twice among the data; give it once"):
         case_of_files(BPX, [record, record])
+
+
+def test_a_discovery_was_judged_by_a_record_of_its_cell_file_without_a_word(tmp_path):
+    data, test = write_record(tmp_path), write_record(tmp_path, "test.csv", seed=1)
+    calibrated = replace(aesi.Cell.from_bpx(BPX), capacity_shares=(("test", 0.98),))
+    cell = tmp_path / "cell.json"
+    cell.write_text(json.dumps(calibrated.to_bpx()))
+    told = "test: the cell's file was fitted to a record of this name, so that no model has it held out"
+    for files, seen in (
+        (([data], [test]), ("test",)),
+        (([test],), ("test",)),  # whose end is kept back
+        (([test], [data]), ()),
+        (([data],), ()),
+    ):
+        case = case_of_files(cell, *files)
+        assert case.seen == seen
+        assert any(note.startswith(told) for note in case.notes) == bool(seen)
+    assert case_of_files(cell, [test], holdout=0.0).seen == ()
+
+
+def test_a_discovery_was_judged_by_what_its_model_had_been_fitted_to_without_a_word(tmp_path):
+    data, test = write_record(tmp_path), write_record(tmp_path, "test.csv", seed=1)
+    first = case_of_files(BPX, [data], good=[test])
+    folder = HybridModel(first.declared().cell).with_fitted(first.records).save(tmp_path / "model")
+    case = case_of_files(folder, [data])
+    thinned = case.with_each(
+        lambda record: record.take(slice(None, None, 2))
+    )  # as a long one is for a search
+    for one in (case, thinned):
+        assert one.seen == ("drive",)
+        (told,) = (note for note in one.notes if "the saved model was fitted to" in note)
+        assert told.startswith("drive: the saved model was fitted to this very record")
 
 
 def test_a_test_that_was_given_twice_counted_twice(tmp_path):

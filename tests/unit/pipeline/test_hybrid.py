@@ -797,6 +797,29 @@ def test_effects_and_their_defaults_were_simulated_without_a_word(model, record,
     assert any(note.endswith(": with series_resistance(resistance_ohm=0.001).") for note in said)
 
 
+def test_effects_of_no_size_were_listed_among_those_that_act(model, record, tmp_path):
+    still = [
+        CATALOGUE["series_resistance"].activate(resistance_ohm=0.0),
+        CATALOGUE["voltage_sensor_offset"].activate(offset_v=0.0),
+    ]
+    gain = CATALOGUE["current_sensor_gain"].activate(gain=1.02)
+    acting = ": with current_sensor_gain(gain=1.02)"
+    idle = "without effect, since of no size: series_resistance(resistance_ohm=0), voltage_sensor_offset(offset_v=0)."
+    for effects, beside, words in (
+        ((gain, *still), (), f"{acting}; {idle}"),
+        ((gain, *still), tuple(map(repr, still)), f"{acting}."),
+        (still, (), f": {idle}"),
+        (still, tuple(map(repr, still)), ""),
+    ):
+        said: list[str] = []
+        folder = HybridModel(model.cell, tuple(effects), beside=beside).save(tmp_path / "model")
+        predict_file(folder, record, tmp_path / "o.csv", say_notes=said.extend)
+        told = [note for note in said if "series_resistance" in note or "current_sensor_gain" in note]
+        assert told == ([f"{record.stem}{words}"] if words else [])
+    inside = folded(model.cell, [gain, *still])
+    assert (inside.held, inside.left, inside.cell) == ((), (gain,), model.cell)
+
+
 def test_what_a_discovery_had_written_into_the_cell_was_simulated_without_a_word(model, record, tmp_path):
     effects = (CATALOGUE["series_resistance"].activate(resistance_ohm=2e-3),)
     inside = folded(model.cell, effects)

@@ -69,6 +69,30 @@ def test_the_words_for_what_a_found_model_holds_were_lost_in_a_run_that_started_
     assert {name: getattr(hybrid(one), name) for name in words} == words
 
 
+def test_the_records_that_a_model_was_trained_on_were_nowhere_in_its_folder(record, tmp_path):
+    hybrid(result(record, "AESI I")).save(tmp_path / "model")
+    assert HybridModel.load(tmp_path / "model").fitted_to == (("drive", read_measurement(record).digest),)
+    copied, other = tmp_path / "copied.csv", write_record(tmp_path, seed=1)
+    copied.write_bytes(record.read_bytes())
+    unseen = tmp_path / "unseen.csv"
+    unseen.write_bytes(other.read_bytes())
+    whole = (
+        "the saved model was fitted to this very record, or to a part of it: its error there is not that of"
+    )
+    named = "the saved model was fitted to a record of this name with other rows; if both are of one test"
+    for file, words in ((copied, whole), (other, named), (unseen, "")):
+        said = []
+        predict_file(tmp_path / "model", file, tmp_path / "o.csv", say_notes=said.extend)
+        told = [note for note in said if "the saved model was fitted to" in note]
+        assert len(told) == bool(words)
+        assert all(note.startswith(f"{file.stem}: {words}") for note in told)
+    table = pd.read_csv(record).drop(columns="voltage_v")  # without a voltage nothing is judged
+    table.to_csv(tmp_path / "drive.csv", index=False)
+    said = []
+    predict_file(tmp_path / "model", tmp_path / "drive.csv", tmp_path / "o.csv", say_notes=said.extend)
+    assert not any("the saved model was fitted to" in note for note in said)
+
+
 def test_physics_was_saved_with_the_bands_of_other_physics(record):
     one = result(record, "ESPM", "ESPM recalibrated")
     assert one.best == "ESPM recalibrated"

@@ -194,6 +194,18 @@ def test_errors_that_are_told_apart_late_have_more_digits(views):
     assert "removes 0.5 % of the mean squared error" in said
 
 
+def test_a_headline_called_records_held_out_that_the_declared_model_had_seen(views):
+    seen = replace(views.run_view(200), seen=("SC03",))
+    assert runs.run_finding(seen).startswith(
+        "On test records, of which the declared model has seen SC03, in free run, the RMSE is 4.1 mV"
+    )
+    view = views.discovery_view(200)
+    assert " RMSE on held-out data: " in discoveries.discovery_consequence(view)
+    seen = replace(view, discovery=view.discovery | {"seen": ["SC03", "NEDC"]})
+    words = " RMSE on test data, of which the declared model has seen SC03 and NEDC: "
+    assert words in discoveries.discovery_consequence(seen)
+
+
 def test_the_correction_was_credited_with_what_the_recalibration_does(views, tmp_path):
     """A pouch cell's drive: 18.9 mV as declared, 9.1 recalibrated, 6.5 corrected were told as 88.2 % less."""
     view = views.run_view(200)
@@ -598,9 +610,11 @@ def test_the_range_that_the_data_cover_is_told(views):
     soc, current_a = np.linspace(0.9, 0.2, 3601), np.linspace(-5.0, 12.5, 3601)
     text = discoveries.span_finding(replace(view, traces=(replace(t, soc=soc, current_a=current_a),)))
     assert "span 1.0 h, 20 to 90 % state of charge" in text
-    assert "from -5 to 12.5 A" in text
+    assert "of -5 to 12.5 A" in text
     idle = replace(view, traces=(replace(t, current_a=np.linspace(-0.00163, 12.6, 3601)),))
-    assert "from 0 to 12.6 A" in discoveries.span_finding(idle)
+    assert "currents of 0 to 12.6 A" in discoveries.span_finding(idle)
+    still = replace(view, traces=(replace(t, soc=soc[:1], current_a=np.full(1, 5.0)),))
+    assert " h, 90 % state of charge and currents of 5 A (" in discoveries.span_finding(still)
     assert discoveries.span_finding(replace(view, traces=())) == ""
 
 

@@ -233,9 +233,27 @@ def test_a_test_record_that_the_cell_file_was_fitted_to_was_called_held_out(tmp_
 
     assert said(one, other) == []
     (note,) = said(other, one)
-    assert note.startswith(
-        "one: the cell's file was fitted to a record of this name, so that no model of this run"
+    assert note.startswith("one: the cell's file was fitted to a record of this name, so that no model has")
+
+
+def test_a_test_record_that_a_saved_model_was_fitted_to_was_called_held_out(tmp_path):
+    one, other = (write_record(tmp_path, f"{name}.csv", seed) for seed, name in enumerate(("one", "other")))
+    renamed = one.rename(tmp_path / "renamed.csv")
+    HybridModel(Cell.from_bpx(BPX), fitted_to=(("one", read(renamed, Reading()).digest),)).save(
+        tmp_path / "model"
     )
+
+    def of(train, test):
+        data = {"kind": "files", "train": [str(train)], "test": [str(test)]}
+        cell = {"bpx": str(tmp_path / "model"), "soc0": SOC0, "start": "declared"}
+        return load(experiment(train, data=data, cell=cell, models=["ESPM"]))
+
+    told = "renamed: the saved model was fitted to this very record, or to a part of it"
+    unseen, seen = of(renamed, other), of(other, renamed)
+    assert (unseen.seen, seen.seen) == ((), ("renamed",))
+    assert not any("was fitted to" in note for note in unseen.notes)
+    assert sum(note.startswith(told) for note in seen.notes) == 1
+    assert [name for name, _ in seen.fitted_to] == ["one", "other"]
 
 
 def test_the_correction_of_a_saved_model_was_dropped_by_a_run_without_a_word(tmp_path):

@@ -9,7 +9,7 @@ from aesi.errors import DataError, SimulationError
 from aesi.physics import simulate
 from aesi.physics.effect import Contribution, Effect
 from aesi.physics.effects import CATALOGUE
-from aesi.pipeline.discovery.discover import discovery_content, found_model
+from aesi.pipeline.discovery.discover import Case, case_model, discovery_content, found_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Measurement
 from aesi.tracer import discover
@@ -40,9 +40,15 @@ def test_what_a_saved_model_had_was_told_as_fitted_beside_the_next_finding(cell,
     gain = CATALOGUE["current_sensor_gain"].activate(gain=1.02)
     offset = CATALOGUE["voltage_sensor_offset"].activate(offset_v=1e-4)
     given = HybridModel(
-        cell, (offset, gain), held=("porosity(factor=1.01)",), beside=(repr(offset),), soh=0.9
+        cell,
+        (offset, gain),
+        held=("porosity(factor=1.01)",),
+        beside=(repr(offset),),
+        soh=0.9,
+        fitted_to=(("first", "0"),),
     )
-    found = discover(cell, [make((gain,))], soc0=0.9, effects=few, given=given.effects)
+    data = make((gain,))
+    found = discover(cell, [data], soc0=0.9, effects=few, given=given.effects)
     written = found_model(found, given)
     assert written.held[0] == "porosity(factor=1.01)"
     assert gain in written.effects
@@ -50,6 +56,8 @@ def test_what_a_saved_model_had_was_told_as_fitted_beside_the_next_finding(cell,
     assert written.was_beside(repr(offset))
     assert all(map(written.was_beside, written.held[1:]))
     assert written.soh == 0.9
+    case = Case(given, (data,))
+    assert case_model(case, found).fitted_to == (("first", "0"), (data.name, data.digest))
 
 
 def test_a_cell_as_declared_lacks_nothing(cell, few, make):

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from aesi.calibration.uncertainty.health import HEALTH_WORDS
+from aesi.over_time import range_words
 from aesi.physics.cell.energies import SPAN_K
 from aesi.physics.simulation import MODEL_WORDS
 from aesi.pipeline.digits import resolving
@@ -173,7 +174,7 @@ def _with_interval(row: Mapping[str, Any]) -> str:
     if low is None or high is None:
         return f"{value:.4g} | not fitted; the notes say what it rests on"
     n = resolving(value, low, high, least=4)
-    return f"{value:.{n}g} | {low:.{n}g} to {high:.{n}g}"
+    return f"{value:.{n}g} | {range_words(f'{low:.{n}g}', f'{high:.{n}g}')}"
 
 
 def _number(value: float | None) -> str:

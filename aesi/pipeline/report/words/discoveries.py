@@ -10,6 +10,7 @@ import numpy as np
 from aesi.advice import listed
 from aesi.constants import MV_PER_V, SECONDS_PER_HOUR
 from aesi.numerics.typing import Array
+from aesi.over_time import range_words
 from aesi.pipeline.digits import decimals
 from aesi.pipeline.report.views import DiscoveryView, Row
 from aesi.pipeline.report.words.sizes import (
@@ -25,7 +26,7 @@ from aesi.pipeline.report.words.sizes import (
 from aesi.tracer.decide.model_to_write import AS_GOOD
 from aesi.tracer.decide.verdict import Thresholds, beyond_noise
 from aesi.tracer.likelihood.model_error import MEASURED_V
-from aesi.tracer.report.outcome import STATES
+from aesi.tracer.report.outcome import STATES, Part
 
 LARGE_SHARE = 0.5
 """Share of the remaining error from which on a sentence says that a sparse correction could still explain more. A
@@ -262,9 +263,10 @@ def span_finding(view: DiscoveryView) -> str:
     least, most = (
         round(end, digits) + 0.0 for end in (least, most)
     )  # + 0.0: a rounded-away minus says nothing
+    percent = range_words(*(f"{round(100 * end)}" for end in soc))
     return (
-        f"The data span {hours:.1f} h, {round(100 * soc[0])} to {round(100 * soc[1])} % state of charge and currents "
-        f"from {least:g} to {most:g} A (discharge positive); the verdict holds only within these ranges."
+        f"The data span {hours:.1f} h, {percent} % state of charge and currents of "
+        f"{range_words(f'{least:g}', f'{most:g}')} A (discharge positive); the verdict holds only within these ranges."
     )
 
 
@@ -300,12 +302,23 @@ def _verb(names: Sequence[str]) -> str:
     return "is" if len(names) == 1 else "are"
 
 
+def part_words(part: Part, discovery: Mapping[str, Any]) -> str:
+    """'on held-out data', or what else a part of the data is; of a test part the records that the declared model was
+    fitted to are named."""
+    if part == "fit":
+        return "on the fitted data"
+    seen = discovery.get("seen", ())
+    return (
+        f"on test data, of which the declared model has seen {listed(seen)}" if seen else "on held-out data"
+    )
+
+
 def discovery_consequence(view: DiscoveryView) -> str:
     """A sentence on what `model/` holds and what each state of the model leaves of data that chose nothing, of those
     that were fitted where there are none; what a finding brings is the step from the refit to it."""
     discovery = view.discovery
-    part = "test" if _left_mv(discovery, "test") else "fit"
-    where = {"test": "on held-out data", "fit": "on the fitted data"}[part]
+    part: Part = "test" if _left_mv(discovery, "test") else "fit"
+    where = part_words(part, discovery)
     words = states_of(discovery)
     errors = {state: (discovery.get(state) or {}).get(part, {}).get("rmse_mv") for state in words}
     digits = error_digits(discovery, part)

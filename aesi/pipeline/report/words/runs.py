@@ -15,8 +15,6 @@ NEARLY = 0.98
 """A one-step error above this share of persistence's is called no better than it."""
 HUNDREDTHS = 2
 """Most decimals of an error in mV, to which it has to be less to be called less."""
-ON_TEST = "On held-out test records, in free run, the RMSE"
-"""Beginning of the headline."""
 
 
 def run_finding(view: RunView) -> str:
@@ -88,6 +86,12 @@ def _ran_out(view: RunView) -> str:
     return f"{text}: before that the error is {told}" if told else text
 
 
+def _on_test(view: RunView) -> str:
+    """Beginning of the headline: that the test records were held out, or which the declared model has seen."""
+    which = f"test records, of which the declared model has seen {listed(view.seen)}"
+    return f"On {which if view.seen else 'held-out test records'}, in free run, the RMSE"
+
+
 def _gain_sentence(view: RunView) -> str:
     """A sentence on the error of the chosen model on the test records in free run, beside that of the physics."""
     model = view.model(view.chosen)
@@ -112,8 +116,8 @@ def _gain_sentence(view: RunView) -> str:
     if corrected is not None and _is_less(corrected, before) and _is_less(corrected, after):
         between, last = _distinct_mv(corrected, after)
         return (
-            f"{ON_TEST} is {between} mV with the {view.corrected} and {before:.1f} mV with the {view.physics} as "
-            f"declared. The correction learnt on top of it does not help: {view.chosen} leaves {last} mV."
+            f"{_on_test(view)} is {between} mV with the {view.corrected} and {before:.1f} mV with the {view.physics} "
+            f"as declared. The correction learnt on top of it does not help: {view.chosen} leaves {last} mV."
         )
     first, last = _distinct_mv(before, after)
     if not _is_less(after, before):
@@ -124,15 +128,15 @@ def _gain_sentence(view: RunView) -> str:
     share = own_share(view)
     if share is None or corrected is None or view.corrected == view.physics:
         return (
-            f"{ON_TEST} is {last} mV with {view.chosen} and {first} mV with the {view.physics} alone. The correction "
-            f"removes {reduction:.1f} % of its mean squared error."
+            f"{_on_test(view)} is {last} mV with {view.chosen} and {first} mV with the {view.physics} alone. The "
+            f"correction removes {reduction:.1f} % of its mean squared error."
         )
     between, last = _distinct_mv(corrected, after)
     # Else the correction would be credited with what the recalibration does.
     return (
-        f"{ON_TEST} is {last} mV with {view.chosen}, {between} mV with the {view.corrected} alone and {before:.1f} mV "
-        f"with the {view.physics} as declared. The correction removes {share:.1f} % of the mean squared error that the "
-        f"{view.corrected} leaves ({reduction:.1f} % of that of the {view.physics} as declared)."
+        f"{_on_test(view)} is {last} mV with {view.chosen}, {between} mV with the {view.corrected} alone and "
+        f"{before:.1f} mV with the {view.physics} as declared. The correction removes {share:.1f} % of the mean "
+        f"squared error that the {view.corrected} leaves ({reduction:.1f} % of that of the {view.physics} as declared)."
     )
 
 
