@@ -25,7 +25,7 @@ M50T's with 4 and 8, 66.9 % with 16."""
 MIN_PIECES = 3
 """Fewest pieces of a band: fewer do not show how much pieces differ. Where the rows inside the trained range give
 fewer, all rows are used and the band is marked `extrapolated`; where all rows give fewer, there is no band. With 6 no
-figure of `aesi bench bands --set layouts='["one"]' --set cells=2` changes, since none of its bands comes near it."""
+figure of `aesi bench bands --set layouts='["one"]' --set virtual=2` changes, since none of its bands comes near it."""
 MIN_ROWS = 30
 """Fewest rows of a piece. With 10 or 100 no figure of those splits changes."""
 CORRELATED_HORIZONS = 100

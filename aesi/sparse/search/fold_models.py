@@ -30,7 +30,7 @@ from aesi.sparse.trained_region import TrainedRegion
 
 N_PIECES = 12
 """Pieces that a single training record is cut into: long enough for drift to show, and short enough that a fit without
-one is nearly the fit to all. A convention: in `aesi bench bands --set layouts='["one"]' --set cells=2` the bands of a
+one is nearly the fit to all. A convention: in `aesi bench bands --set layouts='["one"]' --set virtual=2` the bands of a
 whole drive cover 86.2 % (6.3 % of standard error) at a score of 103.2 mV, with half of it 83.4 % at 105.4, with twice
 85.6 % at 104.2."""
 
