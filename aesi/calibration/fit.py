@@ -25,7 +25,6 @@ from aesi.calibration.records.conditions import Conditions
 from aesi.calibration.records.named import uniquely_named
 from aesi.calibration.records.prepared import (
     Prepared,
-    check_charge,
     fitted_rows_sentence,
     prepared,
     with_temperatures,
@@ -64,6 +63,7 @@ from aesi.physics.cell.energies import SPAN_K
 from aesi.physics.cell.health import day_of
 from aesi.physics.depletion import ran_out
 from aesi.physics.record_checks import check_voltage, other_materials_sentence
+from aesi.physics.start.charge import check_charge
 from aesi.records import Measurement, Spectrum, measured_on_case
 from aesi.records.checked import check_row, check_whole_number
 
@@ -312,7 +312,7 @@ def prepared_model(
         start, at_temperatures, conditions.soc0, model_name, conditions.same_cell, cut_names
     )
     for one in prepared_records:
-        check_charge(start, one)
+        check_charge(start, one.rows, one.start.soc, one.hold)
     spectra, spectrum_sentences = fitted_spectra(start, conditions.spectra)
     span = _span_k(start, prepared_records, spectra)
     on_case = any(r.kelvin is not None and measured_on_case(r.kelvin) for r in prepared_records)

@@ -10,6 +10,7 @@ import numpy as np
 from aesi.advice import listed
 from aesi.constants import MV_PER_V
 from aesi.numerics.metrics import rms
+from aesi.over_time import stamp
 from aesi.tracer.decide.model_to_write import AS_GOOD
 from aesi.tracer.decide.verdict import Verdict, beyond_noise
 from aesi.tracer.report.outcome import NAMES, FileOutcome, State
@@ -123,7 +124,9 @@ def _of_rest(tests: Sequence[FileOutcome], rest_a: float) -> str | None:
 
 def _advice(files: Sequence[FileOutcome]) -> str:
     """What to look at first where the test part contradicts a verdict."""
-    ran_out = [f"{f.name} at {f.emptied_s['after']:g} s" for f in _tests(files) if "after" in f.emptied_s]
+    ran_out = [
+        f"{f.name} at {stamp(f.emptied_s['after'])} s" for f in _tests(files) if "after" in f.emptied_s
+    ]
     if ran_out:
         where = ", ".join(ran_out)
         return f"The model runs empty or full on {where}: check capacity (soh), soc0 and temperature first."
