@@ -54,7 +54,7 @@ from aesi.calibration.start import (
     with_area_factor,
 )
 from aesi.calibration.written_cell import capacities, start_soc, written_cell
-from aesi.constants import ZERO_CELSIUS_K
+from aesi.constants import MILLI, ZERO_CELSIUS_K
 from aesi.errors import DataError, FitError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
@@ -479,7 +479,7 @@ def _own_parameter_sentences(model: Model, x: Array) -> tuple[str, ...]:
         typical = float(np.median(np.abs(record.rows.current_a[record.flows > 0.0])))
         if record.slow and abs(zero_a) > NOTED_ZERO * typical:
             out.append(
-                f"{record.name}: by the fit its current reads {1e3 * abs(zero_a):.2g} mA too "
+                f"{record.name}: by the fit its current reads {MILLI * abs(zero_a):.2g} mA too "
                 f"{'high' if zero_a > 0 else 'low'} ({100 * abs(zero_a) / typical:.1f} % of it); the fit corrects that."
             )
         material, silicon = model.material(i, x) - 1.0, model.silicon(i, x)
