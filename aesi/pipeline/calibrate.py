@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from aesi.calibration import Calibration, Conditions, calibrate
-from aesi.calibration.fit import OnStep, kelvin_taken
+from aesi.calibration.fit import OnStep
 from aesi.calibration.parameters import check_names
-from aesi.calibration.records.prepared import Prepared, with_temperatures
+from aesi.calibration.records.prepared import Prepared, kelvin_taken, with_temperatures
 from aesi.calibration.records.sizes import sizes_sentence
 from aesi.calibration.records.spectra import BAND_HZ, check_spectra
 from aesi.calibration.result import RecordError

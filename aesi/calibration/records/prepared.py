@@ -164,3 +164,8 @@ def with_temperatures(
             )
         out.append(record)
     return tuple(out), tuple(notes)
+
+
+def kelvin_taken(cell: Cell, record: Prepared) -> float:
+    """Mean temperature of a record, K; the file's where the record tells none."""
+    return cell.initial_temperature_k if record.mean_kelvin is None else record.mean_kelvin

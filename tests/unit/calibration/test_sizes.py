@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from aesi.calibration import Conditions
-from aesi.calibration.fit import prepared_model
+from aesi.calibration.prepared_model import prepared_model
 from aesi.calibration.records.sizes import capacity_test_ah, other_sizes, sizes_sentence
 from aesi.errors import DataError
 from aesi.physics import Cell
