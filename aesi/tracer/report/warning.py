@@ -62,8 +62,8 @@ def _of_unsimulated(files: Sequence[FileOutcome]) -> Iterator[str]:
             models.setdefault(why, []).append(NAMES[state])
         for why, names in models.items():
             part = "the test part" if f.part == "test" else "the fitted part"
-            have = "has no figure" if len(names) == 1 else "have no figures"
-            yield f"{' and '.join(names)} {have} on {part} of {f.name}, where it cannot be simulated: {why}"
+            have, each = ("has no figure", "it") if len(names) == 1 else ("have no figures", "they")
+            yield f"{listed(names)} {have} on {part} of {f.name}, where {each} cannot be simulated: {why}"
 
 
 def _of_contradiction(files: Sequence[FileOutcome], verdict: Verdict) -> str | None:

@@ -89,6 +89,15 @@ def test_a_test_part_on_which_the_model_runs_empty_is_not_said_to_lack_physics()
     assert "on drive at 1700000320 s" in first
 
 
+def test_three_models_that_cannot_be_simulated_were_told_as_one():
+    why = dict.fromkeys(("before", "recalibrated", "after"), "the electrolyte ran out of salt.")
+    (told,) = warnings([replace(outcome(0.0), unsimulated=why)], verdict("unknown"))
+    assert told == (
+        "the declared model, the recalibrated model and the written model have no figures on the test part of drive, "
+        "where they cannot be simulated: the electrolyte ran out of salt."
+    )
+
+
 def test_a_written_model_that_does_worse_than_others_is_told_with_each_of_them():
     (one,) = warnings([outcome(7e-3)], verdict("unknown"))
     assert (
