@@ -13,7 +13,7 @@ from aesi.constants import MILLI, SECONDS_PER_HOUR
 from aesi.data.channels.implausible import ENOUGH_STEPS, USUAL_RESISTANCE_OHM_AH, step_resistance_ohm
 from aesi.data.read import read
 from aesi.data.reading import Reading
-from aesi.errors import DataError
+from aesi.errors import DataError, not_written
 from aesi.numerics.files.whole import write_whole
 from aesi.numerics.typing import Array
 from aesi.over_time import extent
@@ -73,7 +73,7 @@ def convert_file(
     try:
         write_csv(out, table)
     except OSError as error:
-        raise DataError(f"{out} cannot be written: {error.strerror or error}.") from None
+        raise DataError(not_written(out, error)) from None
     return record
 
 
