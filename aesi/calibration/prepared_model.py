@@ -11,6 +11,7 @@ from aesi.calibration.records.conditions import Conditions
 from aesi.calibration.records.named import uniquely_named
 from aesi.calibration.records.prepared import (
     Prepared,
+    check_flows,
     fitted_rows_sentence,
     kelvin_taken,
     prepared,
@@ -124,10 +125,7 @@ def _checked_records(
             )
         check_row(record.voltage_v, f"{record.name}: voltage_v")
         check_voltage(cell, record)
-        if not record.current_a.any():
-            raise DataError(
-                f"{record.name}: no current flows in it, so that it tells no parameter; leave it out."
-            )
+        check_flows(record)
     return named
 
 

@@ -109,6 +109,15 @@ def _prepared(
     )
 
 
+def check_flows(record: Measurement) -> None:
+    """Raises DataError for a record in which no current flows."""
+    if not record.current_a.any():
+        raise DataError(
+            f"{record.name}: the current is 0 A in all {len(record):,} rows, so that no parameter shows; leave the "
+            "record out, or check the column of the current."
+        )
+
+
 def fitted_rows_sentence(record: Prepared) -> str:
     """A sentence on the rows that are fitted and how the current runs between them."""
     declared = record.data.hold

@@ -523,7 +523,7 @@ def test_a_file_that_is_fuller_than_most_cells_started_from_another_one(start):
 
 def test_a_record_without_a_current_is_refused_by_its_name(start, records):
     rest = replace(records[0], current_a=np.zeros(len(records[0])), name="rest")
-    with pytest.raises(DataError, match="rest: no current flows in it"):
+    with pytest.raises(DataError, match="rest: the current is 0 A in all"):
         calibrate(start, [records[0], rest])
 
 
