@@ -186,7 +186,7 @@ def fit_traces(found: Calibration) -> tuple[DiscoveryTrace, ...]:
     for i, record in enumerate(model.records):
         rows = record.rows
         start, simulated, fitted = (
-            model.run(i, *states[name])[0] for name in ("declared", "simulated", "fitted")
+            model.run(i, *states[name]).voltage_v for name in ("declared", "simulated", "fitted")
         )
         capacity_ah = found.cell.capacity_ah * found.capacities[record.name]
         soc = start_soc(model, x, i) - rows.discharged_ah(record.hold) / capacity_ah
