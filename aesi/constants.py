@@ -12,3 +12,5 @@ J_PER_KJ = 1000.0
 CM_PER_M = 100.0
 MILLI = 1000.0
 """Thousandths in one: mohm of an ohm, mm of a metre, g of a kilogram."""
+PERCENT = 100.0
+"""Hundredths in one."""

@@ -82,6 +82,11 @@ def first_line(error: BaseException, most: int = 200) -> str:
     return without_logins((str(error).strip().splitlines() or [type(error).__name__])[0])[:most]
 
 
+def not_written(path: object, error: OSError) -> str:
+    """A sentence on a file or folder that the system does not let be written, with its reason."""
+    return f"{path} cannot be written: {error.strerror or error}."
+
+
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """End of a sentence about an unknown name: the known name with the most similar spelling, or a full stop."""
     from difflib import get_close_matches

@@ -17,23 +17,18 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from aesi.calibration.ageing import Ageing
+from aesi.calibration.fit_sentences import (
+    contradicted_prior_sentences,
+    moved_start_sentences,
+    own_parameter_sentences,
+    ran_out_sentences,
+)
 from aesi.calibration.heat import case_records, with_fitted_heat
 from aesi.calibration.model import FitState, Model
-from aesi.calibration.parameters import free_parameters, with_interfaces, with_priors
+from aesi.calibration.prepared_model import prepared_model
 from aesi.calibration.records.conditions import Conditions
-from aesi.calibration.records.named import uniquely_named
-from aesi.calibration.records.prepared import (
-    Prepared,
-    check_charge,
-    fitted_rows_sentence,
-    prepared,
-    with_temperatures,
-)
-from aesi.calibration.records.sizes import other_sizes, sizes_sentence
-from aesi.calibration.records.spectra import degc_of, fitted_spectra
+from aesi.calibration.records.prepared import Prepared, kelvin_taken
 from aesi.calibration.records.temperature import against_temperature
-from aesi.calibration.records.zero import Zero, zero_of
 from aesi.calibration.result import (
     Calibration,
     RecordError,
@@ -43,56 +38,25 @@ from aesi.calibration.result import (
     intervals,
     undetermined,
 )
-from aesi.calibration.shapes import Shapes
-from aesi.calibration.silicon import SILICON_V
-from aesi.calibration.start import (
-    activation_sentences,
-    discharge_branch,
-    full_discharge_numbers,
-    scaled_to_discharge,
-    size_assumed,
-    with_activation,
-    with_area_factor,
-)
+from aesi.calibration.start import size_assumed, with_area_factor
 from aesi.calibration.written_cell import capacities, start_soc, written_cell
 from aesi.constants import ZERO_CELSIUS_K
-from aesi.errors import DataError, FitError
+from aesi.errors import FitError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
-from aesi.physics.cell.energies import SPAN_K
 from aesi.physics.cell.health import day_of
-from aesi.physics.depletion import ran_out
-from aesi.physics.record_checks import check_voltage, other_materials_sentence
-from aesi.records import Measurement, Spectrum, measured_on_case
-from aesi.records.checked import check_row, check_whole_number
+from aesi.records import Measurement
+from aesi.records.checked import check_whole_number
 
-FEWEST_ROWS = 2
-"""Of a record: one row has no time in which a current flows."""
 EVALUATIONS = 100
 """Most evaluations of one descent. The fits behind the shipped files of the Panasonic NCR18650PF and the LG 18650HG2
 need fewer."""
 GAIN = 1e-5
 """Relative reduction of the cost below which a descent ends. With ten times as much the first descent for an LG
 18650HG2 ends a prior standard deviation away, at a cost of 344.7 instead of 340.1."""
-NOTED_ZERO = 0.02
-"""Share of a record's typical current above which a note reports the offset of its cycler's current."""
-NOTED_AGE = 0.01
-"""Relative difference of a record's active material from the file's above which a note reports it."""
-NOTED_SILICON = 0.05
-"""The same for the silicon, which holds a sixth of such a cell's charge."""
-MOVED_SOC = 1e-3
-"""Least change of a given state of charge between the windows of the start file and of the written cell that a note
-tells. A convention."""
-NOTED_DEVIATIONS = 2.0
-"""A fit that ends more than this many standard deviations from a prior that the user gave contradicts it. A
-convention."""
 OnStep = Callable[[int, float], None]
 """Called at each step of a fit with the number of steps so far, and the present misfit over that of the start."""
-OF_ROWS_LEFT_OUT = (
-    "the state of charge that was given is that of its first row, which is not fitted; it starts where its "
-    "voltage says."
-)
 
 
 def calibrate(
@@ -143,10 +107,10 @@ def calibrate(
         size_assumed="" if conditions.same_cell else size_assumed(cell, records),
         notes=(
             *notes,
-            *_contradicted_prior_sentences(model, x),
-            *_own_parameter_sentences(model, x),
-            *_ran_out_sentences(model, states),
-            *_moved_start_sentences(model, begun),
+            *contradicted_prior_sentences(model, x),
+            *own_parameter_sentences(model, x),
+            *ran_out_sentences(model, states),
+            *moved_start_sentences(model, begun),
             *ends[0].heat_sentences,
             *ends_sentences(
                 [end.cost for end in ends],
@@ -285,128 +249,12 @@ def _errors(model: Model, states: Mapping[FitState, tuple[Cell, Array]]) -> tupl
     )
 
 
-def prepared_model(
-    cell: Cell, records: Sequence[Measurement], conditions: Conditions
-) -> tuple[Model, tuple[str, ...]]:
-    """(model that is fitted, sentences on how it was set up, in the order of the steps).
-
-    Raises DataError for records that do not fit the cell.
-    """
-    records = _checked_records(cell, records, conditions)
-    start, zero, size_sentences = _size_and_zero(cell, records, conditions.same_cell)
-    branches = [discharge_branch(start, data) for data in records]
-    at_temperatures, temperature_sentences = with_temperatures(
-        start, [data for data, _ in branches], conditions.temperatures_degc
-    )
-    declared, start = start, with_activation(start)
-    full_discharges = () if conditions.same_cell else full_discharge_numbers(cell, records)
-    # Their capacity is not the one that the largest full discharge shows.
-    smaller = other_sizes(cell, records)
-    of_size = (records[i] for i in full_discharges if records[i].name not in smaller)
-    potential_sentences = filter(None, (other_materials_sentence(start, record) for record in of_size))
-    cut_names = [
-        r.name for r, whole in zip(at_temperatures, records, strict=True) if r.time_s[0] > whole.time_s[0]
-    ]
-    model_name = conditions.model or "espm"
-    prepared_records = prepared(
-        start, at_temperatures, conditions.soc0, model_name, conditions.same_cell, cut_names
-    )
-    for one in prepared_records:
-        check_charge(start, one)
-    spectra, spectrum_sentences = fitted_spectra(start, conditions.spectra)
-    span = _span_k(start, prepared_records, spectra)
-    on_case = any(r.kelvin is not None and measured_on_case(r.kelvin) for r in prepared_records)
-    start = with_interfaces(start, on_case)
-    free = with_priors(free_parameters(start, span, conditions.same_cell, on_case), conditions.priors)
-    energies = {f.name: (f.start, f.sd) for f in free if f.name.endswith("_energy")}
-    ageing = Ageing.of(prepared_records, conditions.dates, conditions.as_of)
-    model = Model(
-        start,
-        prepared_records,
-        free,
-        Shapes.over(start, span),
-        zero,
-        ageing,
-        model_name,
-        spectra,
-    )
-    return model, (
-        *size_sentences,
-        *filter(None, [sizes_sentence(cell, records)]),
-        *potential_sentences,
-        *zero.sentences,
-        *(sentence for _, branch_sentences in branches for sentence in branch_sentences),
-        *temperature_sentences,
-        *(f"{name}: {OF_ROWS_LEFT_OUT}" for name in cut_names if conditions.soc0 is not None),
-        *_small_span_sentences(span, len(prepared_records)),
-        *activation_sentences(declared, start, energies, [f.name for f in free if f.given]),
-        *(r.start.sentence for r in prepared_records if not r.start.against_voltage),  # those are warnings
-        *spectrum_sentences,
-        *map(fitted_rows_sentence, prepared_records),
-        *ageing.sentences,
-    )
-
-
-def _checked_records(
-    cell: Cell, records: Sequence[Measurement], conditions: Conditions
-) -> tuple[Measurement, ...]:
-    """The records with names of their own.
-
-    Raises DataError where there is none, and for one that has too few rows, lacks a voltage or a current, or is no
-    record of the cell.
-    """
-    if not records:
-        raise DataError("give at least one record to calibrate with.")
-    named = uniquely_named(records, {"temperature": conditions.temperatures_degc, "date": conditions.dates})
-    for record in named:
-        if len(record) < FEWEST_ROWS:
-            raise DataError(
-                f"{record.name} has too few rows ({len(record)}) to be fitted; a record needs at least {FEWEST_ROWS}."
-            )
-        check_row(record.voltage_v, f"{record.name}: voltage_v")
-        check_voltage(cell, record)
-        if not record.current_a.any():
-            raise DataError(
-                f"{record.name}: no current flows in it, so that it tells no parameter; leave it out."
-            )
-    return named
-
-
-def _size_and_zero(
-    cell: Cell, records: Sequence[Measurement], same_cell: bool
-) -> tuple[Cell, Zero, tuple[str, ...]]:
-    """(cell of the size that the records indicate, zero offset of their cycler's current, sentences on the size).
-
-    Each needs the other: a first size gives the offset, and currents without the offset give the final size.
-    """
-    if same_cell:
-        return cell, zero_of(cell, records), ()
-    roughly, _ = scaled_to_discharge(cell, records)
-    zero = zero_of(roughly, records)
-    start, sentences = scaled_to_discharge(
-        cell, [zero.subtracted_from(r, roughly.nominal_capacity_ah) for r in records]
-    )
-    return start, zero, sentences
-
-
 def _start_file_at_size(cell: Cell, sized_cell: Cell) -> Cell:
     """The start file at the size that the records indicate, without the typical values that a fit fills in. The limits
     beyond which a record contradicts its temperature were set with such files."""
     return with_area_factor(
         cell, sized_cell.electrode_area_m2 / cell.electrode_area_m2, sized_cell.nominal_capacity_ah
     )
-
-
-def _small_span_sentences(span_k: float, n_records: int) -> tuple[str, ...]:
-    """A sentence where the records span too few kelvin to determine the temperature dependence; else empty."""
-    if span_k > SPAN_K:
-        return ()
-    apart = (
-        f"the mean temperatures of the records are {span_k:.1f} K apart, less than {SPAN_K:g} K"
-        if n_records > 1
-        else "a single record does not tell how the cell answers to temperature"
-    )
-    return (f"{apart}: activation energies and entropy stay as they are.",)
 
 
 def _descend(reporting: _ReportingModel, evaluations: int, x0: Array) -> _Descent:
@@ -427,88 +275,6 @@ def _descend(reporting: _ReportingModel, evaluations: int, x0: Array) -> _Descen
     return _Descent(found.x, found.jac, float(found.cost))
 
 
-STATE_WORDS: dict[FitState, str] = {
-    "declared": "the declared cell",
-    "fitted": "the fitted cell",
-    "simulated": "the file as simulated",
-}
-"""State of the cell -> what notes call it."""
-
-
-def _moved_start_sentences(model: Model, begun: Mapping[str, float]) -> tuple[str, ...]:
-    """A sentence for each record whose given state of charge is another one in the windows of the written cell.
-
-    begun : `Calibration.starts`.
-    """
-    given = ((r.name, r.start.soc) for r in model.records if r.start.basis == "given")
-    return tuple(
-        f"{name} starts at a state of charge of {begun[name]:.4f} of the written cell, in which empty is the rest at "
-        f"its lower cut-off: by the start file it is the {soc:.4g} that was given."
-        for name, soc in given
-        if abs(begun[name] - soc) >= MOVED_SOC
-    )
-
-
-def _ran_out_sentences(model: Model, states: Mapping[FitState, tuple[Cell, Array]]) -> tuple[str, ...]:
-    """A sentence for each record on which the cell runs out of lithium or salt in one of the states."""
-    out = []
-    for i, record in enumerate(model.records):
-        found = {words: model.ran_out_s(i, *states[name]) for name, words in STATE_WORDS.items()}
-        if at_s := {words: at for words, at in found.items() if at is not None}:
-            out.append(ran_out(record.name, at_s))
-    return tuple(out)
-
-
-def _contradicted_prior_sentences(model: Model, x: Array) -> tuple[str, ...]:
-    """A sentence for each prior that was given and that the records contradict."""
-    out = []
-    for free, z in zip(model.free, x, strict=False):
-        if free.given and abs(z) > NOTED_DEVIATIONS:
-            out.append(
-                f"{free.name} ends at {free.value(float(z)):.4g} {free.unit}, {abs(z):.1f} standard deviations "
-                f"{'above' if z > 0.0 else 'below'} what was given ({free.start:g}): the records contradict it."
-            )
-    return tuple(out)
-
-
-def _own_parameter_sentences(model: Model, x: Array) -> tuple[str, ...]:
-    """Sentences on the parameters of single records: offset of the current, active material and silicon."""
-    out = []
-    zero_a = model.zero.at(float(x[model.layout.zero]))
-    for i, record in enumerate(model.records):
-        typical = float(np.median(np.abs(record.rows.current_a[record.flows > 0.0])))
-        if record.slow and abs(zero_a) > NOTED_ZERO * typical:
-            out.append(
-                f"{record.name}: by the fit its current reads {1e3 * abs(zero_a):.2g} mA too "
-                f"{'high' if zero_a > 0 else 'low'} ({100 * abs(zero_a) / typical:.1f} % of it); the fit corrects that."
-            )
-        material, silicon = model.material(i, x) - 1.0, model.silicon(i, x)
-        if abs(material) > NOTED_AGE:
-            out.append(
-                f"{record.name}: in the fit the cell has {100 * abs(material):.1f} % "
-                f"{'more' if material > 0.0 else 'less'} active material in this record than in the file; the record "
-                "may be of another age."
-            )
-        if abs(silicon - 1.0) > NOTED_SILICON:
-            how = "fits with" if record.slow else "has, by the slow records before and after it,"
-            out.append(
-                f"{record.name}: {how} {100 * silicon:.0f} % of the capacity of the negative electrode above "
-                f"{SILICON_V:g} V (silicon, if it has any)."
-            )
-    return tuple(out)
-
-
 def _degc(record: Prepared) -> float | None:
     """Mean temperature of a record, degC; None where it has none."""
     return None if record.mean_kelvin is None else record.mean_kelvin - ZERO_CELSIUS_K
-
-
-def _span_k(cell: Cell, records: Sequence[Prepared], spectra: Sequence[Spectrum]) -> float:
-    """K between the coldest and the warmest record's mean, or spectrum."""
-    means = [kelvin_taken(cell, r) for r in records] + [degc_of(s) + ZERO_CELSIUS_K for s in spectra]
-    return max(means) - min(means)
-
-
-def kelvin_taken(cell: Cell, record: Prepared) -> float:
-    """Mean temperature of a record, K; the file's where the record tells none."""
-    return cell.initial_temperature_k if record.mean_kelvin is None else record.mean_kelvin

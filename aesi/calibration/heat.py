@@ -216,7 +216,7 @@ def _heat_w(model: Model, x: Array, index: int, kelvin: Array) -> Array:
     """
     cell = cell_in_record(model, x, index)
     (empty_n, full_n) = cell.balance.window_n
-    mean_n = model.run(index, model.cell_at(x), x)[5]
+    mean_n = model.run(index, model.cell_at(x), x).mean_n
     # Errors of start and capacity may take the charge beyond full or empty, where the potential of the limit is used.
     soc = np.clip((mean_n - empty_n) / (full_n - empty_n), 0.0, 1.0)
     theta_n, theta_p = cell.balance.stoichiometries(soc)

@@ -18,7 +18,7 @@ from aesi.calibration.silicon import SILICON_SD, may_have_silicon, silicon_edge,
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
 from aesi.physics.effect import Record
-from aesi.physics.model import EspmModel
+from aesi.physics.model import EspmModel, SolvedRows
 from aesi.physics.simulation import ModelName, solved, solver
 from aesi.records import Spectrum
 
@@ -167,8 +167,8 @@ class Model:
         """The cell with these shares of its active material and of its silicon."""
         return replace(cell, negative=with_silicon(cell.negative, self.edge, silicon)).with_material(material)
 
-    def run(self, index: int, cell: Cell, x: Array, more: float = 1.0) -> Array:
-        """Rows of a record's simulation: voltage, surface stoichiometries, ... (see `run_plain`).
+    def run(self, index: int, cell: Cell, x: Array, more: float = 1.0) -> SolvedRows:
+        """A record's simulation.
 
         more : factor on the active material that its cell has.
         """
@@ -179,8 +179,8 @@ class Model:
         at = self._simulated(index, cell, x, 1.0)[1]
         return None if at < 0 else float(self.records[index].rows.time_s[at])
 
-    def _simulated(self, index: int, cell: Cell, x: Array, more: float) -> tuple[Array, int]:
-        """(rows of a record's simulation, number of the first row without lithium or salt, -1 for none)."""
+    def _simulated(self, index: int, cell: Cell, x: Array, more: float) -> tuple[SolvedRows, int]:
+        """(a record's simulation, number of the first row without lithium or salt, -1 for none)."""
         self.simulations += 1
         record = self.records[index]
         model = EspmModel(
@@ -191,7 +191,7 @@ class Model:
         soc = record.start.soc + record.soc_sd * float(x[self.layout.soc(index)])
         load = Record(record.rows.time_s, self.current_a(index, x), record.kelvin)
         rows, _, at, _ = solved(solver(self.model_name), model, load, soc, record.hold)
-        return rows, at
+        return SolvedRows(*rows), at
 
     def as_simulated(self, x: Array) -> Array:
         """The working vector without the parameters of single records: the file's state, currents as measured.
@@ -221,7 +221,7 @@ class Model:
 
     def errors_of(self, cell: Cell, x: Array) -> list[Array]:
         """(rows,) V of each record, measured - simulated with `cell` and the record's part of the working vector."""
-        return [r.rows.voltage_v - self.run(i, cell, x)[0] for i, r in enumerate(self.records)]
+        return [r.rows.voltage_v - self.run(i, cell, x).voltage_v for i, r in enumerate(self.records)]
 
     def residual(self, x: Array) -> Array:
         """The least-squares residual: errors of all rows over their expected size, with a linear loss for large ones;
@@ -235,14 +235,14 @@ class Model:
         the knots of potentials, which have a closed form."""
         cell = self.cell_at(x)
         runs = [self.run(i, cell, x) for i in range(len(self.records))]
-        blocks, of_spectra = self._differences(cell, x, [run[0] for run in runs])
+        blocks, of_spectra = self._differences(cell, x, [run.voltage_v for run in runs])
         for i, (block, run) in enumerate(zip(blocks, runs, strict=True)):
-            surface_n = stretched(run[1], self.edge, self.silicon(i, x))
-            block[:, self._closed] = self.shapes.columns(x[self.layout.shapes], surface_n, run[2])
-            self._set_own_slopes(i, cell, x, run[0], block)
+            surface_n = stretched(run.surface_n, self.edge, self.silicon(i, x))
+            block[:, self._closed] = self.shapes.columns(x[self.layout.shapes], surface_n, run.surface_p)
+            self._set_own_slopes(i, cell, x, run.voltage_v, block)
         parts = []
         for block, run, record, w in zip(blocks, runs, self.records, self.weights, strict=True):
-            lenient = w * leniency(record.rows.voltage_v - run[0])
+            lenient = w * leniency(record.rows.voltage_v - run.voltage_v)
             parts.append(-lenient[:, None] * block)
         return np.vstack([*parts, of_spectra, np.eye(self.layout.size)])
 
@@ -274,7 +274,7 @@ class Model:
                 of_spectra[:, j] = (self.spectra.misfits(changed) - off) / h
             for i, record in enumerate(self.records if simulated else ()):
                 if j != self.layout.zero or record.slow:
-                    blocks[i][:, j] = (self.run(i, changed, there)[0] - voltages_v[i]) / h
+                    blocks[i][:, j] = (self.run(i, changed, there).voltage_v - voltages_v[i]) / h
         return blocks, of_spectra
 
     def _set_own_slopes(self, index: int, cell: Cell, x: Array, voltage_v: Array, block: Array) -> None:
@@ -286,7 +286,7 @@ class Model:
         layout, weights = self.layout, self.ageing.silicon[index]
 
         def slope(there: Array, more: float = 1.0, step: float = STEP) -> Array:
-            return (self.run(index, cell, there, more)[0] - voltage_v) / step
+            return (self.run(index, cell, there, more).voltage_v - voltage_v) / step
 
         there = x.copy()
         there[layout.soc(index)] += STEP

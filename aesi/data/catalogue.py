@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePath
 
 from aesi.data.fetch import Remote, fetch
-from aesi.errors import DataAway, DataError, did_you_mean
+from aesi.errors import DataAway, DataError, did_you_mean, not_written
 from aesi.numerics.files.cache_folder import cache_folder
 
 FOLDER_VARIABLE = "AESI_DATA"
@@ -317,5 +317,5 @@ def _copy(source: Path, out: Path) -> Path:
             copy.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(path, copy)
     except OSError as error:
-        raise DataError(f"{out} cannot be written: {error.strerror}.") from None
+        raise DataError(not_written(out, error)) from None
     return out

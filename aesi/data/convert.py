@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from aesi.constants import SECONDS_PER_HOUR
+from aesi.constants import MILLI, SECONDS_PER_HOUR
 from aesi.data.channels.implausible import ENOUGH_STEPS, USUAL_RESISTANCE_OHM_AH, step_resistance_ohm
 from aesi.data.read import read
 from aesi.data.reading import Reading
-from aesi.errors import DataError
+from aesi.errors import DataError, not_written
 from aesi.numerics.files.whole import write_whole
 from aesi.numerics.typing import Array
 from aesi.over_time import extent, range_words
@@ -73,7 +73,7 @@ def convert_file(
     try:
         write_csv(out, table)
     except OSError as error:
-        raise DataError(f"{out} cannot be written: {error.strerror or error}.") from None
+        raise DataError(not_written(out, error)) from None
     return record
 
 
@@ -106,7 +106,7 @@ def _size_line(record: Measurement) -> list[str]:
         ]
     low, high = (_plain(each / resistance, 2) for each in USUAL_RESISTANCE_OHM_AH)
     return [
-        f"Steps of the current show {_plain(1e3 * resistance, 3)} mohm, as cells of {low} to {high} Ah do; if it is "
+        f"Steps of the current show {_plain(MILLI * resistance, 3)} mohm, as cells of {low} to {high} Ah do; if it is "
         "none of these, the current is in another unit than A (--unit current_a=...), or scaled, or, of a larger cell, "
         "the voltage was taken with the drop of its leads; --cell FILE checks it."
     ]

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from aesi.data.convert import write_csv
 from aesi.data.read import Reading, Sign, read
-from aesi.errors import DataAway, DataError
+from aesi.errors import DataAway, DataError, not_written
 
 TIMEOUT_S = 30
 """Seconds after which a server counts as not answering."""
@@ -53,7 +53,7 @@ def fetch(remote: Remote, folder: Path) -> Path:
     except DataError:
         raise
     except OSError as error:
-        raise DataError(f"{target} cannot be written: {error.strerror or error}.") from None
+        raise DataError(not_written(target, error)) from None
     return target
 
 

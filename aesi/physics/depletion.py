@@ -14,7 +14,7 @@ from aesi.constants import FARADAY_C_MOL, ZERO_CELSIUS_K
 from aesi.numerics.typing import Array
 from aesi.over_time import stamp
 from aesi.physics.espm.plain import rate_factor, stack_of
-from aesi.physics.model import EspmModel
+from aesi.physics.model import EspmModel, SolvedRows
 
 LAYERS = {1: "negative electrode", 2: "positive electrode"}
 MOST_PERCENT = 1e4
@@ -32,17 +32,17 @@ def depletion_sentence(
 ) -> str:
     """Why a simulation stopped, and what to check: one sentence that ends with `RUN_ON`.
 
-    time_s, current_a : (n,) s, A, of the record.  kelvin : temperature at the fault, K.  rows : (7, n) as of
-    `run_plain`.  at : the first faulty row.  what : 1 or 2, the surface of that electrode (`LAYERS`); `SALT`; or
+    time_s, current_a : (n,) s, A, of the record.  kelvin : temperature at the fault, K.  rows : (7, n),
+    `SolvedRows`.  at : the first faulty row.  what : 1 or 2, the surface of that electrode (`LAYERS`); `SALT`; or
     `NO_SOLUTION`.
     """
-    cell = model.cell
+    cell, run = model.cell, SolvedRows(*rows)
     way_there = current_a[max(at - 1, 0) : at + 1]
     asked_a = float(way_there[np.argmax(np.abs(way_there))])
-    head = f"{cell.name}: {_cut_off_clause(model, time_s, rows[0], at, charging=asked_a < 0.0)}"
+    head = f"{cell.name}: {_cut_off_clause(model, time_s, run.voltage_v, at, charging=asked_a < 0.0)}"
     where = f"at {stamp(time_s[at])} s"  # of a row the file may know nothing: models run on rows of their own
     amperes = abs(asked_a)
-    driest = float(np.min(rows[3:5, at])) / cell.electrolyte.c0_mol_m3
+    driest = float(np.min([run.c_e0[at], run.c_el[at]])) / cell.electrolyte.c0_mol_m3
     if what == SALT or (what == NO_SOLUTION and driest < DRY_SHARE):
         cause = _salt_clause(model, kelvin, amperes, where)
     elif what == NO_SOLUTION:
@@ -85,10 +85,12 @@ def _surface_clause(
 ) -> str:
     """A clause: a surface is empty or full, by the charge of the record or by a current too large for solid diffusion.
 
-    rows : as of `run_plain`.  at : the faulty row.  what : 1 or 2, the electrode.  Others as `_salt_clause`.
+    rows : (7, n), `SolvedRows`.  at : the faulty row.  what : 1 or 2, the electrode.  Others as `_salt_clause`.
     """
     cell, electrode, row = model.cell, (model.cell.negative, model.cell.positive)[what - 1], rows[:, at]
-    every = (rows[5] - cell.negative.theta_min) / (cell.negative.theta_max - cell.negative.theta_min)
+    every = (SolvedRows(*rows).mean_n - cell.negative.theta_min) / (
+        cell.negative.theta_max - cell.negative.theta_min
+    )
     soc = float(every[at])
     surface = (
         f"the surface of the {LAYERS[what]} left the stoichiometry range [0, 1] {where}, at a state of charge of "

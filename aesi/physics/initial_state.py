@@ -26,7 +26,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from aesi.constants import ZERO_CELSIUS_K
+from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.errors import DataError
 from aesi.physics.arguments import checked_soc
 from aesi.physics.balance import same_rest
@@ -293,9 +293,7 @@ class _StartReading:
         written = "" if self.written_a == self.current_a else f" ({self.written_a:.3g} A as written)"
         said = f"starts under {self.current_a:.3g} A{written} at {self.record.voltage_v[0]:.3f} V"
         if self._charge_ended_before(begun, drop_v):
-            words = (
-                f"{said}, and with the {1e3 * drop_v:.0f} mV that the model drops at once at {begun:.3f} V"
-            )
+            words = f"{said}, and with the {MV_PER_V * drop_v:.0f} mV that the model drops at once at {begun:.3f} V"
             return self._full_charge(begun, words, None, drop_v)
         return self._read_first_minutes(first, said)
 
@@ -336,11 +334,11 @@ class _StartReading:
         inside = self.open_circuit.soc_at(ocv_v)
         sd = self.open_circuit.full_sd(ocv_v, DROP_ERROR * drop_v)
         above_v = true_v - self.cell.upper_voltage_v
-        near, doubt = f"within {1e3 * CHARGED_V:.0f} mV of", ""
+        near, doubt = f"within {MV_PER_V * CHARGED_V:.0f} mV of", ""
         if above_v < -CHARGED_V:
-            near = f"far above the plateau of its potential and {-1e3 * above_v:.0f} mV below"
+            near = f"far above the plateau of its potential and {-MV_PER_V * above_v:.0f} mV below"
         if above_v > CHARGED_V:
-            near = f"{1e3 * above_v:.0f} mV above"
+            near = f"{MV_PER_V * above_v:.0f} mV above"
             doubt = "; check the voltage's sensor, and the cell file, which may be another cell's"
             if above_v - drop_v <= CHARGED_V:  # as it was read, the voltage is a full cell's
                 doubt = "; by its first row the cell may have dropped by less than the model does"

@@ -6,7 +6,7 @@ Frozen and hashable by value: effects return changed copies, and everything deri
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,6 +30,23 @@ DEFAULT_SUBSTEP_S = 1.0
 """A convention; the effect `numerical_error` shows the influence of a shorter step."""
 ANY_NUMBER = 2**31
 """No limit."""
+
+
+class SolvedRows(NamedTuple):
+    """The rows (7, n) that each solver of a model gives, by name, (n,) each.
+
+    voltage_v : V.  surface_n, surface_p : stoichiometries at the surface of the particles, negative and positive.
+    c_e0, c_el : mol/m3, salt at the collector of the negative and of the positive electrode.
+    mean_n, mean_p : mean stoichiometries of the particles.
+    """
+
+    voltage_v: Array
+    surface_n: Array
+    surface_p: Array
+    c_e0: Array
+    c_el: Array
+    mean_n: Array
+    mean_p: Array
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ from aesi.physics.effect import (
     materials_first,
 )
 from aesi.physics.espm.plain import run_plain
-from aesi.physics.model import EspmModel, of_record
+from aesi.physics.model import EspmModel, SolvedRows, of_record
 from aesi.physics.rest.open_circuit import OpenCircuit
 from aesi.physics.rest.voltage import freed_of_instruments, freed_of_series
 from aesi.records import Hold, Run
@@ -52,7 +52,7 @@ MOST_ROWS = 20_000
 Solution = tuple[Array, dict[str, Array], int, int]
 """The result of a solver: (rows, further, fault_at, fault).
 
-rows : (7, n), as those of `plain.run_plain`.  further : other states by name, (n,) each.  fault_at : first row at
+rows : (7, n), `SolvedRows`.  further : other states by name, (n,) each.  fault_at : first row at
 which lithium or salt has run out, -1 for none.  fault : which one, as `depletion_sentence` takes it.
 """
 
@@ -352,11 +352,11 @@ def _soc_from_rest(
 
 
 def _series(cell: Cell, rows: Array) -> dict[str, Array]:
-    n, p = cell.negative, cell.positive
+    n, p, solved_rows = cell.negative, cell.positive, SolvedRows(*rows)
     return {
-        "c_sp": rows[2] * p.c_max_mol_m3,
-        "c_sn": rows[1] * n.c_max_mol_m3,
-        "c_e0": rows[3],
-        "c_eL": rows[4],
-        "soc": (rows[5] - n.theta_min) / (n.theta_max - n.theta_min),
+        "c_sp": solved_rows.surface_p * p.c_max_mol_m3,
+        "c_sn": solved_rows.surface_n * n.c_max_mol_m3,
+        "c_e0": solved_rows.c_e0,
+        "c_eL": solved_rows.c_el,
+        "soc": (solved_rows.mean_n - n.theta_min) / (n.theta_max - n.theta_min),
     }

@@ -13,7 +13,7 @@ import numpy as np
 from aesi.calibration import Calibration, Conditions, calibrate
 from aesi.calibration.fit import OnStep
 from aesi.calibration.parameters import check_names
-from aesi.calibration.records.prepared import with_temperatures
+from aesi.calibration.records.prepared import check_flows, with_temperatures
 from aesi.calibration.records.sizes import sizes_sentence
 from aesi.calibration.records.spectra import BAND_HZ, check_spectra
 from aesi.calibration.result import RecordError
@@ -199,7 +199,7 @@ def fit_traces(found: Calibration) -> tuple[DiscoveryTrace, ...]:
     for i, record in enumerate(model.records):
         rows = record.rows
         start, simulated, fitted = (
-            model.run(i, *states[name])[0] for name in ("declared", "simulated", "fitted")
+            model.run(i, *states[name]).voltage_v for name in ("declared", "simulated", "fitted")
         )
         capacity_ah = found.cell.capacity_ah * found.capacities[record.name]
         soc = start_soc(model, x, i) - rows.discharged_ah(record.hold) / capacity_ah
@@ -235,11 +235,7 @@ def check_records(measurements: Sequence[Measurement], temperatures_degc: Mappin
                 f"{record.name} lasts {stamp(span_s)} s, in which neither diffusion nor the slope of the open-circuit "
                 f"voltage shows; give records of at least {SHORTEST_S:g} s."
             )
-        if not record.current_a.any():
-            raise DataError(
-                f"{record.name}: the current is 0 A in all {len(record):,} rows, so that no parameter shows; leave the "
-                "record out, or check the column of the current."
-            )
+        check_flows(record)
     for name, value in (temperatures_degc or {}).items():
         check_temperature(value, f"the temperature of {name}")
         if np.ndim(value):

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from aesi.constants import SECONDS_PER_HOUR
-from aesi.errors import InputError
+from aesi.errors import InputError, not_written
 from aesi.numerics.files.whole import write_whole
 from aesi.physics import Cell, ModelName
 from aesi.physics.arguments import check_choice
@@ -206,7 +206,7 @@ def _write(path: Path, text: str) -> Path:
     try:
         write_whole(path, text)
     except OSError as error:
-        raise InputError(f"{path} cannot be written: {error.strerror or error}.") from None
+        raise InputError(not_written(path, error)) from None
     return path
 
 

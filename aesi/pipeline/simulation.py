@@ -16,7 +16,7 @@ from aesi.constants import ZERO_CELSIUS_K
 from aesi.data.convert import write_csv
 from aesi.data.current import CurrentProfile, read_current
 from aesi.data.reading import Reading, record_name
-from aesi.errors import DataError, InputError, SimulationError
+from aesi.errors import DataError, InputError, SimulationError, not_written
 from aesi.numerics.typing import Array
 from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, initial_state, simulate
 from aesi.physics.cell import Soh
@@ -329,4 +329,4 @@ def _write(path: Path, frame: pd.DataFrame) -> None:
     try:
         write_csv(path, frame, DIGITS)
     except OSError as error:
-        raise InputError(f"{path} cannot be written: {error.strerror or error}.") from None
+        raise InputError(not_written(path, error)) from None

@@ -205,11 +205,7 @@ def discover(
 
     inferred: dict[int, InferredHold] = {}
     problem, tested = problem_with(), tests_with(inferred)
-    check_compared(problem)
-    records, declared = problem.records, ModelState(problem)
-    for index, record in enumerate((*records, *tested)):
-        run = declared.simulated(record, index if index < len(records) else None, thin=True)
-        check_same_cell(problem, record, run)
+    _check_case(problem, tested)
     spent = _Spent(progress)
 
     def search(
@@ -236,6 +232,16 @@ def discover(
         time.perf_counter() - began,
     )
     return found if max_effects else replace(found, tried=())
+
+
+def _check_case(problem: InverseProblem, tested: Sequence[PreparedRecord]) -> None:
+    """Raises DataError where a record, fitted or not, seems to be of another cell, and where no known-good record has
+    been at the states of charge of the others."""
+    check_compared(problem)
+    declared = ModelState(problem)
+    numbers = [*range(len(problem.records)), *[None] * len(tested)]
+    for number, record in zip(numbers, (*problem.records, *tested), strict=True):
+        check_same_cell(problem, record, declared.simulated(record, number, thin=True))
 
 
 def _hold_of_test(

@@ -97,14 +97,17 @@ def test_help_loads_nothing_heavy():
     assert done.stdout.strip() == "[]"
 
 
-def test_reading_an_experiment_loads_none_of_what_its_stages_need():
+@pytest.mark.parametrize(
+    "work",
+    [
+        f"import flows.jobs.start as start; start.RunRequest({str(ROOT / 'experiments' / 'smoke.yaml')!r}).config",
+        "import aesi.pipeline.discovery.cases, flows.jobs.start",
+    ],
+    ids=["experiment", "discovery"],
+)
+def test_what_comes_before_the_stages_loads_none_of_what_they_need(work):
     heavy = {"scipy.stats", "scipy.signal", "sklearn", "pandas", "plotly", "prefect", "mlflow", "optuna"}
-    code = f"""
-import sys
-from flows.jobs.start import RunRequest
-RunRequest({str(ROOT / "experiments" / "smoke.yaml")!r}).config
-print(sorted({heavy} & set(sys.modules)))
-"""
+    code = f"{work}; import sys; print(sorted({heavy} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
 

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from aesi.calibration.records.spectra import degc_of, state_of
-from aesi.constants import MILLI, ZERO_CELSIUS_K
+from aesi.constants import MILLI, PERCENT, ZERO_CELSIUS_K
 from aesi.errors import DataError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
@@ -37,8 +37,6 @@ HALF_CHARGE = 0.5
 """State of charge at which spectra are compared."""
 FAST = 1e6
 """Factor on the rate constants that makes the resistance of the kinetics negligible. A convention."""
-PERCENT = 100.0
-"""Per cent in a share of one."""
 
 
 @dataclass(frozen=True)

@@ -14,10 +14,8 @@ from aesi.constants import ZERO_CELSIUS_K
 from aesi.data.thinning import Averaged, Runs
 from aesi.errors import DataError
 from aesi.numerics.typing import Array, BoolArray
-from aesi.over_time import stamp
 from aesi.physics.cell import Cell
 from aesi.physics.initial_state import InitialState, initial_state
-from aesi.physics.record_checks import SOC_MARGIN
 from aesi.physics.rest.open_circuit import GOOD_READING_V
 from aesi.physics.simulation import ModelName
 from aesi.records import Hold, Measurement, at_its_temperature, hold_sentence
@@ -111,6 +109,15 @@ def _prepared(
     )
 
 
+def check_flows(record: Measurement) -> None:
+    """Raises DataError for a record in which no current flows."""
+    if not record.current_a.any():
+        raise DataError(
+            f"{record.name}: the current is 0 A in all {len(record):,} rows, so that no parameter shows; leave the "
+            "record out, or check the column of the current."
+        )
+
+
 def fitted_rows_sentence(record: Prepared) -> str:
     """A sentence on the rows that are fitted and how the current runs between them."""
     declared = record.data.hold
@@ -168,15 +175,6 @@ def with_temperatures(
     return tuple(out), tuple(notes)
 
 
-def check_charge(cell: Cell, record: Prepared) -> None:
-    """Raises DataError for a record whose charge takes the cell far beyond full or empty."""
-    rows = record.rows
-    soc = record.start.soc - rows.discharged_ah(record.hold) / cell.capacity_ah
-    wrong = (soc < -SOC_MARGIN) | (soc > 1.0 + SOC_MARGIN)
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        raise DataError(
-            f"{record.name}: the charge moved takes the cell to a state of charge of {100 * soc[row]:.0f} % at "
-            f"{stamp(rows.time_s[row])} s, from {100 * record.start.soc:.0f} % at the start and with "
-            f"{cell.capacity_ah:.3g} Ah; check the cell file, --soc0 and the sign and unit of the current."
-        )
+def kelvin_taken(cell: Cell, record: Prepared) -> float:
+    """Mean temperature of a record, K; the file's where the record tells none."""
+    return cell.initial_temperature_k if record.mean_kelvin is None else record.mean_kelvin

@@ -42,14 +42,17 @@ def capacity_test_ah(cell: Cell, record: Measurement) -> float | None:
     return charge_ah if warm and fastest_a <= FASTEST_C * charge_ah else None
 
 
-def other_sizes(cell: Cell, records: Sequence[Measurement], file_ah: float = 0.0) -> dict[str, float]:
+def other_sizes(cell: Cell, records: Sequence[Measurement]) -> dict[str, float]:
     """Name of a record -> charge of its full discharge, Ah, for those that take less than `OF_ONE_CELL` of the largest
-    one; empty where none does.  file_ah : capacity in the cell's file, which counts as a full discharge; 0 for none."""
-    return _smaller(_capacities_ah(cell, records), file_ah)
+    one; empty where none does."""
+    return _smaller(_capacities_ah(cell, records))
 
 
 def sizes_sentence(cell: Cell, records: Sequence[Measurement], file_ah: float = 0.0) -> str:
-    """A sentence on the records that `other_sizes` has; '' where there is none."""
+    """A sentence on the records that `other_sizes` has; '' where there is none.
+
+    file_ah : capacity in the cell's file, which counts as a full discharge; 0 for none.
+    """
     capacities = _capacities_ah(cell, records)
     others = _smaller(capacities, file_ah)
     if not others:
@@ -73,6 +76,6 @@ def _capacities_ah(cell: Cell, records: Sequence[Measurement]) -> dict[str, floa
     return {name: charge for name, charge in found.items() if charge is not None}
 
 
-def _smaller(capacities_ah: Mapping[str, float], file_ah: float) -> dict[str, float]:
+def _smaller(capacities_ah: Mapping[str, float], file_ah: float = 0.0) -> dict[str, float]:
     largest = max([file_ah, *capacities_ah.values()])
     return {name: charge for name, charge in capacities_ah.items() if charge < OF_ONE_CELL * largest}

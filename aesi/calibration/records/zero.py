@@ -27,7 +27,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aesi.calibration.start import LONG_CHARGE
-from aesi.constants import SECONDS_PER_HOUR
+from aesi.constants import MILLI, SECONDS_PER_HOUR
 from aesi.errors import DataError
 from aesi.numerics.typing import Array, BoolArray
 from aesi.physics.cell import Cell
@@ -107,7 +107,7 @@ def zero_of(cell: Cell, records: Sequence[Measurement]) -> Zero:
         sds.append(sd)
         sentences.append(
             f"{record.name}: nearly full at both ends; by its charge balance its current reads "
-            f"{1e3 * abs(mean):.1f} +/- {1e3 * sd:.1f} mA too {'high' if mean > 0.0 else 'low'}."
+            f"{MILLI * abs(mean):.1f} +/- {MILLI * sd:.1f} mA too {'high' if mean > 0.0 else 'low'}."
         )
     if not means:
         typical_a = ZERO_SHARE * max(float(np.abs(r.current_a).max()) for r in records)

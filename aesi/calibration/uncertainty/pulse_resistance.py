@@ -17,9 +17,8 @@ from itertools import groupby
 
 import numpy as np
 
-from aesi.calibration.fit import kelvin_taken
 from aesi.calibration.parameters import with_parameters
-from aesi.calibration.records.prepared import Prepared
+from aesi.calibration.records.prepared import Prepared, kelvin_taken
 from aesi.calibration.result import NINETY_FIVE, Calibration
 from aesi.calibration.uncertainty.propagated import STEP, propagated_variance
 from aesi.calibration.written_cell import written_cell

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.optimize import nnls
 from scipy.special import betainc
 
-from aesi.constants import SECONDS_PER_HOUR
+from aesi.constants import MILLI, SECONDS_PER_HOUR
 from aesi.data import units
 from aesi.data.channels.checks import MOST_RELAXED_V, Columns, Context
 from aesi.data.channels.gaps import find_gaps
@@ -114,7 +114,7 @@ def check_scale(columns: Columns, context: Context) -> None:
         if resistance is not None and moved * resistance > HIGHEST_CHARGE_RESISTANCE_OHM_AH:
             raise DataError(
                 f"{context.at('time_s', len(time) - 1)}: {moved:.4g} Ah would have moved, which "
-                f"a cell that shows {resistance * 1e3:.3g} mohm at the steps of its current does not hold: "
+                f"a cell that shows {MILLI * resistance:.3g} mohm at the steps of its current does not hold: "
                 f"{unit_clause(context, 'the time is in ms', time_s='ms')}."
             )
         if resistance is not None:
@@ -152,15 +152,15 @@ def _check_slide(columns: Columns, context: Context, moved_ah: float, resistance
     slide, last = _slide_v(columns, slower), len(columns["time_s"]) - 1
     if slide > CLEAR_SLIDE_V and moved_ah * slower < LEAST_CHARGE_RESISTANCE_AH_A * slide:
         raise DataError(
-            f"{context.at('time_s', last)}: the voltage slides by {slide:.2f} V while {1e3 * moved_ah:.3g} mAh move in "
-            f"{columns['time_s'][last] - columns['time_s'][0]:.3g} s, of a cell that shows {slower * 1e3:.3g} "
+            f"{context.at('time_s', last)}: the voltage slides by {slide:.2f} V while {MILLI * moved_ah:.3g} mAh move "
+            f"in {columns['time_s'][last] - columns['time_s'][0]:.3g} s, of a cell that shows {MILLI * slower:.3g} "
             f"mohm at the steps of its current: {_longer_unit_clause(columns, context)}."
         )
     slide = _slide_v(columns, resistance_ohm)
     if moved_ah * resistance_ohm > MOST_CHARGE_RESISTANCE_AH_A * max(slide, FLAT_V):
         raise DataError(
             f"{context.at('time_s', last)}: {moved_ah:.4g} Ah would have moved while the voltage slides by {slide:.2f} "
-            f"V, of a cell that shows {resistance_ohm * 1e3:.3g} mohm at the steps of its current: "
+            f"V, of a cell that shows {MILLI * resistance_ohm:.3g} mohm at the steps of its current: "
             f"{unit_clause(context, 'the time is in ms', time_s='ms')}."
         )
 

@@ -21,10 +21,8 @@ from aesi.records import Hold
 def run_plain(
     model: EspmModel, time: Array, current: Array, soc0: float, hold: Hold
 ) -> tuple[Array, int, int]:
-    """(rows (7, n), sample of the first fault (-1 for none), its kind); a fault is a surface or salt out of range.
-
-    Rows: voltage, surface stoichiometries (n, p), c_e0, c_eL, mean stoichiometries (n, p).
-    """
+    """(rows (7, n), `SolvedRows`; sample of the first fault (-1 for none); its kind): a fault is a surface or salt out
+    of range."""
     from aesi.physics.espm.plain_kernels import step_plain_record
 
     out = np.empty((7, len(time)))

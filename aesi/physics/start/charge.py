@@ -12,7 +12,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import ndtr
 
+from aesi.errors import DataError
 from aesi.numerics.typing import Array
+from aesi.over_time import stamp
+from aesi.physics.cell import Cell
 from aesi.physics.record_checks import SOC_MARGIN
 from aesi.physics.start.state import InitialState
 from aesi.records import Hold, Measurement
@@ -52,6 +55,22 @@ def charge_admits(soc: float, record: Measurement, hold: Hold, capacity_ah: floa
     """Whether a record that begins at this state of charge stays within `SOC_MARGIN` of empty and full in every row."""
     low, high = _start_bounds(record.discharged_ah(hold) / capacity_ah)
     return bool(low <= soc <= high)
+
+
+def check_charge(cell: Cell, record: Measurement, soc0: float, hold: Hold) -> None:
+    """Raises DataError for a record whose charge takes the cell more than `SOC_MARGIN` beyond empty or full.
+
+    soc0 : state of charge at its first row.  hold : how its current runs between its rows.
+    """
+    soc = soc0 - record.discharged_ah(hold) / cell.capacity_ah
+    beyond = (soc < -SOC_MARGIN) | (soc > 1.0 + SOC_MARGIN)
+    if beyond.any():
+        row = int(np.argmax(beyond))
+        raise DataError(
+            f"{record.name}: the charge moved takes the cell to a state of charge of {100 * soc[row]:.0f} % at "
+            f"{stamp(record.time_s[row])} s, from {100 * soc0:.0f} % at the start and with {cell.capacity_ah:.3g} Ah; "
+            "check the cell file, soc0 and the sign and unit of the current."
+        )
 
 
 def _start_bounds(moved: Array) -> Array:

@@ -20,6 +20,7 @@ from aesi.data.resample import is_even, is_sparse, to_even
 from aesi.errors import CellError, DataError, InputError, SimulationError
 from aesi.numerics.typing import Array, BoolArray, Numbers
 from aesi.numerics.visited import Visited
+from aesi.over_time import stamp
 from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
 from aesi.physics.arguments import check_cell, check_choice, checked_effects, checked_soc
 from aesi.physics.cell import Soh
@@ -195,7 +196,7 @@ class HybridModel:
         if one_step and not np.isfinite(measured).all():
             row = int(np.flatnonzero(~np.isfinite(measured))[0])
             raise DataError(
-                f"voltage_v has no value at {record.time_s[row]:g} s ({row_words(row)}); predict the parts before "
+                f"voltage_v has no value at {stamp(record.time_s[row])} s ({row_words(row)}); predict the parts before "
                 "and after the gap as records of their own, or leave voltage_v out for a free run."
             )
         from_first = error0_v is None and np.isfinite(measured[:1]).any()

@@ -35,7 +35,7 @@ their root mean square, and their largest is 1.1 to 1.9 times beyond; the start 
 BESIDE = 0.05
 """Largest distance of a measured pulse from a state of charge at which it is drawn beside the model's. A convention:
 half of what pulse tests step by."""
-KNOT, PERCENT = "_at_", "_percent"
+KNOT, PLACE_ENDS = "_at_", "_percent"
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,5 +210,5 @@ def _knots(parameters: Sequence[Row]) -> dict[tuple[str, str], list[tuple[float,
         course, is_knot, place = row["name"].partition(KNOT)
         side, _, what = course.partition(".")
         if is_knot and what in COURSES and side in SIDES:
-            found.setdefault((what, side), []).append((float(place.removesuffix(PERCENT)), row))
+            found.setdefault((what, side), []).append((float(place.removesuffix(PLACE_ENDS)), row))
     return {key: sorted(knots, key=lambda knot: knot[0]) for key, knots in found.items()}

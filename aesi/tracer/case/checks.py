@@ -6,13 +6,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from aesi.constants import MV_PER_V
 from aesi.errors import AesiError, DataError
 from aesi.numerics.typing import Array
+from aesi.over_time import stamp
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect
-from aesi.physics.record_checks import SOC_MARGIN
+from aesi.physics.start.charge import check_charge
 from aesi.records import Run
-from aesi.records.checked import row_words
 from aesi.tracer.case.blocks import BLOCKS
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import PreparedRecord
@@ -62,16 +63,7 @@ def check_record(cell: Cell, record: PreparedRecord) -> None:
             f"{record.name}: the current never exceeds {rate:.2g} C, so the cell does not respond and nothing can be "
             "decided; give data with load steps."
         )
-    charge = record.soc0 - record.data.discharged_ah(record.hold) / cell.capacity_ah
-    wrong = (charge < -SOC_MARGIN) | (charge > 1.0 + SOC_MARGIN)
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        at, soc, start = record.data.time_s[row], 100.0 * charge[row], 100.0 * record.soc0
-        raise DataError(
-            f"{record.name}: the charge moved takes the cell to a state of charge of {soc:.0f} % at {at:g} s "
-            f"({row_words(row)}), from {start:.0f} % at the start and with {cell.capacity_ah:.3g} Ah; check the cell "
-            "file, soc0 and the sign and unit of the current."
-        )
+    check_charge(cell, record.data, record.soc0, record.hold)
 
 
 def check_same_cell(problem: InverseProblem, record: PreparedRecord, declared: Run) -> None:
@@ -91,10 +83,12 @@ def check_same_cell(problem: InverseProblem, record: PreparedRecord, declared: R
         if _typical_v(record, run.voltage_v) <= FOREIGN_CELL_V:
             return
     empty = declared.series["depleted"] > 0.0
-    ends = f", and runs empty or full at {record.thin.time_s[np.argmax(empty)]:g} s" if empty.any() else ""
+    ends = (
+        f", and runs empty or full at {stamp(record.thin.time_s[np.argmax(empty)])} s" if empty.any() else ""
+    )
     raise DataError(
-        f"{record.name}: the model of {problem.cell.name} is {1e3 * typical:.0f} mV off in the median, which no single "
-        f"effect does{ends}; the file seems to come from another cell, or soc0 or the temperature is wrong."
+        f"{record.name}: the model of {problem.cell.name} is {MV_PER_V * typical:.0f} mV off in the median, which no "
+        f"single effect does{ends}; the file seems to come from another cell, or soc0 or the temperature is wrong."
     )
 
 

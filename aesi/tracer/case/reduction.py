@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aesi.constants import MV_PER_V
 from aesi.numerics.metrics import rms
 from aesi.physics.simulation import ModelName
 from aesi.tracer.case.free_parameter import STATE_OF_CHARGE
@@ -65,8 +66,8 @@ class Reduction:
         times = self.shift_v / self.noise_v
         return (
             f"the porous electrode (dfn) and the single particle (espm) of {self.of} differ by "
-            f"{1e3 * self.shift_v:.2f} mV RMS here, {f'{times:.0f}' if times >= 10.0 else f'{times:.2g}'} times the "
-            f"noise of the rows that are fitted ({1e3 * self.noise_v:.2f} mV)"
+            f"{MV_PER_V * self.shift_v:.2f} mV RMS here, {f'{times:.0f}' if times >= 10.0 else f'{times:.2g}'} times "
+            f"the noise of the rows that are fitted ({MV_PER_V * self.noise_v:.2f} mV)"
         )
 
 

@@ -116,7 +116,7 @@ def _left_out_residuals(
     return left_v, (record.thin.voltage_v - seen.voltage_v)[: record.n_fit][out]
 
 
-def range_fault(state: ModelState, rates_c: Sequence[float] = (*ORDINARY_C, *FAST_C)) -> str | None:
+def range_fault(state: ModelState, rates_c: Sequence[float]) -> str | None:
     """Why the model fails on a full discharge or charge that the declared model can run, a sentence; None where it runs
     them all: at these C-rates, at the temperatures of the records.
 

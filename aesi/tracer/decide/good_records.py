@@ -15,6 +15,7 @@ from functools import partial
 
 import numpy as np
 
+from aesi.constants import MV_PER_V
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import BoolArray
 from aesi.tracer.case.problem import InverseProblem
@@ -151,14 +152,15 @@ def verdict_beside(path: Path, thresholds: Thresholds) -> Verdict:
     allowed = allowed_error.allowed_v
     groups, margin = look_alikes(path, thresholds) if named else ((), -best_gain(path))
     others = ", ".join(r.name for r in problem.records if not r.good)
-    after = f" without the finding, {1e3 * left:.1f} mV with it" if named else ""
+    after = f" without the finding, {MV_PER_V * left:.1f} mV with it" if named else ""
     reason = (
-        f"the error on unseen data of {others} is {1e3 * before:.1f} mV beyond the noise{after}; it is "
-        f"{1e3 * allowed_error.good_v:.1f} mV on the good records"
+        f"the error on unseen data of {others} is {MV_PER_V * before:.1f} mV beyond the noise{after}; it is "
+        f"{MV_PER_V * allowed_error.good_v:.1f} mV on the good records"
     )
     if left > allowed:
         reason += (
-            f", and chance makes it at most {1e3 * allowed:.1f} mV: a part of the difference is not explained"
+            f", and chance makes it at most {MV_PER_V * allowed:.1f} mV: a part of the difference is not "
+            "explained"
         )
         if not named:
             margin = float(np.log(left / allowed))

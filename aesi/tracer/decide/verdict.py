@@ -11,6 +11,7 @@ from typing import Literal
 
 import numpy as np
 
+from aesi.constants import MV_PER_V
 from aesi.numerics.typing import Array
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.problem import InverseProblem
@@ -163,8 +164,8 @@ def verdict_on(path: Path, thresholds: Thresholds) -> Verdict:
     if left > allowed:
         margin = float(np.log(left / allowed))
         reason = (
-            f"the error on unseen data is {1e3 * left:.2f} mV beyond the noise, {_tried_words(path)} (a right model "
-            f"leaves at most {1e3 * allowed:.2f} mV)"
+            f"the error on unseen data is {MV_PER_V * left:.2f} mV beyond the noise, {_tried_words(path)} (a right "
+            f"model leaves at most {MV_PER_V * allowed:.2f} mV)"
         )
         return Verdict("unknown", (), (), 0.0, left, allowed, reason, margin)
     if not path.chosen.hypothesis:
@@ -176,8 +177,8 @@ def verdict_on(path: Path, thresholds: Thresholds) -> Verdict:
     )
     if tested < thresholds.predicted_share:
         reason = (
-            f"{' + '.join(path.chosen.hypothesis)} fits the data to {1e3 * left:.2f} mV beyond the noise, but these "
-            f"data hardly test it: where a range of {RANGE_OF[by]} is left out of the fit, it predicts only "
+            f"{' + '.join(path.chosen.hypothesis)} fits the data to {MV_PER_V * left:.2f} mV beyond the noise, but "
+            f"these data hardly test it: where a range of {RANGE_OF[by]} is left out of the fit, it predicts only "
             f"{100 * tested:.0f} % of the rows there; add a record with other currents"
         )
         return Verdict("unknown", (), (), 0.0, left, allowed, reason, 0.0)
@@ -193,13 +194,13 @@ def explained_words(path: Path, left_v: float, allowed_v: float) -> str:
     """
     if not path.chosen.hypothesis:
         return (
-            f"the error on unseen data is {1e3 * left_v:.2f} mV beyond the noise, and a right model leaves at most "
-            f"{1e3 * allowed_v:.2f} mV"
+            f"the error on unseen data is {MV_PER_V * left_v:.2f} mV beyond the noise, and a right model leaves at "
+            f"most {MV_PER_V * allowed_v:.2f} mV"
         )
     before_v = structured_v(path, path.base)
     return (
-        f"the error on unseen data is {1e3 * before_v:.2f} mV beyond the noise without the finding, "
-        f"{1e3 * left_v:.2f} mV with it"
+        f"the error on unseen data is {MV_PER_V * before_v:.2f} mV beyond the noise without the finding, "
+        f"{MV_PER_V * left_v:.2f} mV with it"
     )
 
 
@@ -217,8 +218,8 @@ def partly_explained(path: Path, verdict: Verdict, thresholds: Thresholds) -> Ve
     before, left = structured_v(path, path.base), structured_v(path, path.chosen)
     groups, margin = look_alikes(path, thresholds)
     reason = (
-        f"{' + '.join(path.chosen.hypothesis)} reduces the error on unseen data from {1e3 * before:.1f} to "
-        f"{1e3 * left:.1f} mV beyond the noise, by more than the usual error of models of measured cells"
+        f"{' + '.join(path.chosen.hypothesis)} reduces the error on unseen data from {MV_PER_V * before:.1f} to "
+        f"{MV_PER_V * left:.1f} mV beyond the noise, by more than the usual error of models of measured cells"
     )
     if left > verdict.tolerance_v:
         reason += "; no effect that was tried explains the rest"

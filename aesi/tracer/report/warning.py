@@ -10,6 +10,7 @@ import numpy as np
 from aesi.advice import listed
 from aesi.constants import MV_PER_V
 from aesi.numerics.metrics import rms
+from aesi.over_time import stamp
 from aesi.tracer.decide.model_to_write import AS_GOOD
 from aesi.tracer.decide.verdict import Verdict, beyond_noise
 from aesi.tracer.report.outcome import NAMES, FileOutcome, State
@@ -61,8 +62,8 @@ def _of_unsimulated(files: Sequence[FileOutcome]) -> Iterator[str]:
             models.setdefault(why, []).append(NAMES[state])
         for why, names in models.items():
             part = "the test part" if f.part == "test" else "the fitted part"
-            have = "has no figure" if len(names) == 1 else "have no figures"
-            yield f"{' and '.join(names)} {have} on {part} of {f.name}, where it cannot be simulated: {why}"
+            have, each = ("has no figure", "it") if len(names) == 1 else ("have no figures", "they")
+            yield f"{listed(names)} {have} on {part} of {f.name}, where {each} cannot be simulated: {why}"
 
 
 def _of_contradiction(files: Sequence[FileOutcome], verdict: Verdict) -> str | None:
@@ -123,7 +124,9 @@ def _of_rest(tests: Sequence[FileOutcome], rest_a: float) -> str | None:
 
 def _advice(files: Sequence[FileOutcome]) -> str:
     """What to look at first where the test part contradicts a verdict."""
-    ran_out = [f"{f.name} at {f.emptied_s['after']:g} s" for f in _tests(files) if "after" in f.emptied_s]
+    ran_out = [
+        f"{f.name} at {stamp(f.emptied_s['after'])} s" for f in _tests(files) if "after" in f.emptied_s
+    ]
     if ran_out:
         where = ", ".join(ran_out)
         return f"The model runs empty or full on {where}: check capacity (soh), soc0 and temperature first."

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.fit import FittedHypothesis
@@ -80,4 +80,4 @@ def wrong_sds(parameters: int) -> float:
     """Number of standard deviations that any of so many normal deviates exceeds with probability `FAMILY_WISE` (Sidak,
     J. Am. Stat. Assoc. 62 (1967) 626)."""
     each = 1.0 - (1.0 - FAMILY_WISE) ** (1.0 / max(parameters, 1))
-    return float(norm.isf(0.5 * each))
+    return -float(ndtri(0.5 * each))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aesi.calibration import Conditions, calibrate
-from aesi.calibration.fit import prepared_model
+from aesi.calibration.prepared_model import prepared_model
 from aesi.calibration.records.temperature import against_temperature
 from aesi.physics import simulate
 from aesi.records import Measurement

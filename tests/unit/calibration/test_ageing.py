@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from aesi.calibration.ageing import LOADED_SD, LOSS_SD, SLOW_SD, Ageing
-from aesi.calibration.fit import prepared_model
+from aesi.calibration.prepared_model import prepared_model
 from aesi.calibration.records.conditions import Conditions
 from aesi.errors import DataError
 

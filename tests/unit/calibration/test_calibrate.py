@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from aesi.calibration import calibrate
-from aesi.calibration.fit import _moved_start_sentences, prepared_model
+from aesi.calibration.fit_sentences import moved_start_sentences
 from aesi.calibration.model import ERROR_V, REPEATS
 from aesi.calibration.parameters import FitParameter, free_parameters, with_priors
+from aesi.calibration.prepared_model import prepared_model
 from aesi.calibration.records.conditions import Conditions, Prior
 from aesi.calibration.result import at_bounds, information_weights, intervals
 from aesi.calibration.start import full_discharge_numbers, scaled_to_discharge, size_assumed
@@ -130,7 +131,7 @@ def test_a_given_start_that_is_another_state_of_charge_in_the_written_cell_is_to
     records = [
         SimpleNamespace(name=name, start=start) for name, start in (("a", given), ("b", given), ("c", read))
     ]
-    told = _moved_start_sentences(SimpleNamespace(records=records), {"a": 0.8572, "b": 0.8503, "c": 0.8572})
+    told = moved_start_sentences(SimpleNamespace(records=records), {"a": 0.8572, "b": 0.8503, "c": 0.8572})
     assert told == (
         "a starts at a state of charge of 0.8572 of the written cell, in which empty is the rest at its lower cut-off: "
         "by the start file it is the 0.85 that was given.",
@@ -522,7 +523,7 @@ def test_a_file_that_is_fuller_than_most_cells_started_from_another_one(start):
 
 def test_a_record_without_a_current_is_refused_by_its_name(start, records):
     rest = replace(records[0], current_a=np.zeros(len(records[0])), name="rest")
-    with pytest.raises(DataError, match="rest: no current flows in it"):
+    with pytest.raises(DataError, match="rest: the current is 0 A in all"):
         calibrate(start, [records[0], rest])
 
 

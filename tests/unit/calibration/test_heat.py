@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aesi.calibration.fit import calibrate, prepared_model
+from aesi.calibration.fit import calibrate
 from aesi.calibration.heat import CaseRecord, case_records, fit_heat, with_fitted_heat
 from aesi.calibration.model import Model
+from aesi.calibration.prepared_model import prepared_model
 from aesi.calibration.records.conditions import Conditions
 from aesi.errors import CellError, ParameterError
 from aesi.physics import Cell, simulate

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aesi.calibration.fit import prepared_model
+from aesi.calibration.prepared_model import prepared_model
 from aesi.calibration.records.conditions import Conditions
 from aesi.calibration.records.named import uniquely_named
 from aesi.calibration.written_cell import capacities

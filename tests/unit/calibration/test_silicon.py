@@ -6,7 +6,8 @@ from datetime import date
 import numpy as np
 import pytest
 
-from aesi.calibration.fit import calibrate, prepared_model
+from aesi.calibration.fit import calibrate
+from aesi.calibration.prepared_model import prepared_model
 from aesi.calibration.records.conditions import Conditions
 from aesi.calibration.silicon import SILICON_V, may_have_silicon, silicon_edge, with_silicon
 from aesi.physics import Cell, simulate

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from aesi.calibration import Conditions
-from aesi.calibration.fit import prepared_model
-from aesi.calibration.records.sizes import capacity_test_ah, other_sizes, sizes_sentence
+from aesi.calibration.prepared_model import prepared_model
+from aesi.calibration.records.sizes import capacity_test_ah, sizes_sentence
 from aesi.errors import DataError
 from aesi.physics import Cell
 from aesi.pipeline.calibrate import start_at_size
@@ -73,7 +73,7 @@ def test_a_discharge_in_the_cold_or_under_a_high_load_tells_no_size(m50, c_rate,
     assert (charge_ah is not None) == counts
     if counts:
         assert charge_ah == pytest.approx(2.7, rel=0.02)
-    assert bool(other_sizes(m50, [record], m50.capacity_ah)) == counts
+    assert bool(sizes_sentence(m50, [record], m50.capacity_ah)) == counts
 
 
 def test_a_part_of_a_discharge_and_an_aged_cell_are_not_noted(m50):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from aesi.calibration import Conditions, calibrate
-from aesi.calibration.fit import prepared_model
+from aesi.calibration.prepared_model import prepared_model
 from aesi.errors import DataError
 from aesi.numerics.metrics import rms
 from aesi.physics import impedance

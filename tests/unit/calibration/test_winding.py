@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aesi.calibration.fit import prepared_model
 from aesi.calibration.parameters import with_interfaces
+from aesi.calibration.prepared_model import prepared_model
 from aesi.calibration.records.conditions import Conditions
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.physics import Cell, simulate

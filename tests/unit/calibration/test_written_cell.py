@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from aesi.calibration.ageing import LOADED_SD, SLOW_SD
-from aesi.calibration.fit import prepared_model
 from aesi.calibration.parameters import with_interfaces
+from aesi.calibration.prepared_model import prepared_model
 from aesi.calibration.records.conditions import Conditions
 from aesi.calibration.written_cell import capacities, written_cell
 from aesi.physics import simulate

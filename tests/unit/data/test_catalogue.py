@@ -3,6 +3,7 @@
 import functools
 import hashlib
 import http.server
+import os
 import threading
 from dataclasses import replace
 
@@ -188,3 +189,15 @@ def test_a_set_that_was_copied_into_itself_lost_files_of_its_own(tmp_path, monke
     with pytest.raises(DataError, match=r"lies in .*, from where the set is copied"):
         catalogue.get("lg_m50t_w8", folder / "below")
     assert (folder / "below" / "udds.csv").read_text() == "below/udds.csv"
+
+
+def test_a_place_that_no_file_can_be_copied_to_was_refused_for_none(tmp_path, monkeypatch):
+    """The symptom: "OUT cannot be written: None.", since Python has no number for this error."""
+    folder, out = tmp_path / "lg_m50t_w8", tmp_path / "out"
+    folder.mkdir()
+    (folder / "udds.csv").write_text("x")
+    out.mkdir()
+    os.mkfifo(out / "udds.csv")
+    monkeypatch.setenv("AESI_DATA", str(tmp_path))
+    with pytest.raises(DataError, match=r"out cannot be written: .*udds.csv.* is a named pipe"):
+        catalogue.get("lg_m50t_w8", out)

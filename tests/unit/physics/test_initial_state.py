@@ -17,7 +17,7 @@ from aesi.physics.effect import Effect, Record, as_cell_saw
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.record_checks import SOC_MARGIN
 from aesi.physics.rest.open_circuit import GOOD_READING_V, READING_V, OpenCircuit
-from aesi.physics.start.charge import truncated_by_charge
+from aesi.physics.start.charge import check_charge, truncated_by_charge
 from aesi.physics.start.state import InitialState
 from aesi.records import Measurement
 
@@ -144,6 +144,17 @@ def test_what_a_voltage_leaves_open_the_charge_that_moves_tells():
     )
     wrong = replace(read, soc=0.3)
     assert truncated_by_charge(wrong, record(time, amperes, amperes), "backward", LFP.capacity_ah) is wrong
+
+
+def test_more_charge_than_the_cell_has_was_told_by_a_time_that_all_rows_share():
+    time = 1.7e9 + np.arange(0.0, 3601.0, 100.0)
+    hour = record(time, np.full(len(time), LFP.capacity_ah), np.full(len(time), 3.3))
+    first = int(np.argmax(np.arange(len(time)) / 36.0 > 0.5 + SOC_MARGIN))
+    with pytest.raises(DataError, match=rf"a state of charge of -14 % at {time[first]:.12g} s, from 50 % at"):
+        check_charge(LFP, hour, 0.5, "backward")
+    check_charge(LFP, hour, 1.0 - SOC_MARGIN, "backward")
+    with pytest.raises(DataError, match="114 %"):
+        check_charge(LFP, replace(hour, current_a=-hour.current_a), 0.5, "backward")
 
 
 def test_a_potential_that_rises_beyond_all_bounds_past_full_had_a_start_under_load_fail():

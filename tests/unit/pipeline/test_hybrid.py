@@ -58,6 +58,14 @@ def model(record):
     )
 
 
+def test_a_voltage_without_a_value_was_told_by_a_time_that_all_rows_share(model):
+    time = 1.7e9 + np.arange(300.0)
+    voltage = np.full(len(time), 3.7)
+    voltage[200] = np.nan
+    with pytest.raises(DataError, match=r"has no value at 1700000200 s \(row 201, counted from 1\)"):
+        model.predict(time, np.zeros(len(time)), voltage_v=voltage)
+
+
 def test_the_band_of_a_free_run_is_wider_by_what_the_start_is_uncertain_by(model, data):
     sure, unsure = (model.predict_record(data, SOC0, soc0_sd=sd) for sd in (0.0, 0.02))
     moved = [model.predict_record(data, SOC0 + off).physics_v - sure.physics_v for off in (-0.02, 0.02)]

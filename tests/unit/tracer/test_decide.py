@@ -19,7 +19,14 @@ from aesi.records import Measurement
 from aesi.tracer.case.blocks import blocks_of
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import prepare_all
-from aesi.tracer.decide.carry_over import LeftOut, full_course, left_out_errors, range_fault
+from aesi.tracer.decide.carry_over import (
+    FAST_C,
+    ORDINARY_C,
+    LeftOut,
+    full_course,
+    left_out_errors,
+    range_fault,
+)
 from aesi.tracer.decide.confidence import HIGHEST, FrequencyMap, fitted_map
 from aesi.tracer.decide.evidence import named_options, plausible_or_unknown
 from aesi.tracer.decide.model_to_write import (
@@ -284,7 +291,7 @@ def test_an_effect_is_admitted_by_the_largest_gain_on_surrogates(path):
 def test_what_was_fitted_carries_to_a_part_left_out(path):
     error = left_out_errors(path.problem, path.blocks, path.chosen)
     assert error.pooled_v < 1.3e-3 < left_out_errors(path.problem, path.blocks, None).pooled_v
-    assert range_fault(ModelState.of(path.problem, path.chosen)) is None
+    assert range_fault(ModelState.of(path.problem, path.chosen), (*ORDINARY_C, *FAST_C)) is None
 
 
 def test_harm_counts_as_far_as_the_start_of_a_record_left_out_is_known(cell, few, make):
@@ -449,7 +456,7 @@ def test_running_empty_at_the_end_of_a_discharge_is_no_fault(path, monkeypatch, 
 
     monkeypatch.setattr("aesi.tracer.decide.carry_over._course_end", end)
     moved = ModelState(path.problem, {"soc0": {"0": 0.9}})
-    assert range_fault(moved) == ("runs empty" if at_fault else None)
+    assert range_fault(moved, ORDINARY_C) == ("runs empty" if at_fault else None)
 
 
 @pytest.mark.parametrize(

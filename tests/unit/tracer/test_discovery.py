@@ -200,6 +200,17 @@ def test_a_cell_far_colder_than_its_file_is_not_taken_for_another_one(cell, make
             check_same_cell(problem, record, run)
 
 
+def test_a_run_that_ends_empty_was_told_by_a_time_that_all_rows_share(cell, make):
+    drive = make()
+    moved = replace(drive, time_s=drive.time_s + 1.7e9, voltage_v=drive.voltage_v - 2 * FOREIGN_CELL_V)
+    problem = inverse_problem(cell, [moved], 0.9, effects={})
+    (record,) = problem.records
+    run = problem.run(record.thin, 0.9, (), record.thin_hold)
+    depleted = np.where(np.arange(len(record.thin)) < 100, 0.0, 1.0)
+    with pytest.raises(DataError, match=rf"runs empty or full at {record.thin.time_s[100]:.12g} s"):
+        check_same_cell(problem, record, replace(run, series={**run.series, "depleted": depleted}))
+
+
 def test_no_measurement_is_refused(cell, few):
     with pytest.raises(DataError, match="at least one"):
         discover(cell, [], effects=few)

@@ -1,4 +1,4 @@
-"""Thinning, noise floor and continuations."""
+"""Thinning and continuations."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -10,7 +10,7 @@ from aesi.data.thinning import averaged_over
 from aesi.physics import simulate
 from aesi.records import Measurement
 from aesi.tracer.case.checks import check_record
-from aesi.tracer.case.records import leading_record, noise_floor_v, noise_of, prepare_all, prepare_test
+from aesi.tracer.case.records import leading_record, prepare_all, prepare_test
 from aesi.tracer.case.thinned import thinned_record, thinned_together
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.model_state import ModelState
@@ -145,28 +145,6 @@ def test_averages_are_not_noisier_than_the_rows_of_a_drive_that_never_rests(cell
     assert 1e-3 / np.sqrt(10.0) < record.noise_v < record.noise_full_v
 
 
-@pytest.mark.parametrize(("noise_v", "most_v"), [(2e-4, 7e-4), (1e-3, 1.3e-3)])
-def test_the_drop_of_a_current_that_is_never_steady_was_told_as_noise(cell, rng, noise_v, most_v):
-    """The symptom: 3.9 mV of noise in a US06 at 1 Hz, below which nothing was found."""
-    time = np.arange(1200.0)
-    current = 10.0 + np.convolve(rng.normal(0.0, 60.0, len(time)), np.ones(15) / 15, mode="same")
-    voltage = simulate(cell, time, current, soc0=0.8).voltage_v
-    told = noise_floor_v(voltage + noise_v * rng.normal(size=len(time)), current)
-    assert noise_v < told < most_v  # what is left is the answer of kinetics and diffusion
-
-
-def test_noise_floor_is_found_under_a_drive(rng):
-    n = 5000
-    current = np.repeat(rng.normal(0, 10, n // 50), 50)
-    voltage = 3.8 - 2e-3 * current + 1e-3 * rng.normal(size=n)
-    assert noise_floor_v(voltage, current) == pytest.approx(1e-3, rel=0.08)
-
-
-def test_quantised_data_have_at_least_the_noise_of_the_quantum():
-    voltage = np.round(np.linspace(4.0, 3.9, 3000), 2)
-    assert noise_floor_v(voltage, np.ones(3000)) >= 0.01 / np.sqrt(12) * 0.999
-
-
 def test_the_resolution_of_a_voltage_was_averaged_away_as_white_noise(cell):
     time = np.arange(6000.0)
     current = np.where((time > 600) & (time < 3000), 3.0, 0.0)
@@ -179,42 +157,6 @@ def test_the_resolution_of_a_voltage_was_averaged_away_as_white_noise(cell):
     assert np.count_nonzero(last) > 20  # rows of a rest that were rounded to one value
     together = np.sum(record.equivalent_white_v[last] ** -2.0) ** -0.5
     assert together > 0.9 * 5e-3 / np.sqrt(12.0)
-
-
-def test_noise_of_half_a_step_lets_means_tell_more_than_the_step(rng):
-    time = np.arange(20_000.0)
-    voltage = 3.7 + 1e-5 * np.arange(20_000.0) + 1e-3 * rng.normal(size=len(time))
-    data = Measurement(time, np.full(len(time), 3.0), 2e-3 * np.round(voltage / 2e-3), name="scattered")
-    noise = noise_of(data, 3.0)
-    assert noise.sd_v == pytest.approx(np.hypot(1e-3, 2e-3 / np.sqrt(12.0)), rel=0.05)
-    assert noise.sd_of_means_v(np.array([1.0, 100.0])) == pytest.approx(
-        noise.sd_v * np.array([1.0, 0.1]), rel=0.01
-    )
-
-
-def over_five_rows(values):
-    return np.convolve(values, np.ones(5) / np.sqrt(5.0), mode="same")
-
-
-@pytest.mark.parametrize("smooth", [over_five_rows, lambda values: np.repeat(values[::5], 5)])
-def test_the_noise_of_a_filtered_or_held_channel_was_told_from_neighbouring_rows(cell, make, rng, smooth):
-    data = make(n=6000)
-    clean = simulate(cell, data.time_s, data.current_a, 0.9).voltage_v
-    noise = smooth(rng.normal(size=len(data)))
-    channel = replace(data, voltage_v=clean + 1e-3 * noise)
-    assert noise_of(channel, 30.0).sd_v == pytest.approx(1e-3, rel=0.15)
-    assert noise_of(channel, 30.0).rows > 2
-    record = prepare_all(cell, [channel], 0.9, 0.0)[0]
-    assert record.noise_v == pytest.approx(1e-3, rel=0.15)
-    assert record.equivalent_white_v.min() > 1.4 * record.white_v.max()
-
-
-def test_neither_white_noise_nor_a_relaxing_voltage_is_taken_for_that_of_a_filter(cell, make):
-    data = make(n=6000)
-    clean = replace(data, voltage_v=simulate(cell, data.time_s, data.current_a, 0.9).voltage_v)
-    for one in (data, clean):
-        noise = noise_of(one, 30.0)
-        assert (noise.sd_v, noise.rows) == (noise_floor_v(one.voltage_v, one.current_a), 1)
 
 
 @pytest.mark.parametrize("degc", [None, 20.0])
@@ -274,13 +216,6 @@ def test_of_two_fitted_records_that_lead_to_a_test_the_one_it_begins_with_was_ju
     assert leading_record(whole, [first, whole.between(0, 600)])[0] == 1
     index, data = leading_record(whole.between(600, 900), [first, second])
     assert (index, data.time_s[0]) == (1, 300.0)
-
-
-def test_a_few_rows_that_are_off_make_no_noise():
-    rng = np.random.default_rng(5)
-    voltage = 3.7 + 1e-3 * rng.normal(size=20_000)
-    voltage[rng.choice(len(voltage), 200, replace=False)] += 0.03
-    assert noise_floor_v(voltage, np.full(len(voltage), 2.0)) == pytest.approx(1e-3, rel=0.05)
 
 
 def test_a_full_charge_left_out_begins_where_the_fitted_full_charges_do():

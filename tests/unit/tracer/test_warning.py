@@ -84,6 +84,18 @@ def test_a_test_part_on_which_the_model_runs_empty_is_not_said_to_lack_physics()
     first, *_ = warnings([emptied], verdict("found", "series_resistance"))
     assert "The model runs empty or full on drive at 320 s: check capacity" in first
     assert "Another effect" not in first
+    since_1970 = replace(outcome(0.9), emptied_s={"after": 1.7e9 + 320.0})
+    first, *_ = warnings([since_1970], verdict("found", "series_resistance"))
+    assert "on drive at 1700000320 s" in first
+
+
+def test_three_models_that_cannot_be_simulated_were_told_as_one():
+    why = dict.fromkeys(("before", "recalibrated", "after"), "the electrolyte ran out of salt.")
+    (told,) = warnings([replace(outcome(0.0), unsimulated=why)], verdict("unknown"))
+    assert told == (
+        "the declared model, the recalibrated model and the written model have no figures on the test part of drive, "
+        "where they cannot be simulated: the electrolyte ran out of salt."
+    )
 
 
 def test_a_written_model_that_does_worse_than_others_is_told_with_each_of_them():

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from aesi.advice import listed
+from aesi.constants import PERCENT
 from aesi.pipeline.report.views import Row
 from aesi.pipeline.report.words.discoveries import WITH_FINDING, states_of
 from aesi.pipeline.report.words.sizes import (
-    PERCENT,
     TELLING,
     capitalised,
     name_words,

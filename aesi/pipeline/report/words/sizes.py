@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from aesi.advice import listed
+from aesi.constants import PERCENT
 from aesi.parameters import Parameter
 from aesi.physics.effects import CATALOGUE
 
@@ -22,7 +23,6 @@ MOST_PARAMETERS = 3
 """Most parameters of an effect in one sentence."""
 PREFIXES = {"ohm": ("mohm", 1e3), "V": ("mV", 1e3), "A": ("mA", 1e3), "m": ("um", 1e6)}
 """Unit -> that of its thousandths or millionths, and how many make one."""
-PERCENT = 100.0
 SMALL = 0.5
 """Values below this, in their own unit, are written in thousandths."""
 TINY = 1e-4

@@ -7,8 +7,7 @@ from aesi.data.thinning import condensed
 from aesi.physics import simulate
 from aesi.physics.effects import CATALOGUE
 from aesi.records import Measurement
-from aesi.tracer.case.fit_simulation import fit_simulation
-from aesi.tracer.case.stepping import STEPS_A_SAMPLE, stepping
+from aesi.tracer.case.fit_simulation import STEPS_A_SAMPLE, fit_simulation, stepping
 from aesi.tracer.case.thinned import STEADY_SPACING, thinned_record
 
 
