@@ -169,7 +169,7 @@ def pulse_figure(content: Mapping[str, Any]) -> dict[str, Figure]:
     told = content["pulse_resistance"]
     fig = style.figure(
         "Resistance of a pulse over temperature",
-        "Lines: as the file predicts. Bands: 95 %, as the records leave it. A dotted line: no record is near. Crosses: "
+        "Lines: as the file predicts. Bands: 95 % intervals. A dotted line: no record is near. Crosses: "
         f"measured, pulses in the records within {100.0 * BESIDE:g} points of that charge.",
         400,
     )
