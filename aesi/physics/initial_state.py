@@ -32,7 +32,14 @@ from aesi.physics.arguments import checked_soc
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Record, as_cell_saw, instruments_first
-from aesi.physics.rest.open_circuit import CHARGED_V, GIVEN_SD, GOOD_READING_V, READING_V, OpenCircuit
+from aesi.physics.rest.open_circuit import (
+    BEYOND_V,
+    CHARGED_V,
+    GIVEN_SD,
+    GOOD_READING_V,
+    READING_V,
+    OpenCircuit,
+)
 from aesi.physics.rest.voltage import first_rows_v, freed_of_instruments, freed_of_series
 from aesi.physics.simulation import ModelName, model_with
 from aesi.physics.start.charge import charge_admits, truncated_by_charge
@@ -342,6 +349,7 @@ class _StartReading:
             doubt = "; check the voltage's sensor, and the cell file, which may be another cell's"
             if above_v - drop_v <= CHARGED_V:  # as it was read, the voltage is a full cell's
                 doubt = "; by its first row the cell may have dropped by less than the model does"
+        doubt = self._limits_doubt(ocv_v - drop_v) or doubt
         words = (
             f"{self.record.name} {how}, {near} the upper cut-off "
             f"({self.cell.upper_voltage_v:g} V): a full charge, state of charge 1 +/- {sd:.4f} "
@@ -354,6 +362,24 @@ class _StartReading:
             words,
             rest_voltage_v=rest_v,
             by_voltage=self._in_declared_windows(inside),
+        )
+
+    def _limits_doubt(self, ocv_v: float) -> str:
+        """A clause where state of charge 1 of the cell's file is no charge to its cut-off; empty elsewhere.
+
+        ocv_v : V, the open-circuit voltage as it was read.
+        """
+        full_v, cut_off_v = self.open_circuit.voltage_at(1.0), self.cell.upper_voltage_v
+        if full_v > cut_off_v + BEYOND_V:
+            off = f"{1e3 * (full_v - cut_off_v):.0f} mV above this cut-off"
+        elif full_v < min(ocv_v, cut_off_v) - BEYOND_V:
+            off = f"{1e3 * (ocv_v - full_v):.0f} mV below this record"
+        else:
+            return ""
+        return (
+            f"; but by the potentials and the stoichiometry limits of the cell's file a state of charge of 1 rests at "
+            f"{full_v:.3f} V, {off}: correct the cut-off, the potentials or the limits (aesi calibrate fits limits and "
+            "potentials), or give --soc0"
         )
 
     def _in_declared_windows(self, soc: float) -> float:

@@ -15,6 +15,7 @@ from aesi.physics.cell.bpx_transport import check_kinetics, check_transport
 from aesi.physics.cell.bpx_unread import (
     capacity_sentences,
     replaced_relation_sentences,
+    rising_potential_sentences,
     unread_field_sentences,
     version_0_sentences,
 )
@@ -66,6 +67,7 @@ def read_bpx(source: str | PathLike[str] | Mapping[str, Any], fitted: bool = Fal
             *cell.unread,
             *version_0_sentences(left_behind),
             *replaced_relation_sentences(cell),
+            *rising_potential_sentences(cell),
             *capacity_sentences(cell),
         ),
     )

@@ -268,6 +268,23 @@ def test_a_relation_that_does_not_hold_where_surfaces_and_salt_come_was_replaced
     assert "so that at rest, too, it stays at the last value" in short
 
 
+def test_two_rows_of_a_table_that_were_swapped_made_a_potential_rise_in_silence(content):
+    side = content["Parameterisation"]["Positive electrode"]
+    ocp = Cell.from_bpx(content).positive.ocp
+    x = np.linspace(0.0, 1.0, 101)
+    y = ocp(x)
+    side["OCP [V]"] = {"x": x.tolist(), "y": y.tolist()}
+    assert Cell.from_bpx(content).unread == ()
+    risen_v = y[49] - y[50]
+    y[[49, 50]] = y[[50, 49]]
+    side["OCP [V]"] = {"x": x.tolist(), "y": y.tolist()}
+    (said,) = Cell.from_bpx(content).unread
+    assert (
+        f"positive electrode rises by {1e3 * risen_v:.0f} mV between the stoichiometries 0.49 and 0.5,"
+        in said
+    )
+
+
 def test_a_potential_over_the_lithium_that_was_taken_out_is_refused(content):
     side = content["Parameterisation"]["Positive electrode"]
     side["OCP [V]"] = {"x": [0.0, 1.0], "y": [3.0, 4.4]}

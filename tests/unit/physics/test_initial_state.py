@@ -92,6 +92,22 @@ def test_a_rest_above_the_upper_cut_off_is_said_to_be_above_it():
     assert said.endswith("check the voltage's sensor, and the cell file, which may be another cell's.")
 
 
+@pytest.mark.parametrize(
+    ("cut_off_v", "rest_v", "off"),
+    [
+        (4.1, 4.08, "rests at 4.200 V, 100 mV above this cut-off"),
+        (4.1, 4.15, "rests at 4.200 V, 100 mV above this cut-off"),
+        (4.35, 4.33, "rests at 4.200 V, 130 mV below this record"),
+    ],
+)
+def test_limits_of_another_upper_cut_off_put_a_full_charge_elsewhere_without_a_word(cut_off_v, rest_v, off):
+    edited = LG_M50.with_cut_offs(LG_M50.lower_voltage_v, cut_off_v)
+    found = initial_state(edited, resting(rest_v))
+    assert found.basis == "full charge"
+    assert off in found.sentence
+    assert "limits" not in initial_state(LG_M50, resting(4.18)).sentence
+
+
 def test_a_cold_start_under_load_was_told_to_be_of_another_cell():
     """A drop that builds up over seconds is all there at once in a model without double layers."""
     amperes = 2.0 * LG_M50.capacity_ah

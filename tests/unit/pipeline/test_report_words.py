@@ -58,6 +58,24 @@ def test_an_error_of_661_mv_did_not_say_that_the_model_ran_empty(views):
     ).endswith("not how accurate it is.")
 
 
+def test_a_correction_was_judged_by_records_on_which_none_of_it_is_applied(views):
+    """'The correction removes 0.2 % ...', of a drive whose rows all lay below the charge that it was trained on."""
+    view = views.run_view(200)
+    physics, chosen, other = view.models
+
+    def finding(**kept):
+        records = {name: {"kept_pct": share, "outside_pct": 100.0} for name, share in kept.items()}
+        return runs.run_finding(replace(view, models=(physics, chosen | {"test_records": records}, other)))
+
+    before = runs.run_finding(view).removesuffix(".")
+    told = finding(empty=0.0, full=97.0)
+    assert told.startswith(
+        f"{before}; empty cannot show what the correction is worth, since none of it is applied"
+    )
+    assert finding(cold=0.4, empty=0.0).startswith(f"{before}; cold and empty cannot show")
+    assert finding(near=20.0, full=None) == f"{before}."
+
+
 def test_a_correction_that_does_not_beat_the_physics_it_was_learned_on_is_told_so(views):
     view = views.run_view(200)
     row = {"name": "ESPM recalibrated", "free_run": {"test_rmse_mv": 3.9}}

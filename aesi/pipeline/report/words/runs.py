@@ -7,7 +7,7 @@ import numpy as np
 from aesi.advice import listed
 from aesi.constants import MV_PER_V
 from aesi.over_time import stamp
-from aesi.pipeline.product.trained import ALL_PCT, trained_sentence
+from aesi.pipeline.product.trained import ALL_PCT, NONE_PCT, trained_sentence
 from aesi.pipeline.report.views import Row, RunView
 from aesi.records import Role
 
@@ -19,8 +19,9 @@ HUNDREDTHS = 2
 
 def run_finding(view: RunView) -> str:
     """A sentence on what the correction gains on the test records in free run, on where a mere refit does better,
-    and on the error before a simulation ran out, where one did."""
-    return f"{_gain_sentence(view).removesuffix('.')}{_refit_better(view)}{_ran_out(view)}."
+    on the records on which nothing of the correction is applied, and on the error before a simulation ran out."""
+    head = _gain_sentence(view).removesuffix(".")
+    return f"{head}{_refit_better(view)}{_not_applied(view)}{_ran_out(view)}."
 
 
 def _refit_better(view: RunView) -> str:
@@ -59,6 +60,21 @@ def _before_mv(view: RunView, role: Role, key: str) -> float | None:
     if after is None or taken is None or taken >= 100.0:
         return None
     return float(after / np.sqrt(1.0 - taken / 100.0))
+
+
+def _not_applied(view: RunView) -> str:
+    """Clause, from '; ' on, on the test records that say nothing of the correction, since it has faded there; '' where
+    there is none."""
+    records = (view.model(view.chosen) or {}).get("test_records") or {}
+    names = [
+        name for name, one in records.items() if (kept := one.get("kept_pct")) is not None and kept < NONE_PCT
+    ]
+    if not names:
+        return ""
+    return (
+        f"; {listed(names)} cannot show what the correction is worth, since none of it is applied so far outside the "
+        "range it was trained on: train on records that span the states of charge and temperatures of the test"
+    )
 
 
 def _ran_out(view: RunView) -> str:
