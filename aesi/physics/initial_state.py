@@ -371,9 +371,9 @@ class _StartReading:
         """
         full_v, cut_off_v = self.open_circuit.voltage_at(1.0), self.cell.upper_voltage_v
         if full_v > cut_off_v + BEYOND_V:
-            off = f"{1e3 * (full_v - cut_off_v):.0f} mV above this cut-off"
+            off = f"{MV_PER_V * (full_v - cut_off_v):.0f} mV above this cut-off"
         elif full_v < min(ocv_v, cut_off_v) - BEYOND_V:
-            off = f"{1e3 * (ocv_v - full_v):.0f} mV below this record"
+            off = f"{MV_PER_V * (ocv_v - full_v):.0f} mV below this record"
         else:
             return ""
         return (

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from aesi.constants import MV_PER_V
 from aesi.numerics.typing import Array
 from aesi.physics.cell.bpx_transport import inside_window
 from aesi.physics.cell.parts import (
@@ -45,7 +46,7 @@ OTHER_CAPACITY = 1.5
 to 1.01 in the files of ten cells."""
 RISES_V = 1e-3
 """Least rise of a potential towards a fuller electrode that is told, V: none in the window of any shipped file, 0.04 mV
-in eight published sets (of PyBaMM)."""
+in those of eight published sets (of PyBaMM)."""
 HYSTERESIS_STATE = "Initial hysteresis state"
 """Beginning of the names of the two fields, one per electrode."""
 BRANCHES = ("OCP (lithiation) [V]", "OCP (delithiation) [V]")
@@ -129,7 +130,7 @@ def rising_potential_sentences(cell: CellParameters) -> tuple[str, ...]:
         if risen_v[top] >= RISES_V:
             foot = int(np.argmin(potential_v[: top + 1]))
             sentences.append(
-                f"the potential of the {side} electrode rises by {1e3 * risen_v[top]:.0f} mV between the "
+                f"the potential of the {side} electrode rises by {MV_PER_V * risen_v[top]:.0f} mV between the "
                 f"stoichiometries {at[foot]:.4g} and {at[top]:.4g}, and should fall: correct it there; a state of "
                 "charge that is read from a voltage is wrong around it."
             )
