@@ -242,11 +242,17 @@ def _with_provenance(
 
 def _errors(model: Model, states: Mapping[FitState, tuple[Cell, Array]]) -> tuple[RecordError, ...]:
     """The RMSE of each record under each state of the cell."""
-    left_v = {name: [rms(error) for error in model.errors_of(*state)] for name, state in states.items()}
-    return tuple(
-        RecordError(r.name, _degc(r), left_v["declared"][i], left_v["fitted"][i], left_v["simulated"][i])
-        for i, r in enumerate(model.records)
-    )
+    errors_v = {name: model.errors_of(*state) for name, state in states.items()}
+    out = []
+    for i, record in enumerate(model.records):
+        before_v, after_v, simulated_v = (
+            rms(errors_v[name][i]) for name in ("declared", "fitted", "simulated")
+        )
+        at_s = model.ran_out_s(i, *states["simulated"])
+        until = errors_v["simulated"][i][: 0 if at_s is None else np.searchsorted(record.rows.time_s, at_s)]
+        until_v = rms(until) if len(until) else None
+        out.append(RecordError(record.name, _degc(record), before_v, after_v, simulated_v, at_s, until_v))
+    return tuple(out)
 
 
 def _start_file_at_size(cell: Cell, sized_cell: Cell) -> Cell:

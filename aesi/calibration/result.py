@@ -13,6 +13,7 @@ from aesi.calibration.parameters import FitParameter
 from aesi.constants import MV_PER_V
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
+from aesi.over_time import stamp
 from aesi.physics.cell import Cell
 
 if TYPE_CHECKING:
@@ -94,7 +95,8 @@ class RecordError:
     """RMSE of one record's rows, V.
 
     before_v : with the start file.  after_v : with the fit, including the record's own parameters.  simulated_v : with
-    the written file, without these parameters, on the currents as measured.
+    the written file, without these parameters, on the currents as measured.  ran_out_s : s, when the written file runs
+    out of lithium or salt there, and until_v : with it, of the rows before; None where it does not.
     """
 
     name: str
@@ -102,6 +104,24 @@ class RecordError:
     before_v: float
     after_v: float
     simulated_v: float
+    ran_out_s: float | None = None
+    until_v: float | None = None
+
+    @property
+    def until_mv(self) -> float | None:
+        """`until_v` in mV."""
+        return None if self.until_v is None else MV_PER_V * self.until_v
+
+
+def until_words(ran_out_s: float | None, until_mv: float | None) -> str:
+    """' (3.20 mV until it runs out at 740 s)' of a simulation that runs out of lithium or salt; '' of others.
+
+    ran_out_s : s.  until_mv : mV, RMSE before; None where it runs out at once.
+    """
+    if ran_out_s is None:
+        return ""
+    before = "" if until_mv is None else f"{until_mv:.2f} mV until "
+    return f" ({before}it runs out at {stamp(ran_out_s)} s)"
 
 
 @dataclass(frozen=True)
@@ -173,7 +193,8 @@ class Calibration:
                 if e.after_v > NOTABLY * e.before_v
             ),
             *(
-                f"{e.name}: the RMSE is {MV_PER_V * e.simulated_v:.2f} mV with the written file and "
+                f"{e.name}: the RMSE is {MV_PER_V * e.simulated_v:.2f} mV with the written "
+                f"file{until_words(e.ran_out_s, e.until_mv)} and "
                 f"{MV_PER_V * e.before_v:.2f} mV with the start file: the capacity, initial state and offset of the "
                 "current sensor that were fitted to this record alone are not in the file."
                 for e in self.errors

@@ -314,6 +314,8 @@ def _file_row(error: RecordError, capacity_share: float, soc0: float) -> dict[st
         "before_rmse_mv": MV_PER_V * error.before_v,
         "after_rmse_mv": MV_PER_V * error.after_v,
         "as_simulated_rmse_mv": MV_PER_V * error.simulated_v,
+        "ran_out_s": error.ran_out_s,
+        "until_ran_out_rmse_mv": error.until_mv,
         "capacity_share": capacity_share,
         "soc0": soc0,
     }

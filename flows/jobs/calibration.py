@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from aesi.calibration.result import until_words
 from aesi.pipeline.calibrate import Request, calibrate_files
 from aesi.pipeline.notes import together
 from aesi.pipeline.report.words.calibrations import open_line
@@ -41,6 +42,7 @@ def calibrate(
         console.say(
             f"  {row['name']}: {row['before_rmse_mv']:.2f} mV before, {row['after_rmse_mv']:.2f} mV after, "
             f"{row['as_simulated_rmse_mv']:.2f} mV as the file is simulated"
+            f"{until_words(row['ran_out_s'], row['until_ran_out_rmse_mv'])}"
         )
     for row in content["impedance"]:
         low, high = row["band_hz"]

@@ -17,7 +17,7 @@ from aesi.pipeline.report.nyquist import nyquist_figures
 from aesi.pipeline.report.page import write_page
 from aesi.pipeline.report.plots import maps, records
 from aesi.pipeline.report.views import DiscoveryTrace, Row
-from aesi.pipeline.report.words.calibrations import best_known_first, pulse_sentence
+from aesi.pipeline.report.words.calibrations import as_simulated, best_known_first, pulse_sentence
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -68,6 +68,7 @@ def write_calibration_report(path: str | Path, view: CalibrationView) -> Path:
         view=view,
         finding=finding(view.content),
         pulse_sentence=pulse_sentence(view.content),
+        as_simulated=as_simulated,
         parameters=[row for row in parameters if KNOT not in row["name"]],
         knots=[row for row in parameters if KNOT in row["name"]],
         nyquist=list(nyquist),
@@ -77,9 +78,13 @@ def write_calibration_report(path: str | Path, view: CalibrationView) -> Path:
 def finding(content: Mapping[str, Any]) -> str:
     """Sentence on how far off the records the fit is, and was the start file, in free run; then the file by itself."""
     files = content["files"]
-    after, before, simulated = (
-        _range([row[f"{key}_rmse_mv"] for row in files]) for key in ("after", "before", "as_simulated")
-    )
+    after, before = (_range([row[f"{key}_rmse_mv"] for row in files]) for key in ("after", "before"))
+    simulated = [
+        row["as_simulated_rmse_mv" if row["until_ran_out_rmse_mv"] is None else "until_ran_out_rmse_mv"]
+        for row in files
+    ]
+    ran_out = [row["name"] for row in files if row["until_ran_out_rmse_mv"] is not None]
+    until = f", until it runs out on {', '.join(ran_out)}" if ran_out else ""
     on = files[0]["name"] if len(files) == 1 else f"the {len(files)} records that it was fitted to"
     worse = [
         row["name"]
@@ -90,7 +95,7 @@ def finding(content: Mapping[str, Any]) -> str:
     return (
         f"In free run the calibrated model errs by {after} mV RMSE on {on}, where the start file erred by {before} mV. "
         "With the written file alone, without each record's own initial state, capacity and current offset, the error "
-        f"is {simulated} mV.{against}"
+        f"is {_range(simulated)} mV{until}.{against}"
     )
 
 

@@ -299,6 +299,9 @@ def test_a_record_that_the_declared_cell_runs_empty_on_was_told_with_an_error_of
     (note,) = (n for n in found.notes if "runs empty" in n)
     assert note.startswith("longer: ")
     assert "in the declared cell at" in note
+    (error,) = found.errors
+    assert f"in the file as simulated at {error.ran_out_s:g} s" in note
+    assert error.until_v < error.simulated_v
 
 
 def test_the_declared_cell_was_judged_on_a_record_of_another_day_with_a_loss_that_nobody_declared(
@@ -328,6 +331,9 @@ def test_a_file_that_is_worse_than_the_start_file_as_it_is_simulated_was_not_war
     assert warning.startswith(
         f"{first.name}: the RMSE is 40.00 mV with the written file and 20.00 mV with the start file"
     )
+    ran_out = replace(worse, ran_out_s=740.0, until_v=5e-3)
+    (warning,) = replace(found, errors=(ran_out,)).warnings
+    assert "40.00 mV with the written file (5.00 mV until it runs out at 740 s) and 20.00 mV" in warning
     assert replace(found, errors=(replace(worse, simulated_v=20e-3),)).warnings == ()
 
 

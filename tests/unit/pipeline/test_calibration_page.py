@@ -37,7 +37,7 @@ def parameter(value=1.0, of_prior=0.3, **more):
 def record(name, **more):
     return {
         "name": name, "temperature_degc": None, "before_rmse_mv": 30.0, "after_rmse_mv": 2.0,
-        "as_simulated_rmse_mv": 4.0, "capacity_share": 0.99, **more,
+        "as_simulated_rmse_mv": 4.0, "ran_out_s": None, "until_ran_out_rmse_mv": None, "capacity_share": 0.99, **more,
     }  # fmt: skip
 
 
@@ -186,6 +186,11 @@ def test_a_record_that_the_fit_made_worse_is_named_first(content):
 def test_a_record_that_the_written_file_is_worse_on_was_not_named(content):
     content["files"][1] |= {"before_rmse_mv": 5.0, "after_rmse_mv": 2.0, "as_simulated_rmse_mv": 6.0}
     assert finding(content).endswith(" On slow the start file has the lower error.")
+
+
+def test_the_error_of_a_file_was_that_of_the_hours_after_it_had_run_out(content):
+    content["files"][1] |= {"as_simulated_rmse_mv": 830.65, "ran_out_s": 74520.0, "until_ran_out_rmse_mv": 12.3}
+    assert "the error is 4.0 to 12.3 mV, until it runs out on slow. On slow the start file" in finding(content)
 
 
 def test_no_knots_are_no_figure():

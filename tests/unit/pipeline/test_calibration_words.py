@@ -45,6 +45,8 @@ def test_a_report_says_at_what_a_record_was_taken_and_what_the_records_tell_of_e
     model_error_pct, off
 ):
     file = {"before_rmse_mv": 2.0, "after_rmse_mv": 1.0, "as_simulated_rmse_mv": 1.5, "capacity_share": 1.0}
+    whole = {"ran_out_s": None, "until_ran_out_rmse_mv": None}
+    ran_out = {"ran_out_s": 740.0, "until_ran_out_rmse_mv": 1.25}
     told = {"low": 0.9, "high": 1.1, "unit": "factor", "prior_from": "convention", "value": 1.0}
     text = to_text(
         {
@@ -52,8 +54,8 @@ def test_a_report_says_at_what_a_record_was_taken_and_what_the_records_tell_of_e
             "model": "espm",
             "declared_degc": 25.0,
             "files": [
-                file | {"name": "a", "temperature_degc": None},
-                file | {"name": "b", "temperature_degc": 9.5},
+                file | whole | {"name": "a", "temperature_degc": None},
+                file | ran_out | {"name": "b", "temperature_degc": 9.5},
             ],
             "health": {},
             "pulse_resistance": {
@@ -89,7 +91,7 @@ def test_a_report_says_at_what_a_record_was_taken_and_what_the_records_tell_of_e
     assert "\n\\* no record within 8 K: " in text
     assert "\nNo record tells it.\n" in text
     assert "| a | 25.0, as declared | 2.00 |" in text
-    assert "| b | 9.5 | 2.00 |" in text
+    assert "| b | 9.5 | 2.00 | 1.00 | 1.50 (1.25 mV until it runs out at 740 s) | 1.000 |" in text
     assert "| negative.rate | 1 | 0.9 to 1.1 | factor | 3 | convention |" in text
     assert "| contact | 1 | 0.9 to 1.1 | factor | 100 | convention |" in text
     assert text.index("| negative.rate |") < text.index("| contact |")  # the best known first, as on the page
