@@ -189,8 +189,14 @@ def test_a_record_that_the_written_file_is_worse_on_was_not_named(content):
 
 
 def test_the_error_of_a_file_was_that_of_the_hours_after_it_had_run_out(content):
-    content["files"][1] |= {"as_simulated_rmse_mv": 830.65, "ran_out_s": 74520.0, "until_ran_out_rmse_mv": 12.3}
-    assert "the error is 4.0 to 12.3 mV, until it runs out on slow. On slow the start file" in finding(content)
+    content["files"][1] |= {
+        "as_simulated_rmse_mv": 830.65,
+        "ran_out_s": 74520.0,
+        "until_ran_out_rmse_mv": 12.3,
+    }
+    assert "the error is 4.0 to 12.3 mV, until it runs out on slow. On slow the start file" in finding(
+        content
+    )
 
 
 def test_no_knots_are_no_figure():
