@@ -1,4 +1,7 @@
-"""Ctrl-C ends a command within two seconds, whatever is running; so does a scheduler that ends it, or `timeout`.
+"""Ctrl-C ends a command within two seconds; so does a scheduler that ends it, or `timeout`.
+
+Not where PyBaMM's solver makes the data of a virtual cell in this process: it lets no other code run until it returns,
+after minutes for a record of hours.
 
 What is worth keeping is on disk at every moment, and the next command closes a run that was cut off. So Prefect and
 MLflow get TIDY_S seconds to end by themselves, and then the process and its children are ended.
