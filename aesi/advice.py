@@ -104,7 +104,8 @@ def with_columns(sentence: str) -> str:
     told = [f"the column {listed(columns)} of the batch's table"] if columns else []
     if any(option in OF_READING for option in options):
         told.append(
-            "in a batch these options hold for all cells; for this one alone give them to `aesi data convert`"
+            "in a batch these options hold for all cells; for this one alone give them to `aesi data convert`; what is "
+            "no record belongs in another folder"
         )
     return f"{sentence.removesuffix('.')} ({'; '.join(told)})." if told else sentence
 

@@ -179,7 +179,7 @@ def test_a_batch_advised_an_option_for_one_cell_that_holds_for_all(tmp_path):
     pd.DataFrame(columns).to_csv(tmp_path / "milli.csv", index=False)
     row = run_job(Job("milli", CELL, (tmp_path / "milli.csv",)), tmp_path / "out", Settings())
     assert "--unit current_a=mA (in a batch these options hold for all cells" in row["reason"]
-    assert row["reason"].endswith("for this one alone give them to `aesi data convert`).")
+    assert row["reason"].endswith("what is no record belongs in another folder).")
 
 
 def left(folder, content):
