@@ -53,7 +53,7 @@ def test_the_measured_experiments_differ_in_no_setting_that_a_test_could_have_ch
         content = yaml.safe_load((EXPERIMENT_FILES / name).read_text())
         assert "library" not in content
         assert set(content["search"]) <= {
-            "candidates", "population", "resamples", "block", "workers", "timeout_s",
+            "candidates", "population", "resamples", "block", "workers",
         }  # fmt: skip
 
 
