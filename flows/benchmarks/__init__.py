@@ -57,11 +57,10 @@ def run(name: str, **options: Any) -> Iterator[dict[str, Any]]:
     known.pop("return")
     for option, value in options.items():
         if option not in known:
-            near = did_you_mean(option, known).removesuffix(".")
+            near = did_you_mean(option, known)
+            begun = "; it has" if near == "." else f"{near} It has"
             there = ", ".join(known) or "none"
-            raise InputError(
-                f"--set {option}: `aesi bench {name}` has no such option{near}{' I' if near else '; i'}t has: {there}."
-            )
+            raise InputError(f"--set {option}: `aesi bench {name}` has no such option{begun}: {there}.")
         try:
             options[option] = TypeAdapter(known[option], config=AS_WRITTEN).validate_python(value)
         except ValidationError as error:
