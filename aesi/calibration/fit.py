@@ -90,7 +90,7 @@ def calibrate(
     start_model, notes = prepared_model(cell, records, conditions)
     ends = _fit_ends(start_model, starts, seed, evaluations, on_step)
     model, x, found = ends[0].model, ends[0].x, ends[0].cell
-    states = model.states(cell, x)
+    runs = {name: model.errors_and_ends(*state) for name, state in model.states(cell, x).items()}
     scaled = ends[0].jacobian * information_weights(model, x)[:, None]
     covariance: Array = np.asarray(np.linalg.inv(scaled.T @ scaled), dtype=float)
     shares = capacities(model, x)
@@ -102,14 +102,14 @@ def calibrate(
         parameters=parameters[0],
         undetermined=undetermined(model, scaled),
         at_bounds=at_bounds(model, x),
-        errors=_errors(model, states),
+        errors=_errors(model, runs),
         capacities=shares,
         size_assumed="" if conditions.same_cell else size_assumed(cell, records),
         notes=(
             *notes,
             *contradicted_prior_sentences(model, x),
             *own_parameter_sentences(model, x),
-            *ran_out_sentences(model, states),
+            *ran_out_sentences(model, runs),
             *moved_start_sentences(model, begun),
             *ends[0].heat_sentences,
             *ends_sentences(
@@ -240,17 +240,18 @@ def _with_provenance(
     )
 
 
-def _errors(model: Model, states: Mapping[FitState, tuple[Cell, Array]]) -> tuple[RecordError, ...]:
-    """The RMSE of each record under each state of the cell."""
-    errors_v = {name: model.errors_of(*state) for name, state in states.items()}
+def _errors(
+    model: Model, runs: Mapping[FitState, Sequence[tuple[Array, int | None]]]
+) -> tuple[RecordError, ...]:
+    """The RMSE of each record under each state of the cell.  runs : state -> `Model.errors_and_ends`."""
     out = []
     for i, record in enumerate(model.records):
         before_v, after_v, simulated_v = (
-            rms(errors_v[name][i]) for name in ("declared", "fitted", "simulated")
+            rms(runs[name][i][0]) for name in ("declared", "fitted", "simulated")
         )
-        at_s = model.ran_out_s(i, *states["simulated"])
-        until = errors_v["simulated"][i][: 0 if at_s is None else np.searchsorted(record.rows.time_s, at_s)]
-        until_v = rms(until) if len(until) else None
+        error_v, row = runs["simulated"][i]
+        at_s = None if row is None else float(record.rows.time_s[row])
+        until_v = rms(error_v[:row]) if row else None
         out.append(RecordError(record.name, _degc(record), before_v, after_v, simulated_v, at_s, until_v))
     return tuple(out)
 

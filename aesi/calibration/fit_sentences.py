@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -10,7 +10,6 @@ from aesi.calibration.model import FitState, Model
 from aesi.calibration.silicon import SILICON_V
 from aesi.constants import MILLI
 from aesi.numerics.typing import Array
-from aesi.physics.cell import Cell
 from aesi.physics.depletion import ran_out
 
 NOTED_ZERO = 0.02
@@ -72,12 +71,18 @@ def own_parameter_sentences(model: Model, x: Array) -> tuple[str, ...]:
     return tuple(out)
 
 
-def ran_out_sentences(model: Model, states: Mapping[FitState, tuple[Cell, Array]]) -> tuple[str, ...]:
-    """A sentence for each record on which the cell runs out of lithium or salt in one of the states."""
+def ran_out_sentences(
+    model: Model, runs: Mapping[FitState, Sequence[tuple[Array, int | None]]]
+) -> tuple[str, ...]:
+    """A sentence for each record on which the cell runs out of lithium or salt in one of the states.
+
+    runs : state of the cell -> `Model.errors_and_ends`.
+    """
     out = []
     for i, record in enumerate(model.records):
-        found = {words: model.ran_out_s(i, *states[name]) for name, words in STATE_WORDS.items()}
-        if at_s := {words: at for words, at in found.items() if at is not None}:
+        rows = {words: runs[name][i][1] for name, words in STATE_WORDS.items()}
+        at_s = {words: float(record.rows.time_s[row]) for words, row in rows.items() if row is not None}
+        if at_s:
             out.append(ran_out(record.name, at_s))
     return tuple(out)
 

@@ -174,11 +174,6 @@ class Model:
         """
         return self._simulated(index, cell, x, more)[0]
 
-    def ran_out_s(self, index: int, cell: Cell, x: Array) -> float | None:
-        """Time at which a record's simulation runs out of lithium or salt, s; None where it does not."""
-        at = self._simulated(index, cell, x, 1.0)[1]
-        return None if at < 0 else float(self.records[index].rows.time_s[at])
-
     def _simulated(self, index: int, cell: Cell, x: Array, more: float) -> tuple[SolvedRows, int]:
         """(a record's simulation, number of the first row without lithium or salt, -1 for none)."""
         self.simulations += 1
@@ -222,6 +217,15 @@ class Model:
     def errors_of(self, cell: Cell, x: Array) -> list[Array]:
         """(rows,) V of each record, measured - simulated with `cell` and the record's part of the working vector."""
         return [r.rows.voltage_v - self.run(i, cell, x).voltage_v for i, r in enumerate(self.records)]
+
+    def errors_and_ends(self, cell: Cell, x: Array) -> list[tuple[Array, int | None]]:
+        """(error as of `errors_of`, number of the first row without lithium or salt, None without one) of each
+        record."""
+        out: list[tuple[Array, int | None]] = []
+        for i, record in enumerate(self.records):
+            run, at = self._simulated(i, cell, x, 1.0)
+            out.append((record.rows.voltage_v - run.voltage_v, None if at < 0 else at))
+        return out
 
     def residual(self, x: Array) -> Array:
         """The least-squares residual: errors of all rows over their expected size, with a linear loss for large ones;
