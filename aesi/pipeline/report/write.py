@@ -100,7 +100,7 @@ def write_discovery_report(path: str | Path, view: DiscoveryView) -> Path:
         moved=_moved_rows(view.discovery),
         candidates=[
             row | {"title": discoveries.hypothesis_title(row, view.titles)}
-            for row in sorted(view.discovery["candidates"], key=lambda row: -row["score"])
+            for row in view.discovery["candidates"]
         ],
     )
 
