@@ -38,7 +38,6 @@ class Scores:
     samples.
     """
 
-    n: int
     coverage: float
     mean_width_v: float
     interval_score_v: float
@@ -62,7 +61,6 @@ def scores_of(
     if current_a is not None and soc is not None:
         worst = worst_bin_coverage(covered, current_a, soc)
     return Scores(
-        n=int(seen.sum()),
         coverage=float(np.mean(covered[seen])) if seen.any() else np.nan,
         mean_width_v=float(np.mean(intervals.width_v[seen])) if seen.any() else np.nan,
         interval_score_v=interval_score(intervals.lower_v, intervals.upper_v, residuals, alpha),
