@@ -41,7 +41,6 @@ class Parameter:
     `log`); None for a uniform prior within the bounds.
     capacity_power : `expected` and `spread` hold for a cell of 1 Ah and scale with this power of the capacity: 1 for a
     current, -1 for a resistance.
-    linear : True where the voltage is nearly linear in it, so that a fit need not update its slope at every step.
     low_is_limit : True where the lower bound stands for zero, which a logarithmic scale does not reach. Zero may then
     be given, and a fit that ends on this bound is an ordinary result.
     spread : error of cell files in this parameter; hypotheses about other effects may move it within this spread.
@@ -61,7 +60,6 @@ class Parameter:
     description: str = ""
     expected: float | None = None
     capacity_power: int = 0
-    linear: bool = False
     low_is_limit: bool = False
     spread: Spread | None = None
     counted: Literal["itself", "added", "share"] = "itself"

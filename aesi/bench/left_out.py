@@ -111,8 +111,9 @@ def judged(case: LeftOutCase, cells: str, limit_s: float | None = LIMIT_S) -> Ca
     """Run one case and return its row; the verdict is NOT_RUN if its data are not available.
 
     cells : folder of the cell files.  limit_s : limit of the processor time, s; None sets no limit. A case that takes
-    longer has failed.  `times_better` is the error of the written model over the lower of the errors of the declared
-    and the recalibrated model, so that values above 1 mean that the written model is worse.
+    longer has failed, as has one with a model that cannot be simulated on the record.  `times_better` is the error of
+    the written model over the lower of the errors of the declared and the recalibrated model, so that values above 1
+    mean that the written model is worse.
     """
     spent = Stopwatch()
     row = _asked(case)
@@ -126,9 +127,11 @@ def judged(case: LeftOutCase, cells: str, limit_s: float | None = LIMIT_S) -> Ca
     content = answer_of(lambda: discovery_content(discover(cell, list(records.values()), [test])), limit_s)
     if isinstance(content, NoAnswer):
         return row | content.row | spent.row
-    left = {f"{state}_mv": content[state]["test"]["rmse_mv"] for state in STATES}
-    better = min(left["before_mv"], left["recalibrated_mv"])
     told = {"verdict": content["verdict"], "effects": content["effects"]}
+    left = {f"{state}_mv": content[state]["test"].get("rmse_mv") for state in STATES}
+    if None in left.values():
+        return row | told | {"error": "one of the models cannot be simulated on the record", **spent.row}
+    better = min(left["before_mv"], left["recalibrated_mv"])
     return row | told | left | {"times_better": left["after_mv"] / better, **spent.row}
 
 

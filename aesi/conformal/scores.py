@@ -38,7 +38,6 @@ class Scores:
     samples.
     """
 
-    n: int
     coverage: float
     mean_width_v: float
     interval_score_v: float
@@ -62,7 +61,6 @@ def scores_of(
     if current_a is not None and soc is not None:
         worst = worst_bin_coverage(covered, current_a, soc)
     return Scores(
-        n=int(seen.sum()),
         coverage=float(np.mean(covered[seen])) if seen.any() else np.nan,
         mean_width_v=float(np.mean(intervals.width_v[seen])) if seen.any() else np.nan,
         interval_score_v=interval_score(intervals.lower_v, intervals.upper_v, residuals, alpha),
@@ -90,31 +88,29 @@ def bin_numbers(current_a: Array, soc: Array) -> IntArray:
     return np.asarray(row * CURRENT_BINS + column)
 
 
-def worst_bin_coverage(
-    covered: Array, current_a: Array, soc: Array, min_samples: int = MIN_BIN_SAMPLES
-) -> float:
-    """Least coverage among (current, SOC) bins of more than `min_samples` samples, smaller ones joined to their
+def worst_bin_coverage(covered: Array, current_a: Array, soc: Array) -> float:
+    """Least coverage among (current, SOC) bins of more than MIN_BIN_SAMPLES samples, smaller ones joined to their
     neighbours: every sample counts, so that it is never above the average. NaN for fewer samples than that in all.
 
     covered : (n,) 1, 0, or NaN where the residual is missing.
     """
     seen = np.isfinite(covered)
-    if seen.sum() <= min_samples:
+    if seen.sum() <= MIN_BIN_SAMPLES:
         return np.nan
     _, number = np.unique(bin_numbers(current_a, soc)[seen], return_inverse=True)
-    group = _joined(np.bincount(number), min_samples)[number]
+    group = _joined(np.bincount(number))[number]
     return float((np.bincount(group, weights=covered[seen]) / np.bincount(group)).min())
 
 
-def _joined(counts: IntArray, min_samples: int) -> IntArray:
-    """(bins,) number of the group of each bin: neighbours are joined until a group holds more than `min_samples`; what
-    is left at the end goes to the last group."""
+def _joined(counts: IntArray) -> IntArray:
+    """(bins,) number of the group of each bin: neighbours are joined until a group holds more than MIN_BIN_SAMPLES;
+    what is left at the end goes to the last group."""
     group = np.zeros(len(counts), dtype=np.int64)
     current, held = 0, 0
     for place, count in enumerate(counts.tolist()):
         group[place] = current
         held += count
-        if held > min_samples:
+        if held > MIN_BIN_SAMPLES:
             current, held = current + 1, 0
     return np.minimum(group, current - 1) if held and current else group
 

@@ -11,60 +11,50 @@ from aesi.conformal.online.method import Method
 from aesi.conformal.scores import Scores, scores_of
 from aesi.numerics.typing import Array
 
-MAX_RESIDUALS = 20_000
-"""Most calibration residuals: enough for half a per cent of coverage, in a fraction of a second."""
+Driven = tuple[Array, Array]
+"""(one-step-ahead residuals of a record, (n,) V; the current at these samples, (n,) A)."""
 PIECES = 20
 """Number of runs, spread over all records, to which calibration residuals are thinned."""
 
 
 def validation_scores(
     method: Method,
-    residuals: Sequence[Array],
-    valid_residuals: Sequence[Array],
-    alpha: float = 0.1,
-    window: int = 200,
-    rng: np.random.Generator | None = None,
-    current_a: Sequence[Array] | None = None,
-    valid_current_a: Sequence[Array] | None = None,
-    max_residuals: int = MAX_RESIDUALS,
+    calibration: Sequence[Driven],
+    judged: Sequence[Driven],
+    alpha: float,
+    window: int,
+    rng: np.random.Generator,
+    max_residuals: int,
 ) -> Scores:
     """Coverage, width and interval score on the validation records, all samples pooled.
 
-    residuals, valid_residuals : one (n_i,) array per continuous record, V, out of sample.  current_a, valid_current_a :
-    one (n_i,) array per record, A, both or neither.  max_residuals : the calibration is thinned to evenly spaced
-    pieces with about this many samples in all. Raises as `Method.fit` does.
+    calibration, judged : one pair per continuous record, residuals out of sample.  max_residuals : the calibration is
+    thinned to evenly spaced pieces with about this many samples in all. Raises as `Method.fit` does.
     """
-    records, currents = spaced_pieces(residuals, current_a, max_residuals)
+    records, currents = zip(*spaced_pieces(calibration, max_residuals), strict=True)
     calibrated = method.fit(records, alpha, window, rng, currents)
-    parts = [
-        calibrated.intervals(record, None if valid_current_a is None else valid_current_a[i])
-        for i, record in enumerate(valid_residuals)
-    ]
+    parts = [calibrated.intervals(residuals, current_a) for residuals, current_a in judged]
     together = Intervals(
         np.concatenate([part.lower_v for part in parts]),
         np.concatenate([part.upper_v for part in parts]),
         np.concatenate([part.warm for part in parts]),
     )
-    return scores_of(together, np.concatenate(list(valid_residuals)), alpha)
+    return scores_of(together, np.concatenate([residuals for residuals, _ in judged]), alpha)
 
 
-def spaced_pieces(
-    records: Sequence[Array], currents: Sequence[Array] | None, max_samples: int
-) -> tuple[list[Array], list[Array] | None]:
-    """The records and their currents, cut down to about `max_samples` in PIECES evenly spaced pieces (each a
-    record of its own); as they are where they hold no more."""
-    total = sum(len(r) for r in records)
+def spaced_pieces(records: Sequence[Driven], max_samples: int) -> list[Driven]:
+    """The records, cut down to about `max_samples` in PIECES evenly spaced pieces (each a record of its own); as they
+    are where they hold no more."""
+    total = sum(len(residuals) for residuals, _ in records)
     if total <= max_samples:
-        return list(records), None if currents is None else list(currents)
+        return list(records)
     step, length = total / PIECES, max_samples // PIECES
-    kept: list[Array] = []
-    kept_current: list[Array] = []
+    kept: list[Driven] = []
     start = 0
-    for i, record in enumerate(records):
+    for residuals, current_a in records:
         first = np.ceil(start / step) * step - start
-        for begin in np.arange(first, len(record), step).astype(int):
-            kept.append(record[begin : begin + length])
-            if currents is not None:
-                kept_current.append(currents[i][begin : begin + length])
-        start += len(record)
-    return kept, None if currents is None else kept_current
+        for begin in np.arange(first, len(residuals), step).astype(int):
+            piece = np.s_[begin : begin + length]
+            kept.append((residuals[piece], current_a[piece]))
+        start += len(residuals)
+    return kept

@@ -80,7 +80,7 @@ def convert_file(
 def record_lines(record: Measurement, *, of_cell: bool = False) -> list[str]:
     """Sentences on the content of a record, to check a conversion.  of_cell : the record is known to be of a cell."""
     step = np.diff(record.time_s)
-    charge = record.current_a[1:] * step / SECONDS_PER_HOUR
+    charge = record.steps_as(record.hold_taken) / SECONDS_PER_HOUR
     out, into = float(np.sum(charge[charge > 0])), float(np.sum(-charge[charge < 0]))
     lines = [
         f"{extent(record.time_s)}, every {np.median(step):.4g} s in the median; {_range(record.voltage_v, 'V')}.",

@@ -76,8 +76,7 @@ class Window:
 
         def averaged(stretch: Array) -> Array:
             around = np.lib.stride_tricks.sliding_window_view(stretch, len(weights))[:: self.factor]
-            kept = self._centres(stretch) - self._half
-            return np.asarray((around @ (weights / weights.sum()))[: len(kept)])
+            return np.asarray(around @ (weights / weights.sum()))
 
         return np.concatenate(self._by_stretch(column, averaged))
 

@@ -41,7 +41,7 @@ class Residual(Protocol):
 class Minimum:
     """The result of a descent.
 
-    x : (n,) the best point.  cost : half the sum of squares there.  rounds : number of times that slopes were computed.
+    x : (n,) the best point.  cost : half the sum of squares there.
     converged : True where it ended because no step reduces the cost by the tolerance.
     known_x : (n,) last point where slopes were computed, with a cost less than the tolerance above that at x, for
     callers that need slopes at the end; x where the descent did not converge.
@@ -49,7 +49,6 @@ class Minimum:
 
     x: Array
     cost: float
-    rounds: int
     converged: bool
     known_x: Array
 
@@ -85,16 +84,16 @@ def descend(
     x = np.clip(x0, low, high)
     residual = model.residual(x)
     if residual is None or not np.isfinite(residual).all():
-        return Minimum(x, np.inf, 0, False, x)
+        return Minimum(x, np.inf, False, x)
     damping = DAMPING
     if slopes is not None:
         near = _Point(x, residual, slopes)
         last, damping = _broyden_steps(model, near, low, high, tolerance, damping, fresh=False)
         x, residual = last.x, last.residual
-    for done in range(rounds):
+    for _ in range(rounds):
         computed_slopes = model.slopes(x, residual)
         if computed_slopes is None or not np.isfinite(computed_slopes).all():
-            return Minimum(x, _half_square(residual), done, False, x)
+            return Minimum(x, _half_square(residual), False, x)
         start = _Point(x, residual, computed_slopes)
         last, damping = _broyden_steps(model, start, low, high, tolerance, damping, fresh=True)
         if start.cost - last.cost < tolerance:
@@ -104,8 +103,8 @@ def descend(
                 last, damping = _broyden_steps(model, start, low, high, tolerance, DAMPING, fresh=True)
         x, residual = last.x, last.residual
         if start.cost - last.cost < tolerance:
-            return Minimum(x, last.cost, done + 1, True, start.x)
-    return Minimum(x, _half_square(residual), rounds, False, x)
+            return Minimum(x, last.cost, True, start.x)
+    return Minimum(x, _half_square(residual), False, x)
 
 
 def foreseen_cost(x: Array, residual: Array, slopes: Array, low: Array, high: Array) -> float:

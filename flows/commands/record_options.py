@@ -205,8 +205,8 @@ def _values_by_record(
 
 
 def _record_of(option: str, file: str, paths: list[Path]) -> str:
-    """The name of the record that an option means by `file`: a path as in --data, the name of a file, or that of a
-    record, tried in this order.
+    """The name of the record that an option means by `file`: a path as in --data, the name of a record, that of a
+    file, or that of a file without its ending, tried in this order.
 
     Raises InputError if it means none of the files `paths`, or several.
     """

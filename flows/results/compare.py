@@ -75,7 +75,6 @@ def _compared(store: Store, experiment: str, run: Any) -> ComparedRun:
         metrics=_metrics(run),
         chosen=run.data.params.get("chosen_model", ""),
         judged_on=_judged_on(run.data.params),
-        tags=run.data.tags,
         comparison=_content(store, run, COMPARISON),
         discovery=_content(store, run, FINDING) if "verdict" in run.data.tags else {},
     )

@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 def _send_run(store: Store, item: Item, again: bool) -> None:
     """A finished nested run: parameters, metrics, files.  again : whether it may be there already, in whole or in
     part."""
-    info = _sent_before(store, item) if again else None
+    found = store.child(item["experiment_id"], item["parent"], item["label"]) if again else None
     tags = {PARENT: item["parent"], NUMBER: item["label"], **item["tags"]}
-    if info is None and store.local:
+    if found is None and store.local:
         artifacts = new_artifact_uri(store.artifact_place(item["experiment_id"]))
         _write_files(store, artifacts, item["files"])
         insert_run(store.database, item, artifacts, tags)
     else:
-        _send_run_by_client(store, item, tags, info)
+        _send_run_by_client(store, item, tags, found and found.info)
 
 
 def _send_run_by_client(store: Store, item: Item, tags: Mapping[str, str], info: RunInfo | None) -> None:
@@ -137,11 +137,6 @@ def _send_experiment(store: Store, item: Item) -> None:
     new = {key: value for key, value in item["tags"].items() if key not in there}
     for key, value in (new | of_both_kinds(item["tags"], there)).items():
         store.client.set_experiment_tag(item["experiment_id"], key, value)
-
-
-def _sent_before(store: Store, item: Item) -> RunInfo | None:
-    found = store.child(item["experiment_id"], item["parent"], item["label"])
-    return None if found is None else found.info
 
 
 SENDERS: dict[str, Callable[[Store, Item], None]] = {

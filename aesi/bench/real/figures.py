@@ -118,7 +118,8 @@ def case_figure(row: CaseRow) -> Figure:
     model. The last part of the record is held out."""
     said = " + ".join(row["effects"]) or "no name"
     answer = " or ".join(row["answer"]) or "no name"
-    errors = ", ".join(f"{row[f'{state}_test_mv']:.1f} mV {words}" for state, words in STATES.items())
+    known = {words: row[f"{state}_test_mv"] for state, words in STATES.items()}
+    errors = ", ".join(f"{error:.1f} mV {words}" for words, error in known.items() if error is not None)
     fig = style.figure(
         str(row["case"]),
         f"{row['verdict']}: {said}; right: {answer}. RMSE on held-out data: {errors}.".replace("_", " "),

@@ -125,7 +125,7 @@ def _by_kind(rows: Sequence[CaseRow]) -> list[dict[str, Any]]:
     return [
         {
             "put_in": put_in,
-            "said": [(r["record"].partition("/")[0], r["named"], _answer_text(r)) for r in each],
+            "said": [(r["record"].partition("/")[0], r.get("named"), _answer_text(r)) for r in each],
         }
         for put_in, each in sorted(found.items())
     ]

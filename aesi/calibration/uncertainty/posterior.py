@@ -38,14 +38,13 @@ class PosteriorSamples:
     """Samples of the posterior of the global parameters, and what they say of the linear intervals.
 
     samples : (n, parameters) working coordinates.  intervals : 95 %, from them.  width_ratios : name -> width over that
-    of the linear interval.  accepted : share of proposals.  autocorrelation : steps, nan where the chain is too short.
+    of the linear interval.  autocorrelation : steps, nan where the chain is too short.
     linearised_losses : whether losses between dated records were among what is taken to be linear.
     """
 
     samples: Array
     intervals: dict[str, Interval]
     width_ratios: dict[str, float]
-    accepted: float
     autocorrelation: float
     linearised_losses: bool = False
 
@@ -104,7 +103,7 @@ def sample_posterior(found: Calibration, steps: int, seed: int = 0) -> Posterior
         autocorrelation = float(np.mean(emcee.autocorr.integrated_time(sampler.get_chain(), quiet=True)))
     if steps < 50.0 * autocorrelation:
         autocorrelation = np.nan
-    return _summary(found, kept, float(np.mean(sampler.acceptance_fraction)), autocorrelation)
+    return _summary(found, kept, autocorrelation)
 
 
 def _log_probability(found: Calibration) -> Callable[[Array], float]:
@@ -129,7 +128,7 @@ def _log_probability(found: Calibration) -> Callable[[Array], float]:
     return log_probability
 
 
-def _summary(found: Calibration, samples: Array, accepted: float, autocorrelation: float) -> PosteriorSamples:
+def _summary(found: Calibration, samples: Array, autocorrelation: float) -> PosteriorSamples:
     out, width_ratios = {}, {}
     for j, free in enumerate(found.model.free):
         low, middle, high = np.quantile(samples[:, j], [0.025, 0.5, 0.975])
@@ -137,4 +136,4 @@ def _summary(found: Calibration, samples: Array, accepted: float, autocorrelatio
             free.value(float(middle)), free.value(float(low)), free.value(float(high)), free.unit, free.source
         )
         width_ratios[free.name] = float((high - low) / (2.0 * NINETY_FIVE * np.sqrt(found.covariance[j, j])))
-    return PosteriorSamples(samples, out, width_ratios, accepted, autocorrelation, found.model.ageing.dated)
+    return PosteriorSamples(samples, out, width_ratios, autocorrelation, found.model.ageing.dated)

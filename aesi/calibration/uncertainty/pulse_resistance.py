@@ -150,12 +150,15 @@ def measured_pulses(record: Measurement, soc0: float, capacity_ah: float) -> tup
     """
     time_s, voltage_v, c_rate = record.time_s, record.voltage_v, record.current_a / capacity_ah
     soc = soc0 - record.discharged_ah(record.hold_taken) / capacity_ah
+    near_1c, between_s = np.abs(c_rate - 1.0) < NEAR_1C, 0.5 * (time_s[1:] + time_s[:-1])
     found = []
-    for k in np.flatnonzero((np.abs(c_rate[:-1]) < STEADY_C) & (np.abs(c_rate[1:] - 1.0) < NEAR_1C)):
-        end = int(np.searchsorted(time_s, time_s[k] + PULSE_S[-1]))
-        pulse = c_rate[k + 1 : end]
-        if end < len(time_s) and len(pulse) > 1 and np.ptp(pulse[1:]) < STEADY_C:
+    for k in np.flatnonzero((np.abs(c_rate[:-1]) < STEADY_C) & near_1c[1:]):
+        until_s = time_s[k] + PULSE_S[-1]
+        last = int(np.searchsorted(between_s, until_s))  # the row nearest to 10 s
+        last -= not near_1c[last]  # where a pulse ends after 10 s, that row may show the rest already
+        pulse = c_rate[k + 1 : last + 1]
+        if until_s <= time_s[-1] and len(pulse) > 1 and np.ptp(pulse[1:]) < STEADY_C:
             current_a = capacity_ah * float(np.mean(pulse))
-            found.append((soc[k], (voltage_v[k] - voltage_v[end - 1]) / current_a))
+            found.append((soc[k], (voltage_v[k] - voltage_v[last]) / current_a))
     socs, ohm = np.array(found, dtype=float).reshape(-1, 2).T
     return socs, ohm

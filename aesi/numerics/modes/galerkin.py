@@ -40,13 +40,12 @@ class SphereModes:
     r = x (1 + (1 - s) (1 - x**2) / 2), of slope s at the surface and (3 - s) / 2 in the centre.
     With z_k the surface value of mode k:  dz_k/dt = -lam_k (D/R^2) z_k - gain_k (flux/R),  surface = sum z_k.
     lam : (n,) ascending, lam[0] = 0.  gain : (n,) gain[0] = 3.
-    r : (m,) collocation points in [0, 1], r[-1] = 1.  at : (m, n) values at r from z.
-    project : (n, m) z from values at r, which its inverse interpolates.
+    at : (m, n) values at m collocation points from z, the last of them on the surface.
+    project : (n, m) z from values there, which its inverse interpolates.
     """
 
     lam: Array
     gain: Array
-    r: Array
     at: Array
     project: Array
 
@@ -72,7 +71,6 @@ def sphere_modes(order: int) -> SphereModes:
     return SphereModes(
         lam=_locked(lam),
         gain=_locked(at_surface**2),
-        r=_locked(_radius(nodes)[0]),
         at=_locked(at),
         project=_locked(np.linalg.inv(at)),
     )

@@ -50,7 +50,6 @@ PARAMETERS = {
         bounds=(-BOUND_V, BOUND_V),
         neutral=0.0,
         expected=float(expected),
-        linear=True,
         spread=Spread(None, float(expected), "half-cell to half-cell scatter, Chen et al. 2020"),
         source="scatter of half-cell measurements, tens of millivolts",
         description=f"coefficient of cos({k} pi z)" if k else "constant part",

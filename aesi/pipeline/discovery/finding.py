@@ -102,7 +102,7 @@ class Finding:
         import pandas as pd
 
         rows = []
-        for candidate in sorted(self.content["candidates"], key=lambda c: -c["score"]):
+        for candidate in self.content["candidates"]:
             about = {key: candidate[key] for key in ("effect", "kind", "score", "test_rmse_mv")}
             for name, values in (candidate["parameters"] or {None: {}}).items():
                 rows.append(about | {"parameter": name} | values)

@@ -10,9 +10,8 @@ import numpy as np
 
 from aesi.conformal import METHODS, Method
 from aesi.conformal.scores import Scores
-from aesi.conformal.validation import validation_scores
+from aesi.conformal.validation import Driven, validation_scores
 from aesi.errors import AesiError
-from aesi.numerics.typing import Array
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.records import ErrorSeries, Failed
 from aesi.sparse import Candidate, FitnessWeights, Genome, Problem, SparseModel, evaluate
@@ -74,22 +73,16 @@ def _scores(problem: Problem, config: ExperimentConfig, outcome: Candidate, mode
     conformal = config.conformal
     return validation_scores(
         method(config),
-        [residual for residual, _ in calibration],
-        [residual for residual, _ in judged],
+        calibration,
+        judged,
         conformal.alpha,
         conformal.window,
         np.random.default_rng(config.seed),
-        current_a=[current for _, current in calibration],
-        valid_current_a=[current for _, current in judged],
-        max_residuals=CALIBRATION_RESIDUALS,
+        CALIBRATION_RESIDUALS,
     )
 
 
-_Driven = tuple[Array, Array]
-"""(one-step-ahead residuals of a record, (n,) V; the current at these samples, (n,) A)."""
-
-
-def _roles(problem: Problem, candidate: Candidate, model: SparseModel) -> tuple[list[_Driven], list[_Driven]]:
+def _roles(problem: Problem, candidate: Candidate, model: SparseModel) -> tuple[list[Driven], list[Driven]]:
     """(residuals for the calibration, residuals for the score) of an ensemble.
 
     The calibration uses the out-of-fold residuals of the training records. The score is on the validation records;
@@ -110,7 +103,7 @@ def _roles(problem: Problem, candidate: Candidate, model: SparseModel) -> tuple[
     return out_of_fold[:middle] + out_of_fold[middle + 1 :], [out_of_fold[middle]]
 
 
-def _residual(model: SparseModel, record: ErrorSeries) -> _Driven:
+def _residual(model: SparseModel, record: ErrorSeries) -> Driven:
     return (record.error_v - model.one_step(record))[1:], record.current_a[1:]
 
 

@@ -4,7 +4,6 @@ the training drives are left out in turn."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 
 import numpy as np
 
@@ -119,9 +118,3 @@ def cuts(data: DataConfig) -> int:
     would be further from the trained rows than the test is.
     """
     return HALVES if data.repeats is not None else 1
-
-
-def parts(n: int, count: int) -> list[slice]:
-    """Slices that cut n rows into `count` consecutive parts of equal length, to within a row."""
-    edges = np.linspace(0, n, count + 1).round().astype(int)
-    return [slice(int(a), int(b)) for a, b in pairwise(edges)]

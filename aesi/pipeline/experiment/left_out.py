@@ -32,7 +32,7 @@ import numpy as np
 
 from aesi.numerics.typing import Array
 from aesi.pipeline.experiment.config import ExperimentConfig
-from aesi.pipeline.experiment.drives import cuts, parts, training_part
+from aesi.pipeline.experiment.drives import cuts, training_part
 from aesi.pipeline.experiment.physics_models import (
     DECLARED,
     RECALIBRATED,
@@ -43,6 +43,7 @@ from aesi.pipeline.experiment.physics_models import (
 from aesi.pipeline.experiment.recalibrate import FitRecord
 from aesi.records import ErrorSeries, HeldOutDrive, LeftOutDrives, Role
 from aesi.sparse import with_inputs
+from aesi.sparse.search.rows import cut_evenly, spans_of
 
 TrainingDrive = tuple[str, slice]
 """(record, its rows) of a training drive."""
@@ -125,11 +126,17 @@ class TrainingDrives:
         return HeldOutDrive.of(self.under(physics, piece), piece.drive, piece.rows)
 
     def pieces(self) -> Pieces:
-        """The pieces of the training drives that are left out in turn."""
+        """The pieces of the training drives that are left out in turn: the samples that the rows of a fold predict. The
+        first sample of a drive, which no row predicts, is in its first piece."""
         count = cuts(self.config.data)
         lengths = [rows.stop - rows.start for _, rows in self.drives]
+        spans = spans_of([n - 1 for n in lengths])
         return Pieces(
-            tuple(Piece(drive, rows) for drive, n in enumerate(lengths) for rows in parts(n, count)),
+            tuple(
+                Piece(drive, slice(0 if a == first else a - first + 1, b - first + 1))
+                for drive, (first, last) in enumerate(spans)
+                for a, b in cut_evenly(first, last, count)
+            ),
             tuple(Piece(drive, slice(0, n)) for drive, n in enumerate(lengths)) if count > 1 else (),
         )
 

@@ -22,7 +22,7 @@ from aesi.pipeline.notes import together
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.report import tables
 from aesi.pipeline.report.figures import paper_figures
-from aesi.pipeline.report.page import write_figures
+from aesi.pipeline.report.page import write_page
 from aesi.pipeline.report.views import BootstrapView, RecordTrace, RunView
 from aesi.pipeline.report.words.runs import run_finding
 from aesi.pipeline.report.write import write_run_report
@@ -128,7 +128,8 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
     for format, name in TABLES.items():
         write_whole(folder / name, tables.render(rows, format))
     write_run_report(folder / REPORT, view)
-    write_figures(folder / FIGURES / PAPER_FIGURES, f"{view.experiment}: figures", paper_figures(view))
+    figures, title = paper_figures(view), f"{view.experiment}: figures"
+    write_page(folder / FIGURES / PAPER_FIGURES, "figures.html", figures, title=title)
     write_whole(folder / SUMMARY, json.dumps(summary, indent=1, allow_nan=False))
     return summary
 

@@ -46,7 +46,7 @@ class FileParameter:
 def _waves() -> Iterator[FileParameter]:
     """The potentials' coefficients, without the constant one: a voltmeter is not off by millivolts."""
     for name, parameter in CATALOGUE[POTENTIALS].parameters.items():
-        if parameter.linear and parameter.spread is not None and name != "a0_v":
+        if parameter.spread is not None and name != "a0_v":
             assert parameter.spread.loose is not None
             yield FileParameter(POTENTIALS, name, POTENTIAL_SHARE * parameter.spread.loose)
 

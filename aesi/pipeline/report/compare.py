@@ -71,7 +71,6 @@ class ComparedRun:
     metrics: Mapping[str, float]
     chosen: str = ""
     judged_on: str = ""
-    tags: Mapping[str, str] = field(default_factory=dict)
     comparison: Mapping[str, Any] = field(default_factory=dict)
     discovery: Mapping[str, Any] = field(default_factory=dict)
     job: str = "experiment"

@@ -53,10 +53,7 @@ def paper_figures(view: RunView) -> dict[str, Figure]:
 def physics_maps(view: RunView) -> dict[str, Figure | None]:
     """Mean signed error of the physics model over (current, SOC), one map a role, one colour range."""
     parts = {role: _joined(view.of(role)) for role in ROLES if view.of(role)}
-    limit = max(
-        (maps.shared_limit(current, soc, [error], False) for current, soc, error in parts.values()),
-        default=None,
-    )
+    limit = max((maps.shared_limit(x, y, [error], False) for x, y, error in parts.values()), default=0.0)
     return {
         f"error_map_espm_{role}": maps.map_figure(
             current,

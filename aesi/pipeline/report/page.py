@@ -73,11 +73,6 @@ def _environment() -> Environment:
     return environment
 
 
-def write_figures(path: str | Path, title: str, figures: Mapping[str, Figure]) -> Path:
-    """All figures on one page, one after the other, each to be saved as SVG from its menu."""
-    return write_page(path, "figures.html", figures, title=title)
-
-
 def _describe(fig: Figure, embedded: Embedded) -> dict[str, Any]:
     meta = fig.layout.meta
     return {

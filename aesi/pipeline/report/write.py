@@ -51,19 +51,15 @@ def write_run_report(path: str | Path, view: RunView) -> Path:
         corrected_mv=runs.corrected_mv(view),
         own_share=runs.own_share(view),
         finding=runs.run_finding(view),
-        sentences=[
-            sentence
-            for sentence in (
-                runs.refit_finding(view),
-                runs.constant_finding(view),
-                runs.others_finding(view),
-                runs.persistence_finding(chosen),
-                runs.interval_finding(chosen),
-                runs.outside_finding(chosen),
-                runs.validation_finding(view),
-            )
-            if sentence
-        ],
+        sentences=_said(
+            runs.refit_finding(view),
+            runs.constant_finding(view),
+            runs.others_finding(view),
+            runs.persistence_finding(chosen),
+            runs.interval_finding(chosen),
+            runs.outside_finding(chosen),
+            runs.validation_finding(view),
+        ),
         tables=tables.all_tables(view.models),
         models=predicted_models(view),
         sections=sections.SECTIONS,
@@ -83,26 +79,26 @@ def write_discovery_report(path: str | Path, view: DiscoveryView) -> Path:
         digits={part: discoveries.error_digits(view.discovery, part) for part in ("fit", "test")},
         written=discoveries.discovery_consequence(view),
         finding=discoveries.discovery_finding(view),
-        sentences=[
-            sentence
-            for sentence in (
-                discoveries.reason_finding(view.discovery),
-                discoveries.next_finding(view.discovery, view.titles),
-                discoveries.look_alike_finding(view.discovery, view.titles),
-                *moved_findings(view.discovery),
-                discoveries.span_finding(view),
-            )
-            if sentence
-        ],
+        sentences=_said(
+            discoveries.reason_finding(view.discovery),
+            discoveries.next_finding(view.discovery, view.titles),
+            discoveries.look_alike_finding(view.discovery, view.titles),
+            *moved_findings(view.discovery),
+            discoveries.span_finding(view),
+        ),
         rest=discoveries.rest_finding(view.discovery),
         look_alikes=discoveries.look_alike_names(view.discovery, view.titles),
         closest=discoveries.closest_finding(view),
         moved=_moved_rows(view.discovery),
         candidates=[
             row | {"title": discoveries.hypothesis_title(row, view.titles)}
-            for row in sorted(view.discovery["candidates"], key=lambda row: -row["score"])
+            for row in view.discovery["candidates"]
         ],
     )
+
+
+def _said(*sentences: str) -> list[str]:
+    return [sentence for sentence in sentences if sentence]
 
 
 def _moved_rows(discovery: Mapping[str, Any]) -> list[Row]:

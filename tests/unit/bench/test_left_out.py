@@ -34,6 +34,20 @@ def test_records_that_cannot_be_had_are_not_run(tmp_path, monkeypatch):
     assert row["error"]
 
 
+def test_a_model_that_fails_on_the_left_out_record_ended_the_benchmark(shared_data, monkeypatch):
+    errors = {
+        "before": {"test": {}},
+        "recalibrated": {"test": {"rmse_mv": 8.0}},
+        "after": {"test": {"rmse_mv": 8.0}},
+    }
+    content = errors | {"verdict": "none", "effects": []}
+    monkeypatch.setattr("aesi.bench.left_out.discover", lambda *_: None)
+    monkeypatch.setattr("aesi.bench.left_out.discovery_content", lambda _: content)
+    row = judged(plan("nmc/C2")[0], "experiments/cells")
+    assert summary([row])["failed"] == 1
+    assert "cannot be simulated" in table([row])[-1]
+
+
 @pytest.fixture
 def rows():
     def row(name, after, **more):

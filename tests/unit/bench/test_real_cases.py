@@ -212,6 +212,15 @@ def test_the_report_is_one_file_with_what_was_said(tmp_path):
     assert 'data-figure="confusion"' in body
     assert 'data-figure="sizes"' in body
     assert "100 [2, 100] of 1" in body
+    # No page was written where the declared model failed on the held-out data, or the data of a fault were not there.
+    failed = row | {"case": "current_offset-0.2-x", "before_test_mv": None}
+    not_run = {k: v for k, v in row.items() if k not in ("named", "effects", "residual")} | {
+        "verdict": "not run"
+    }
+    rows = [failed, not_run]
+    page = write_report(tmp_path / "real.html", rows, summary(rows)).read_text()
+    assert "x: not run" in page
+    assert "RMSE on held-out data: 5.0 mV recalibrated model, 5.0 mV written model." in page
 
 
 def test_the_table_counts_by_kind_and_shows_each_case(gain_rows):

@@ -264,11 +264,10 @@ def test_the_posterior_says_how_far_the_linear_intervals_were_off(found):
     assert set(posterior.intervals) == set(found.parameters)
     assert "times as wide as the linear ones" in posterior.sentence
     assert "too short" in posterior.sentence
-    assert posterior.accepted > 0.05
 
 
 def test_a_posterior_kept_to_itself_that_it_takes_losses_between_days_to_be_linear():
-    posterior = PosteriorSamples(np.zeros((1, 1)), {}, {"negative.rate": 1.1}, 0.2, 5.0)
+    posterior = PosteriorSamples(np.zeros((1, 1)), {}, {"negative.rate": 1.1}, 5.0)
     assert "losses" not in posterior.sentence
     assert (
         "losses between dated records are taken to be linear"

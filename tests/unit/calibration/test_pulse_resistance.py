@@ -73,7 +73,7 @@ def test_the_pulses_of_a_record_show_the_resistance_of_its_cell(truth, hold):
     soc, ohm = measured_pulses(record, 0.6, truth.capacity_ah)
     charged_ah = (30.0 + 5.0 + 60.0 - 30.0) / 3600.0 * truth.nominal_capacity_ah
     assert soc == pytest.approx([0.6, 0.6 - charged_ah / truth.capacity_ah], abs=3e-4)
-    assert ohm == pytest.approx(np.exp(log_resistance(truth, np.array([25.0]), soc))[0], rel=0.03)
+    assert ohm == pytest.approx(np.exp(log_resistance(truth, np.array([25.0]), soc))[0], rel=0.008)
 
 
 def test_a_record_without_pulses_shows_none(truth):

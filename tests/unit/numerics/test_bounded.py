@@ -58,7 +58,7 @@ def test_a_minimum_outside_the_box_is_met_on_its_face():
 def test_a_start_that_fails_is_returned_as_it_is():
     found = descend(Counted(lambda x: None, None), np.zeros(2), -np.ones(2), np.ones(2), 5, 1e-3)
     assert found.cost == np.inf
-    assert (found.rounds, found.converged) == (0, False)
+    assert not found.converged
 
 
 def test_a_start_where_the_model_gives_no_number_ended_in_an_error_of_linear_algebra():
@@ -80,7 +80,7 @@ def test_updates_take_the_place_of_slopes_which_are_taken_seldom():
     box = np.full(6, -5.0), np.full(6, 5.0)
     found = descend(model, np.zeros(6), *box, 20, 1e-12)
     assert found.x == pytest.approx(truth, abs=1e-4)
-    assert found.rounds == model.asked[1] <= 3
+    assert model.asked[1] <= 3
     assert model.asked[0] < 20
 
 
@@ -94,8 +94,9 @@ def test_where_it_begins_with_the_slopes_of_another_place_it_ends_where_it_would
 
 
 def test_a_descent_that_stops_early_has_not_converged():
-    found = descend(rosenbrock(), np.array([-1.2, 1.0]), np.full(2, -5.0), np.full(2, 5.0), 1, 1e-14)
-    assert (found.rounds, found.converged) == (1, False)
+    model = rosenbrock()
+    found = descend(model, np.array([-1.2, 1.0]), np.full(2, -5.0), np.full(2, 5.0), 1, 1e-14)
+    assert (model.asked[1], found.converged) == (1, False)
 
 
 def test_where_slopes_were_taken_last_is_as_good_within_the_tolerance():

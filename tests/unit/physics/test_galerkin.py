@@ -39,7 +39,7 @@ def test_the_surface_follows_the_half_space_soon_after_a_step_of_the_flux():
 
 def test_projection_and_evaluation_are_inverse_in_the_sphere():
     modes = sphere_modes(8)
-    assert modes.r[-1] == pytest.approx(1.0)
+    assert modes.at[-1] == pytest.approx(1.0)  # on the surface
     assert modes.project @ modes.at == pytest.approx(np.eye(8), abs=1e-9)
 
 

@@ -361,5 +361,7 @@ def test_bins_beyond_the_colours_of_a_map_were_drawn_as_if_they_ended_there(larg
     current_a, soc = (a.ravel() for a in np.meshgrid(np.linspace(-5.0, 5.0, 240), np.linspace(0.1, 0.9, 240)))
     error_v = np.full(current_a.size, 5e-3)
     error_v[(current_a > 4.5) & (soc > 0.87)] = largest_mv / 1e3
-    figure = maps.map_figure(current_a, soc, error_v, "errors", absolute=True)
+    figure = maps.map_figure(
+        current_a, soc, error_v, "errors", True, maps.shared_limit(current_a, soc, [error_v], True)
+    )
     assert ("lie beyond the colours" in figure.layout.meta["caption"]) == told

@@ -10,7 +10,7 @@ import pytest
 
 from aesi.pipeline.report import sections
 from aesi.pipeline.report.arrays.embed import STORED, ArrayStore, embed
-from aesi.pipeline.report.page import FILTERS, _environment, write_figures
+from aesi.pipeline.report.page import FILTERS, _environment, write_page
 from aesi.pipeline.report.plots import records
 from aesi.pipeline.report.table_formats import Table
 from aesi.pipeline.report.write import write_discovery_report, write_run_report
@@ -163,7 +163,7 @@ def test_an_interrupted_write_leaves_the_old_report(views, tmp_path, monkeypatch
     path.write_text("old")
     monkeypatch.setattr("os.replace", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
-        write_figures(path, "t", {})
+        write_page(path, "figures.html", {}, title="t")
     assert path.read_text() == "old"
 
 

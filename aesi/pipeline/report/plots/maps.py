@@ -22,17 +22,19 @@ SMALLEST_SQUARE_MV2 = 1e-6
 
 
 def map_figure(
-    current_a: Array, soc: Array, error_v: Array, title: str, absolute: bool, limit_mv: float | None = None
+    current_a: Array, soc: Array, error_v: Array, title: str, absolute: bool, limit_mv: float
 ) -> Figure:
-    """Mean error, or mean absolute error, in bins over (current, SOC), in mV."""
+    """Mean error, or mean absolute error, in bins over (current, SOC), in mV.
+
+    limit_mv : end of the colours; see `shared_limit`.
+    """
     error_mv = (np.abs(error_v) if absolute else error_v) * MV_PER_V
     binned = error_map(current_a, soc, error_mv)
-    limit = limit_mv or map_limit(binned)
     word = "mean |error|" if absolute else "mean error"
     caption = (
         f"{word.capitalize()} in bins over current and state of charge; bins with few samples are blank."
     )
-    if np.nanmax(np.abs(binned.mean), initial=0.0) > limit:
+    if np.nanmax(np.abs(binned.mean), initial=0.0) > limit_mv:
         caption += " A few lie beyond the colours and have the last one; the cursor tells their values."
     fig = style.figure(title, caption, 360)
     fig.add_heatmap(
@@ -41,8 +43,8 @@ def map_figure(
         z=binned.mean,
         customdata=binned.count,
         colorscale=style.SEQUENTIAL if absolute else style.DIVERGING,
-        zmin=0 if absolute else -limit,
-        zmax=limit,
+        zmin=0 if absolute else -limit_mv,
+        zmax=limit_mv,
         hoverongaps=False,
         colorbar={"title": {"text": "mV"}, "thickness": 12, "outlinewidth": 0},
         hovertemplate="%{x:.3g} A, SOC %{y:.3g} %<br>%{z:.2f} mV from %{customdata} samples<extra></extra>",
@@ -52,7 +54,7 @@ def map_figure(
     return fig
 
 
-def map_limit(binned: ErrorMap) -> float:
+def _limit(binned: ErrorMap) -> float:
     """A colour range that a single bin cannot stretch: the 98th percentile of |mean|."""
     values = np.abs(binned.mean[np.isfinite(binned.mean)])
     return float(np.percentile(values, 98)) if len(values) else 1.0
@@ -61,7 +63,7 @@ def map_limit(binned: ErrorMap) -> float:
 def shared_limit(current_a: Array, soc: Array, errors_v: Sequence[Array], absolute: bool) -> float:
     """One colour range for maps that are to be compared: the widest of theirs, mV."""
     as_drawn = [(np.abs(e) if absolute else e) * MV_PER_V for e in errors_v]
-    return max(map_limit(error_map(current_a, soc, e)) for e in as_drawn)
+    return max(_limit(error_map(current_a, soc, e)) for e in as_drawn)
 
 
 def dependence_figure(

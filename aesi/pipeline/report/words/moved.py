@@ -41,7 +41,7 @@ def moved_findings(discovery: Mapping[str, Any]) -> list[str]:
     if after is not None:
         shown["after"] = BESIDE if after == WITH_FINDING else WRITTEN
     moved = [_sentence(words, own[state]) for state, words in shown.items() if own.get(state)]
-    return [*moved, *([resized_finding(discovery)] if resized_finding(discovery) else [])]
+    return [*moved, *filter(None, [resized_finding(discovery)])]
 
 
 def resized_finding(discovery: Mapping[str, Any]) -> str:
