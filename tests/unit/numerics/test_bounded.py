@@ -182,3 +182,19 @@ def test_a_wall_beside_an_end_of_the_box_left_a_step_no_room():
     )
     found = descend(model, np.array([1.0, 0.0]), np.full(2, -5.0), np.array([1.0, 5.0]), 20, 1e-9)
     assert found.x == pytest.approx([1.0, 2.0], abs=1e-4)
+
+
+def test_a_descent_ended_on_the_wrong_side_of_a_jump_beside_which_its_slopes_are_flat():
+    target = np.array([30.0, -0.1, -2.0])
+
+    def residual(x):  # the last one jumps by 2 where the second coordinate passes zero
+        return np.array([10.0 * x[0], 0.1 * x[1], 0.0 if x[1] < 0.0 else -2.0]) - target
+
+    model = Counted(residual, lambda x: np.diag([10.0, 0.1, 0.0])[:, :2])
+    start, box = np.array([0.0, -0.5]), (np.full(2, -9.0), np.full(2, 9.0))
+    beside = descend(model, start, *box, 20, 1e-9)
+    found = descend(model, start, *box, 20, 1e-9, jumps=[1])
+    assert beside.x == pytest.approx([3.0, -1.0], abs=1e-3)
+    assert found.x == pytest.approx([3.0, 0.0], abs=1e-3)
+    assert found.cost < beside.cost - 1.9
+    assert found.converged

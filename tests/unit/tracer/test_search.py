@@ -8,8 +8,10 @@ import pytest
 
 from aesi.errors import CellError
 from aesi.numerics.metrics import rms
+from aesi.physics import simulate
 from aesi.physics.effect import Effect
 from aesi.physics.effects import CATALOGUE
+from aesi.records import Measurement
 from aesi.tracer.case.blocks import blocks_of
 from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, coordinates_of, effect_parameters
 from aesi.tracer.discovery import inverse_problem
@@ -23,6 +25,8 @@ from aesi.tracer.search.growths import PROMISING, growths_on, most_promising, pr
 from aesi.tracer.search.hypothesis_fits import MOVED_SDS, base_of, fitted_hypothesis, linearised_as_declared
 from aesi.tracer.search.plausible import ALIKE_NATS, most_plausible
 from aesi.tracer.search.reach import REACH_FACTOR, least_error_v
+
+from .conftest import NOISE_V, steps
 
 ADDED_OHM = 2e-3
 ALLOWED_V = 0.6e-3
@@ -300,6 +304,25 @@ def test_a_fit_had_to_start_where_a_change_to_first_order_leaves_volts(monkeypat
         rms(fitter.residual(x)) for x in (*begun, coordinates_of(fitter.free, far.values_by_key))
     )
     assert left < 0.6 * left_far
+
+
+def test_a_fit_ended_beside_a_lag_of_zero_where_rows_at_steps_of_the_current_are_read_after_them(cell, few):
+    rng, time = np.random.default_rng(1), np.arange(1200.0)
+    current = steps(len(time), 45.0, rng)
+    voltage = simulate(cell, time, current, 0.9, hold="backward").voltage_v + NOISE_V * rng.normal(size=1200)
+    record = Measurement(time, current, voltage, name="held", hold="backward")
+    effects = {**few, "clock_skew": CATALOGUE["clock_skew"]}
+    problem = inverse_problem(cell, [record], soc0=0.9, effects=effects)
+    fitter = HypothesisFitter(problem, blocks_of(problem), ())
+    lag = [one.key for one in fitter.free].index(("clock_skew", "lag_s"))
+    late = np.zeros(len(fitter.free))
+    early = late.copy()
+    early[lag] = -0.01  # a millisecond
+    size = PRIORS[problem.trust].nearest(PRIORS[problem.trust].median)
+    assert fitter.cost(early, size) > fitter.cost(late, size) + 100.0
+    found = fitter.descend(early, size, 8)
+    assert found[lag] >= 0.0
+    assert fitter.cost(found, size) <= fitter.cost(late, size)
 
 
 @pytest.mark.parametrize(("reached", "fitted"), [(20.0, FINALISTS), (4.5, FINALISTS + 1), (-900.0, 12)])
