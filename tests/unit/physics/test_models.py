@@ -76,6 +76,19 @@ def test_rows_of_a_second_erred_by_millivolts_where_diffusivity_is_steep(name, d
     assert np.abs(pulsed(row_s, degc, name) - pulsed(0.0625, degc, name)).max() < STEEP_V[row_s]
 
 
+@pytest.mark.parametrize(("c_rate", "within_v"), [(-2.3, 0.02), (-4.0, 0.1), (2.3, 0.02)])
+def test_a_cold_step_to_where_diffusion_is_much_quicker_was_off_by_a_hundred_volts(c_rate, within_v):
+    """A charge of 4C from rest at -15 degC in rows of a second, where the voltage does not leave 5 V."""
+    cell = Cell.from_bpx(CELLS / "lg_18650hg2_cold.bpx.json")
+    voltages_v = []
+    for rows in (1, 20):  # in a second
+        time_s = np.arange(5 * rows + 1) / rows
+        current_a = np.where(time_s < 1.01, 0.0, c_rate * cell.nominal_capacity_ah)
+        run = simulate(cell, time_s, current_a, 0.6, (), -15.0, "backward", on_depletion="clip")
+        voltages_v.append(run.voltage_v[::rows])
+    assert np.abs(voltages_v[0] - voltages_v[1]).max() < within_v
+
+
 @pytest.mark.parametrize("model", ["espm", "dfn"])
 def test_a_voltage_jumped_as_a_profile_entered_the_next_cell_of_the_table_of_its_diffusivity(model):
     """By 0.04 mV here, by 28 mV where film and diffusivity both span decades: a fit took that for a slope."""
