@@ -39,7 +39,7 @@ from aesi.calibration.result import (
     undetermined,
 )
 from aesi.calibration.start import size_assumed, with_area_factor
-from aesi.calibration.written_cell import capacities, start_soc, written_cell
+from aesi.calibration.written_cell import capacities, fit_states, start_soc, written_cell
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import FitError
 from aesi.numerics.metrics import rms
@@ -90,7 +90,7 @@ def calibrate(
     start_model, notes = prepared_model(cell, records, conditions)
     ends = _fit_ends(start_model, starts, seed, evaluations, on_step)
     model, x, found = ends[0].model, ends[0].x, ends[0].cell
-    runs = {name: model.errors_and_ends(*state) for name, state in model.states(cell, x).items()}
+    runs = {name: model.errors_and_ends(*state) for name, state in fit_states(model, cell, x).items()}
     scaled = ends[0].jacobian * information_weights(model, x)[:, None]
     covariance: Array = np.asarray(np.linalg.inv(scaled.T @ scaled), dtype=float)
     shares = capacities(model, x)

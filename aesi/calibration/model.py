@@ -191,8 +191,7 @@ class Model:
     def as_simulated(self, x: Array) -> Array:
         """The working vector without the parameters of single records: the file's state, currents as measured.
 
-        A fitted initial state is kept unless the record begins with a full charge, since a simulation reads the state
-        from the voltage.
+        A fitted initial state is kept unless the record begins with a full charge.
         """
         out = x.copy()
         out[self.layout.zero] = self.zero.z_at_zero
@@ -201,18 +200,6 @@ class Model:
             out[self.layout.own(index)[first:]] = 0.0
         out[self.layout.ages] = self.ageing.z_of_file_state
         return out
-
-    def states(self, declared: Cell, x: Array) -> dict[FitState, tuple[Cell, Array]]:
-        """State -> (cell, working vector for the simulation of its records), for a fit that ended at `x`.
-
-        The declared cell has lost nothing, and takes currents as measured, like a file in a simulation.
-        """
-        nothing, simulated = self.as_simulated(np.zeros(self.layout.size)), self.as_simulated(x)
-        return {
-            "declared": (declared, nothing),
-            "simulated": (self.cell_at(simulated), simulated),
-            "fitted": (self.cell_at(x), x),
-        }
 
     def errors_of(self, cell: Cell, x: Array) -> list[Array]:
         """(rows,) V of each record, measured - simulated with `cell` and the record's part of the working vector."""

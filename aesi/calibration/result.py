@@ -95,8 +95,9 @@ class RecordError:
     """RMSE of one record's rows, V.
 
     before_v : with the start file.  after_v : with the fit, including the record's own parameters.  simulated_v : with
-    the written file, without these parameters, on the currents as measured.  ran_out_s : s, when the written file runs
-    out of lithium or salt there, and until_v : with it, of the rows before; None where it does not.
+    the written file, without these parameters, on the currents as measured, from the start that this file reads.
+    ran_out_s : s, when the written file runs out of lithium or salt there, and until_v : with it, of the rows before;
+    None where it does not.
     """
 
     name: str
@@ -150,7 +151,7 @@ class Calibration:
     cell : calibrated.  declared : start.  parameters : name -> value with its interval.  undetermined : combinations
     that the data do not determine.  at_bounds : names of parameters that ended on a bound.  errors : of each record.
     capacities : record -> its capacity over that of the cell.  starts : record -> state of charge at its first row, in
-    the windows of `cell` as old as in that record; a simulation of the record starts there.
+    the windows of `cell` as old as in that record, as fitted.
     size_assumed : a sentence where no record determined the size of the cell, else ''.  x, covariance : working vector
     and its covariance, for the posterior.
     against_temperature : a sentence for each record whose voltage contradicts the temperature that it was fitted at.

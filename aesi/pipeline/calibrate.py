@@ -21,7 +21,7 @@ from aesi.calibration.start import full_discharge_numbers, scaled_to_discharge
 from aesi.calibration.uncertainty.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.uncertainty.posterior import PosteriorSamples, check_posterior, sample_posterior
 from aesi.calibration.uncertainty.pulse_resistance import PULSE_S, pulse_resistance
-from aesi.calibration.written_cell import start_soc
+from aesi.calibration.written_cell import fit_states, start_soc
 from aesi.constants import CM_PER_M, MILLI, MV_PER_V, ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError
 from aesi.numerics.files.whole import write_whole
@@ -194,7 +194,7 @@ def fit_traces(found: Calibration) -> tuple[DiscoveryTrace, ...]:
     had when the record was measured.
     """
     model, x = found.model, found.x
-    states = model.states(found.declared, x)
+    states = fit_states(model, found.declared, x)
     out = []
     for i, record in enumerate(model.records):
         rows = record.rows

@@ -73,11 +73,13 @@ def solve_electrode(lo, hi, side, total, at, particles, surfaces, memory):  # ty
 def solve_unit(lo, side, total, at, particles, surfaces, memory):  # type: ignore[no-untyped-def]
     """Newton's method on the current of an electrode's only unit, between bounds; returns Phi.
 
-    The total current grows with the unit's, but as a logarithm at large currents, where Newton's step overshoots.
+    The total current grows with the unit's, but as a logarithm at large currents, where Newton's step overshoots: of a
+    double layer in short steps it may jump to and fro for ever, just inside the bounds. Where a step is not half of
+    the one before, the interval between the bounds is halved.
     """
     y, slope, gain = memory.y, memory.slope, memory.gain
     first = side * memory.ohm.shape[0]
-    phi, least, most = 0.0, -math.inf, math.inf
+    phi, least, most, moved = 0.0, -math.inf, math.inf, math.inf
     for step in range(NEWTON_STEPS):
         evaluate_electrode(lo, lo + 1, side, total, step == 0, at, particles, surfaces, memory)
         phi = memory.potential[0] + memory.ohm[0, 0] * total + at.chi * memory.log_salt[first]
@@ -90,8 +92,11 @@ def solve_unit(lo, side, total, at, particles, surfaces, memory):  # type: ignor
         else:
             least = y[lo]
         ahead = y[lo] - off / gain[0]
-        bracketed = least < ahead < most or math.isinf(least) or math.isinf(most)
-        y[lo] = ahead if bracketed else 0.5 * (least + most)
+        nears = least < ahead < most and abs(off) < 0.5 * moved * gain[0]
+        if not (nears or math.isinf(least) or math.isinf(most)):
+            ahead = 0.5 * (least + most)
+        moved = abs(ahead - y[lo])
+        y[lo] = ahead
     return phi
 
 

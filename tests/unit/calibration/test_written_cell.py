@@ -7,8 +7,9 @@ from aesi.calibration.ageing import LOADED_SD, SLOW_SD
 from aesi.calibration.parameters import with_interfaces
 from aesi.calibration.prepared_model import prepared_model
 from aesi.calibration.records.conditions import Conditions
-from aesi.calibration.written_cell import capacities, written_cell
-from aesi.physics import simulate
+from aesi.calibration.written_cell import capacities, fit_states, written_cell
+from aesi.numerics.metrics import rms
+from aesi.physics import initial_state, simulate
 from aesi.records import Measurement
 
 
@@ -61,3 +62,21 @@ def test_a_fit_steps_as_finely_as_the_file_is_simulated(model):
     fitted = model.run(1, model.cell_at(x), x)[0]
     simulated = simulate(model.cell_at(x), rows.time_s, rows.current_a, 1.0, (), None, "backward").voltage_v
     assert np.abs(fitted - simulated).max() < 1e-3
+
+
+def test_the_file_as_simulated_began_under_load_where_the_fit_did_and_not_where_a_simulation_reads(start):
+    """A file was told to err by 7 mV on a record that `aesi simulate` misses by 304."""
+    whole = with_interfaces(start)
+    loaded = discharge(whole, "loaded", 0.5).between(700.0, 3000.0)
+    model = prepared_model(whole, [loaded], Conditions(same_cell=True))[0]
+    (record,) = model.records
+    assert record.start.basis == "load"
+    x = np.zeros(model.layout.size)
+    x[model.layout.soc(0)] = -0.1 / record.soc_sd
+    file = written_cell(model, x)
+    soc0 = initial_state(file, loaded, hold="backward").soc
+    run = simulate(file, record.rows.time_s, record.rows.current_a, soc0, (), None, "backward")
+    (error_v,) = model.errors_of(*fit_states(model, whole, x)["simulated"])
+    assert rms(error_v) == pytest.approx(rms(record.rows.voltage_v - run.voltage_v), rel=1e-2)
+    (fitted_v,) = model.errors_of(*fit_states(model, whole, x)["fitted"])
+    assert rms(fitted_v) > 5.0 * rms(error_v)

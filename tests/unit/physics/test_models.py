@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from aesi.errors import InputError, SimulationError
-from aesi.physics import Cell, EspmModel, simulate
+from aesi.physics import Cell, EspmModel, impedance, simulate
 from aesi.physics.effect import Effect
 from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.product.hybrid import HybridModel
@@ -76,6 +76,19 @@ def test_rows_of_a_second_erred_by_millivolts_where_diffusivity_is_steep(name, d
     assert np.abs(pulsed(row_s, degc, name) - pulsed(0.0625, degc, name)).max() < STEEP_V[row_s]
 
 
+@pytest.mark.parametrize(("c_rate", "within_v"), [(-2.3, 0.02), (-4.0, 0.1), (2.3, 0.02)])
+def test_a_cold_step_to_where_diffusion_is_much_quicker_was_off_by_a_hundred_volts(c_rate, within_v):
+    """A charge of 4C from rest at -15 degC in rows of a second, where the voltage does not leave 5 V."""
+    cell = Cell.from_bpx(CELLS / "lg_18650hg2_cold.bpx.json")
+    voltages_v = []
+    for rows in (1, 20):  # in a second
+        time_s = np.arange(5 * rows + 1) / rows
+        current_a = np.where(time_s < 1.01, 0.0, c_rate * cell.nominal_capacity_ah)
+        run = simulate(cell, time_s, current_a, 0.6, (), -15.0, "backward", on_depletion="clip")
+        voltages_v.append(run.voltage_v[::rows])
+    assert np.abs(voltages_v[0] - voltages_v[1]).max() < within_v
+
+
 @pytest.mark.parametrize("model", ["espm", "dfn"])
 def test_a_voltage_jumped_as_a_profile_entered_the_next_cell_of_the_table_of_its_diffusivity(model):
     """By 0.04 mV here, by 28 mV where film and diffusivity both span decades: a fit took that for a slope."""
@@ -141,6 +154,20 @@ def test_a_double_layer_hung_on_the_rounding_of_rows_on_a_straight_line():
     ]
     bends = np.diff([run.voltage_v for run in voltages], n=2, axis=0)
     assert np.abs(bends).max() < 1e-4
+
+
+@pytest.mark.parametrize("c_rate", [-1.0, 0.5, 1.5, 5.0])
+def test_the_current_of_a_cold_double_layer_jumped_to_and_fro_until_the_steps_of_newton_ended(c_rate):
+    """A step of 1.5C was up to half a volt off, in either direction, where rows are short and kinetics slow. At once
+    the layers take all of it, so that the voltage drops by the impedance at high frequency."""
+    cell = Cell.from_bpx(CELLS / "panasonic_ncr18650pf.bpx.json")
+    current_a = c_rate * cell.nominal_capacity_ah
+    time_s = 1e-6 * np.arange(3.0)
+    load = np.where(time_s > 0.0, current_a, 0.0)
+    run = simulate(cell, time_s, load, 0.9, (), -20.0, "backward")
+    (at_once_ohm,) = impedance(cell, np.array([1e9]), 0.9, -20.0).real
+    dropped_v = run.voltage_v[0] - run.voltage_v[1:]
+    assert dropped_v == pytest.approx(current_a * at_once_ohm, abs=1e-4)
 
 
 def test_a_saved_model_keeps_which_one_it_is(tmp_path):
