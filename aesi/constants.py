@@ -1,4 +1,4 @@
-"""Constants of nature (CODATA 2018, exact), of clocks, of what a cell survives, and of the units of reports."""
+"""Constants of nature (CODATA 2018, exact), of clocks, of what a cell survives, of units of reports, and of chance."""
 
 FARADAY_C_MOL = 96485.33212331001
 GAS_CONSTANT_J_MOL_K = 8.31446261815324
@@ -14,3 +14,5 @@ MILLI = 1000.0
 """Thousandths in one: mohm of an ohm, mm of a metre, g of a kilogram."""
 PERCENT = 100.0
 """Hundredths in one."""
+LARGEST_SEED = 2**32 - 1
+"""That NumPy's older generators take, by which Optuna, PySINDy, scikit-learn and emcee draw."""

@@ -1,26 +1,15 @@
-"""Restore calibrated intervals from their saved state; the kinds that a saved file may contain are listed here."""
+"""Restore calibrated intervals from their saved state, which may contain the bands and regressors of this version."""
 
 from __future__ import annotations
 
 from aesi.conformal.bands.band import Band
-from aesi.conformal.bands.marginal import FixedBand, RollingBand
-from aesi.conformal.bands.regression import RegressionBand
 from aesi.conformal.online.calibrated import SCHEMA, Calibrated
 from aesi.conformal.online.method import check_settings
 from aesi.conformal.online.scale import Scale
-from aesi.conformal.regressors.boosted import BoostedQuantiles
-from aesi.conformal.regressors.forest import ForestQuantiles
-from aesi.conformal.regressors.linear import LinearQuantiles
 from aesi.conformal.regressors.model import QuantileModel
-from aesi.conformal.regressors.normalised import NormalisedQuantiles
 from aesi.errors import InputError
 from aesi.numerics.files.restored import LEAST_POSITIVE, reading_back, saved_array, saved_count, saved_number
 from aesi.numerics.typing import SavedState
-
-BANDS: dict[str, type[Band]] = {band.kind: band for band in (FixedBand, RollingBand, RegressionBand)}
-REGRESSORS: dict[str, type[QuantileModel]] = {
-    model.kind: model for model in (LinearQuantiles, ForestQuantiles, BoostedQuantiles, NormalisedQuantiles)
-}
 
 
 def calibrated_from_dict(state: SavedState) -> Calibrated:
@@ -31,9 +20,12 @@ def calibrated_from_dict(state: SavedState) -> Calibrated:
     with reading_back("intervals"):
         if state.get("schema") != SCHEMA:
             raise InputError(f"intervals have schema {state.get('schema')!r}, this version reads {SCHEMA!r}.")
+        # All of them are known: importing any module of this package imports the registered methods.
+        bands = {band.kind: band for band in Band.__subclasses__()}
+        regressors = {model.kind: model for model in QuantileModel.__subclasses__()}
         kind = state["band_kind"]
-        if kind not in BANDS:
-            raise InputError(f"unknown kind of band {kind!r}; this version knows {', '.join(sorted(BANDS))}.")
+        if kind not in bands:
+            raise InputError(f"unknown kind of band {kind!r}; this version knows {', '.join(sorted(bands))}.")
         alpha, window = state["alpha"], saved_count(state["window"], "window")
         check_settings(alpha, window)
         low, high = saved_array(state["marginal_v"], "marginal_v", (2,)).tolist()
@@ -43,7 +35,7 @@ def calibrated_from_dict(state: SavedState) -> Calibrated:
             method=str(state["method"]),
             alpha=float(alpha),
             window=window,
-            band=BANDS[kind].from_state(state["band"], REGRESSORS),
+            band=bands[kind].from_state(state["band"], regressors),
             scale=Scale.from_state(state["scale"]),
             rate=saved_number(state["rate"], "rate", 0.0),
             marginal_v=(low, high),

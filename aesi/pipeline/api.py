@@ -14,6 +14,7 @@ import numpy as np
 
 from aesi.advice import advises_python, with_arguments
 from aesi.calibration import Calibration, Conditions
+from aesi.constants import LARGEST_SEED
 from aesi.data.read import Reading, examined, read
 from aesi.data.reading import record_names
 from aesi.data.spectra import read_spectra
@@ -160,7 +161,7 @@ def calibrate(
     _check_priors(priors)
     _check_days(dates or {}, as_of)
     check_whole_number("starts", starts, 1)
-    check_whole_number("seed", seed, 0)
+    check_whole_number("seed", seed, 0, LARGEST_SEED)
     if cut_offs_v is not None and not _is_row(cut_offs_v, 2):
         raise InputError(f"cut_offs_v = {cut_offs_v!r}: give (lower, upper) V, as in (2.5, 4.2).")
     given = declared_model(cell)
@@ -229,7 +230,7 @@ def _check_asked(holdout: object, max_effects: int, seed: int) -> None:
             "is 0.3."
         )
     check_whole_number("max_effects", max_effects, 0, MOST_EFFECTS)
-    check_whole_number("seed", seed, 0)
+    check_whole_number("seed", seed, 0, LARGEST_SEED)
 
 
 def _check_by_name(what: str, given: object) -> None:

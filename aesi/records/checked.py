@@ -99,7 +99,7 @@ def check_whole_number(name: str, value: object, least: int, most: float = np.in
     """Raises InputError where an argument is no whole number from `least` to `most`."""
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not whole or not least <= value <= most:  # type: ignore[operator]
-        upper = f" up to {most:g}" if np.isfinite(most) else ""
+        upper = f" up to {most:.0f}" if np.isfinite(most) else ""
         raise InputError(f"{name} = {value!r} is not a whole number from {least}{upper}.")
 
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from aesi.constants import MILLI
+from aesi.constants import LARGEST_SEED, MILLI
 from aesi.errors import InputError
 from aesi.pipeline.written import calibration_files, discovery_files
 from flows.commands import options, outputs, record_options
@@ -208,7 +208,12 @@ def calibrate(
         typer.Option(help="Name of the cell in the written file. Default: that of the start file."),
     ] = None,
     seed: Annotated[
-        int, typer.Option(min=0, help="Random seed of the samples of --posterior and the cells of --starts.")
+        int,
+        typer.Option(
+            min=0,
+            max=LARGEST_SEED,
+            help="Random seed of the samples of --posterior and the cells of --starts.",
+        ),
     ] = 0,
     model: options.ModelOption = None,
 ) -> None:

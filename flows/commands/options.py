@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from aesi.constants import LARGEST_SEED
 from aesi.errors import CellError, InputError
 
 if TYPE_CHECKING:
@@ -170,7 +171,7 @@ ModelOption = Annotated[
 MaxEffects = Annotated[
     int, typer.Option("--max-effects", min=0, max=10, help="Largest number of effects that are added.")
 ]
-Seed = Annotated[int, typer.Option("--seed", min=0, help="Random seed.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, max=LARGEST_SEED, help="Random seed.")]
 StoreUri = Annotated[
     str | None,
     typer.Option(

@@ -14,7 +14,7 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -299,6 +299,7 @@ def _opened(database: Path, uri: str) -> tuple[str, ...]:
     """Ready a database for several readers, and let the artifacts that were moved with it be found."""
     try:
         _write_ahead(database)
+        _make_tables(database)
         return follow(database)
     except sqlite3.Error as error:
         raise _unusable(uri, error) from None
@@ -312,6 +313,21 @@ def _write_ahead(database: Path) -> None:
         connection.execute("PRAGMA journal_mode=WAL")
     finally:
         connection.close()
+
+
+def _make_tables(database: Path) -> None:
+    """Give a database without tables all of MLflow's at once. Made one by one in the file, as MLflow does it for some
+    seconds, a process that is killed meanwhile leaves some, and neither it nor any other can use the file again."""
+    with closing(sqlite3.connect(database, timeout=30)) as file:
+        if file.execute("SELECT 1 FROM sqlite_master").fetchone():
+            return
+        from mlflow.store.db.utils import _initialize_tables, create_sqlalchemy_engine
+
+        engine = create_sqlalchemy_engine(f"{SQLITE}:memory:")
+        _initialize_tables(engine)
+        with closing(engine.raw_connection()) as made:
+            made.driver_connection.backup(file)  # one transaction
+        engine.dispose()
 
 
 def _reach(uri: str) -> None:

@@ -1,13 +1,16 @@
 """What every registered method promises, whatever it does inside."""
 
 import io
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
 
 import numpy as np
 import pytest
 
 from aesi.conformal import COMPARED, METHODS, Calibrated, calibrated_from_dict
 from aesi.conformal.online.calibrated import SCHEMA
+from aesi.conformal.online.spci import SPCI
+from aesi.conformal.regressors.model import FitTask, QuantileModel
 from aesi.errors import FitError, InputError
 
 WINDOW = 50
@@ -132,6 +135,35 @@ def test_survives_a_file_without_pickle(calibrated: Calibrated) -> None:
     record = series(400, 6)
     np.testing.assert_array_equal(restored.intervals(record).lower_v, calibrated.intervals(record).lower_v)
     np.testing.assert_array_equal(restored.intervals(record).upper_v, calibrated.intervals(record).upper_v)
+
+
+@dataclass(frozen=True, eq=False)
+class Alike(QuantileModel):
+    """Quantiles that are the same whatever the history.  levels_v : (2 B,) V."""
+
+    levels_v: np.ndarray
+    kind: ClassVar[str] = "alike"
+
+    @classmethod
+    def fit(cls, task: FitTask) -> Self:
+        return cls(np.quantile(task.targets, task.levels))
+
+    def quantiles(self, rows):
+        return np.tile(self.levels_v, (len(rows), 1))
+
+    def to_state(self):
+        return {"levels_v": self.levels_v}
+
+    @classmethod
+    def from_state(cls, state, kinds):
+        return cls(np.asarray(state["levels_v"]))
+
+
+def test_a_regressor_that_was_added_had_to_be_listed_once_more_to_be_read_back() -> None:
+    fitted = SPCI(name="alike", fitter=Alike.fit).fit([series(1000, 1)], window=WINDOW)
+    record = series(400, 6)
+    restored = calibrated_from_dict(fitted.to_dict())
+    np.testing.assert_array_equal(restored.intervals(record).lower_v, fitted.intervals(record).lower_v)
 
 
 @pytest.mark.parametrize("content", [{"schema": SCHEMA}, [], None])

@@ -318,6 +318,7 @@ def test_a_discovery_says_what_cannot_be_meant_before_it_searches(cell, record, 
     [
         ({"starts": 1.5}, "starts = 1.5 is not a whole number from 1"),
         ({"seed": -1}, "seed = -1 is not a whole number from 0"),
+        ({"seed": 2**32}, "seed = 4294967296 is not a whole number from 0 up to 4294967295"),
         ({"cut_offs_v": 4.2}, r"cut_offs_v = 4.2: give \(lower, upper\) V"),
         ({"cut_offs_v": (1, 2, 3)}, r"cut_offs_v = \(1, 2, 3\): give"),
         ({"body_mm": 5}, "a body of 5 mm: give diameter and height"),

@@ -1,7 +1,6 @@
 """The interface of a regressor of the SPCI family: quantiles of the next residual from feature rows.
 
-A new regressor is one small file with a `QuantileModel`, a line in `aesi.conformal.saved` and a method that
-fits it in `aesi.conformal.registry`.
+A new regressor is one small file with a `QuantileModel`, and a method that fits it in `aesi.conformal.registry`.
 """
 
 from __future__ import annotations

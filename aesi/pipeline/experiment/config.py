@@ -12,7 +12,7 @@ import re
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 from pydantic import BaseModel, Field, ValidationError, field_validator, model_validator
 
@@ -26,6 +26,7 @@ from aesi.pipeline.experiment.sections import (
     DiscoverConfig,
     FallbackConfig,
     LibraryConfig,
+    RandomSeed,
     RunnerConfig,
     SearchConfig,
     Section,
@@ -74,7 +75,7 @@ class ExperimentConfig(Section):
 
     name: str
     note: str = ""
-    seed: Annotated[int, Field(ge=0)] = 0
+    seed: RandomSeed = 0
     data: DataConfig
     cell: CellConfig = CellConfig()
     fallback: FallbackConfig | None = None

@@ -20,6 +20,7 @@ from pydantic import (
     model_validator,
 )
 
+from aesi.constants import LARGEST_SEED
 from aesi.data.channels.columns import known_quantities
 from aesi.data.reading import Reading, column_name
 from aesi.data.units import known_units
@@ -31,6 +32,7 @@ Share = Annotated[float, Field(gt=0, lt=1)]
 Positive = Annotated[float, Field(gt=0)]
 Weight = Annotated[float, Field(ge=0)]
 Count = Annotated[int, Field(ge=1)]
+RandomSeed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
 SHORT_FOR = {"cell": "bpx"}
 """Section that may be written as a single text, also below `fallback` -> key that the text is the value of."""
 
@@ -115,7 +117,7 @@ class VirtualConfig(Section):
     pulse_c: Annotated[float, Field(ge=0)] = 5.0
     other_load: Positive = 2.0
     thermocouple: bool | None = None
-    seed: Annotated[int, Field(ge=0)] = 0
+    seed: RandomSeed = 0
 
     @model_validator(mode="after")
     def _effects_that_are_there(self) -> VirtualConfig:

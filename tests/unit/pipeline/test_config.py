@@ -114,6 +114,10 @@ FILES = {"kind": "files", "train": ["a.csv"], "test": ["b.csv"]}
             "window = 18 cannot hold the 19 residuals that enbpi needs at alpha = 0.1",
         ),
         ({"data": {"kind": "virtual", "virtual": {"seed": -1}}}, "data.virtual.seed = -1"),
+        (
+            {"seed": 2**32},
+            "seed = 4294967296 is not admissible: it has to be less than or equal to 4294967295",
+        ),
         ({"data": {"kind": "files", "columns": "I"}}, "it takes keys with a value each, as in {KEY: VALUE}"),
         (
             {"library": {"special": "ja"}},
