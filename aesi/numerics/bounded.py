@@ -13,7 +13,7 @@ Nocedal & Wright, Numerical Optimization, 2nd ed. (2006), chapters 10, 11 and 16
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 from typing import Protocol
 
@@ -86,66 +86,138 @@ def descend(
     tried above it as well, and so are both ends of the descent, which continues from the second then.
     Where the model fails at x0, the cost is infinite.
     """
-    x = _past_jumps(model, np.clip(x0, low, high), low, high, jumps, tolerance)
-    found = _descended(model, x, low, high, rounds, tolerance, slopes, jumps)
-    there = _past_jumps(model, found.x, low, high, jumps, tolerance)
-    if there is found.x:
-        return found
-    return _descended(model, there, low, high, rounds, tolerance, None, jumps)
+    descent = _Descent(model, low, high, tolerance, tuple(jumps))
+    found = descent.minimum(descent.past_jumps(np.clip(x0, low, high)), rounds, slopes)
+    there = descent.past_jumps(found.x)
+    return found if there is found.x else descent.minimum(there, rounds, None)
 
 
-def _past_jumps(
-    model: Residual, x: Array, low: Array, high: Array, jumps: Sequence[int], tolerance: float
-) -> Array:
-    """x (n,), with each of the coordinates `jumps` at zero where that reduces the cost by more than the tolerance; x
-    itself where none does, or where the model fails there."""
-    here = model.residual(x) if len(jumps) else None
-    if here is None:
+@dataclass(frozen=True, eq=False)
+class _Descent:
+    """What a descent is made with, as `descend` has it."""
+
+    model: Residual
+    low: Array
+    high: Array
+    tolerance: float
+    jumps: tuple[int, ...]
+
+    def minimum(self, x: Array, rounds: int, slopes: Array | None) -> Minimum:
+        """Where a descent from x within the box ends."""
+        residual = self.model.residual(x)
+        if residual is None or not np.isfinite(residual).all():
+            return Minimum(x, np.inf, False, x)
+        within, damping = self, DAMPING
+        if slopes is not None:
+            last, damping = within._broyden_steps(_Point(x, residual, slopes), damping, fresh=False)
+            x, residual = last.x, last.residual
+        for _ in range(rounds):
+            computed_slopes = self.model.slopes(x, residual)
+            if computed_slopes is None or not np.isfinite(computed_slopes).all():
+                return Minimum(x, _half_square(residual), False, x)
+            start = _Point(x, residual, computed_slopes)
+            last, damping = within._broyden_steps(start, damping, fresh=True)
+            if start.cost - last.cost < self.tolerance:
+                walled = within._within_walls(start)
+                if walled is not None:
+                    within = walled
+                    last, damping = within._broyden_steps(start, DAMPING, fresh=True)
+            x, residual = last.x, last.residual
+            if start.cost - last.cost < self.tolerance:
+                return Minimum(x, last.cost, True, start.x)
+        return Minimum(x, _half_square(residual), False, x)
+
+    def past_jumps(self, x: Array) -> Array:
+        """x (n,), with each of the coordinates `jumps` at zero where that reduces the cost by more than the tolerance;
+        x itself where none does, or where the model fails there."""
+        here = self.model.residual(x) if self.jumps else None
+        if here is None:
+            return x
+        cost = _half_square(here)
+        for j in self.jumps:
+            there = x.copy()
+            there[j] = np.clip(0.0, self.low[j], self.high[j])
+            residual = None if there[j] == x[j] else self.model.residual(there)
+            if residual is not None and cost - _half_square(residual) > self.tolerance:
+                x, cost = there, _half_square(residual)
         return x
-    cost = _half_square(here)
-    for j in jumps:
-        there = x.copy()
-        there[j] = np.clip(0.0, low[j], high[j])
-        residual = None if there[j] == x[j] else model.residual(there)
-        if residual is not None and cost - _half_square(residual) > tolerance:
-            x, cost = there, _half_square(residual)
-    return x
 
+    def _broyden_steps(self, here: _Point, damping: float, fresh: bool) -> tuple[_Point, float]:
+        """(last point, damping) after steps with the slopes of a point and then with their updates, while the cost
+        falls.
 
-def _descended(
-    model: Residual,
-    x: Array,
-    low: Array,
-    high: Array,
-    rounds: int,
-    tolerance: float,
-    slopes: Array | None,
-    jumps: Sequence[int],
-) -> Minimum:
-    """`descend` from x within the box, to where it ends first."""
-    residual = model.residual(x)
-    if residual is None or not np.isfinite(residual).all():
-        return Minimum(x, np.inf, False, x)
-    damping = DAMPING
-    if slopes is not None:
-        near = _Point(x, residual, slopes)
-        last, damping = _broyden_steps(model, near, low, high, tolerance, damping, False, jumps)
-        x, residual = last.x, last.residual
-    for _ in range(rounds):
-        computed_slopes = model.slopes(x, residual)
-        if computed_slopes is None or not np.isfinite(computed_slopes).all():
-            return Minimum(x, _half_square(residual), False, x)
-        start = _Point(x, residual, computed_slopes)
-        last, damping = _broyden_steps(model, start, low, high, tolerance, damping, True, jumps)
-        if start.cost - last.cost < tolerance:
-            limited_box = _within_walls(model, start, low, high, tolerance)
-            if limited_box is not None:
-                low, high = limited_box
-                last, damping = _broyden_steps(model, start, low, high, tolerance, DAMPING, True, jumps)
-        x, residual = last.x, last.residual
-        if start.cost - last.cost < tolerance:
-            return Minimum(x, last.cost, True, start.x)
-    return Minimum(x, _half_square(residual), False, x)
+        fresh : True where the slopes were computed at this point.
+        """
+        for _ in range(1 + len(here.x)):
+            accepted, damping = self._accepted_step(here, damping, fresh)
+            if accepted is None:
+                return here, damping
+            gain, here, fresh = here.cost - accepted.cost, accepted, False
+            if gain < self.tolerance:
+                break
+        return here, damping
+
+    def _accepted_step(self, here: _Point, damping: float, fresh: bool) -> tuple[_Point | None, float]:
+        """(point after one step that reduces the cost, with updated slopes, or None; damping for the next step).
+
+        A step that does not is repeated with a damping eight times as strong, until it promises less than the
+        tolerance; such a step is tried once, and only with slopes computed here. Where those are right some step
+        reduces the cost, however small the damping was before: on a pulse test read 0.125 s late (blind set, seed 31,
+        case 50) six trials left a fit 2,000 nats short at a lag of one row, where the slope has a kink.
+        """
+        for trial in count() if fresh else range(UPDATED_TRIALS):
+            promising, best = False, None
+            for step in self._steps(here, damping):
+                foreseen = here.residual + here.slopes @ step
+                little = here.cost - _half_square(foreseen) < self.tolerance
+                if not step.any() or (little and (trial or not fresh)):
+                    continue
+                promising = True
+                x = np.clip(here.x + step, self.low, self.high)
+                residual = self.model.residual(x)
+                if residual is not None and _half_square(residual) < (best or here).cost:
+                    slopes = here.slopes + np.outer(residual - foreseen, step / (step @ step))
+                    best = _Point(x, residual, slopes)
+            if best is not None:
+                return best, max(damping / 5.0, 1e-6)
+            if not promising:
+                return None, damping
+            damping *= STRONGER
+        return None, damping
+
+    def _steps(self, here: _Point, damping: float) -> Iterator[Array]:
+        """The step (n,) within the box and, where that leads below jumps, the step within the box above them."""
+        step = _step(here, self.low, self.high, damping)
+        yield step
+        below = [j for j in self.jumps if here.x[j] + step[j] < 0.0 <= here.x[j]]
+        if below:
+            above = self.low.copy()
+            above[below] = 0.0
+            yield _step(here, above, self.high, damping)
+
+    def _within_walls(self, here: _Point) -> _Descent | None:
+        """The descent in a box limited by walls at x, for a point where no step achieves the reduction that its slopes
+        promise; None where they promise less than the tolerance, or there is no wall.
+
+        A wall is found where a coordinate alone, in the shortest step that promises the tolerance, ends with a cost
+        more than the tolerance above the one that its slope predicts.
+        """
+        step, damping = np.zeros(len(here.x)), DAMPING
+        while (tried := _step(here, self.low, self.high, damping)).any():
+            if here.cost - _half_square(here.residual + here.slopes @ tried) < self.tolerance:
+                break
+            step, damping = tried, damping * STRONGER
+        low, high, found = self.low.copy(), self.high.copy(), False
+        for j in np.flatnonzero(step):
+            x = here.x.copy()
+            x[j] += step[j]
+            residual = self.model.residual(x)
+            foreseen = _half_square(here.residual + here.slopes[:, j] * step[j])
+            # NaN counts as a wall, too
+            if residual is None or not _half_square(residual) - foreseen <= self.tolerance:
+                (low if step[j] < 0.0 else high)[j] = here.x[j]
+                found = True
+        return replace(self, low=low, high=high) if found else None
 
 
 def foreseen_cost(x: Array, residual: Array, slopes: Array, low: Array, high: Array) -> float:
@@ -153,109 +225,6 @@ def foreseen_cost(x: Array, residual: Array, slopes: Array, low: Array, high: Ar
     here = _Point(x, residual, slopes)
     step = _step(here, low, high, DAMPING)
     return _half_square(residual + slopes @ step)
-
-
-def _broyden_steps(
-    model: Residual,
-    here: _Point,
-    low: Array,
-    high: Array,
-    tolerance: float,
-    damping: float,
-    fresh: bool,
-    jumps: Sequence[int],
-) -> tuple[_Point, float]:
-    """(last point, damping) after steps with the slopes of a point and then with their updates, while the cost falls.
-
-    fresh : True where the slopes were computed at this point.
-    """
-    for _ in range(1 + len(here.x)):
-        accepted, damping = _accepted_step(model, here, low, high, tolerance, damping, fresh, jumps)
-        if accepted is None:
-            return here, damping
-        gain, here, fresh = here.cost - accepted.cost, accepted, False
-        if gain < tolerance:
-            break
-    return here, damping
-
-
-def _accepted_step(
-    model: Residual,
-    here: _Point,
-    low: Array,
-    high: Array,
-    tolerance: float,
-    damping: float,
-    fresh: bool,
-    jumps: Sequence[int],
-) -> tuple[_Point | None, float]:
-    """(point after one step that reduces the cost, with updated slopes, or None; damping for the next step).
-
-    A step that does not is repeated with a damping eight times as strong, until it promises less than the tolerance;
-    such a step is tried once, and only with slopes computed here. Where those are right some step reduces the cost,
-    however small the damping was before: on a pulse test read 0.125 s late (blind set, seed 31, case 50) six trials
-    left a fit 2,000 nats short at a lag of one row, where the slope has a kink.
-
-    A step below a jump is tried above it as well, and the better one taken.
-    """
-    for trial in count() if fresh else range(UPDATED_TRIALS):
-        promising, best = False, None
-        for step in _steps(here, low, high, damping, jumps):
-            foreseen = here.residual + here.slopes @ step
-            little = here.cost - _half_square(foreseen) < tolerance
-            if not step.any() or (little and (trial or not fresh)):
-                continue
-            promising = True
-            x = np.clip(here.x + step, low, high)
-            residual = model.residual(x)
-            if residual is not None and _half_square(residual) < (best or here).cost:
-                slopes = here.slopes + np.outer(residual - foreseen, step / (step @ step))
-                best = _Point(x, residual, slopes)
-        if best is not None:
-            return best, max(damping / 5.0, 1e-6)
-        if not promising:
-            return None, damping
-        damping *= STRONGER
-    return None, damping
-
-
-def _steps(here: _Point, low: Array, high: Array, damping: float, jumps: Sequence[int]) -> Iterator[Array]:
-    """The step (n,) within the box and, where that leads below jumps, the step within the box above them."""
-    step = _step(here, low, high, damping)
-    yield step
-    below = [j for j in jumps if here.x[j] + step[j] < 0.0 <= here.x[j]]
-    if below:
-        above = low.copy()
-        above[below] = 0.0
-        yield _step(here, above, high, damping)
-
-
-def _within_walls(
-    model: Residual, here: _Point, low: Array, high: Array, tolerance: float
-) -> tuple[Array, Array] | None:
-    """(low, high) of the box limited by walls at x, for a point where no step achieves the reduction that its slopes
-    promise; None where they promise less than the tolerance, or there is no wall.
-
-    A wall is found where a coordinate alone, in the shortest step that promises the tolerance, ends with a cost more
-    than the tolerance above the one that its slope predicts.
-    """
-    step, damping = np.zeros(len(here.x)), DAMPING
-    while (tried := _step(here, low, high, damping)).any():
-        if here.cost - _half_square(here.residual + here.slopes @ tried) < tolerance:
-            break
-        step, damping = tried, damping * STRONGER
-    low, high, found = low.copy(), high.copy(), False
-    for j in np.flatnonzero(step):
-        x = here.x.copy()
-        x[j] += step[j]
-        residual = model.residual(x)
-        foreseen = _half_square(here.residual + here.slopes[:, j] * step[j])
-        if (
-            residual is None or not _half_square(residual) - foreseen <= tolerance
-        ):  # NaN counts as a wall, too
-            (low if step[j] < 0.0 else high)[j] = here.x[j]
-            found = True
-    return (low, high) if found else None
 
 
 def _step(here: _Point, low: Array, high: Array, damping: float) -> Array:
