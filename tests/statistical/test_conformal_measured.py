@@ -7,7 +7,7 @@ import pytest
 
 import aesi
 from aesi.conformal import METHODS
-from aesi.conformal.scores import low_minute_share, scores_of
+from aesi.conformal.scores import MIN_BIN_SAMPLES, low_minute_share, scores_of
 
 PIECE = 1800  # the drive repeats its schedule every 1,800 s
 
@@ -32,8 +32,8 @@ def test_holds_within_bins_and_minutes(pieces, name: str) -> None:
         scores = scores_of(intervals, residual, 0.1, current, soc)
         # 1,800 samples whose misses the adaptive step spaces out: the share scatters by less than a per cent.
         assert 0.88 <= scores.coverage <= 0.925
-        # Some eight bins of little more than 200 samples, each of which scatters by 2 %: four of these below 90 %.
-        assert scores.worst_bin_coverage >= 0.82
+        # Some eight bins of little more than 200 samples, each of which scatters by 2.1 %: four of these below 90 %.
+        assert scores.worst_bin_coverage >= 0.9 - 4.0 * np.sqrt(0.9 * 0.1 / MIN_BIN_SAMPLES)
         assert low_minute_share([intervals.covers(residual)], 1.0) <= 0.01
 
 
