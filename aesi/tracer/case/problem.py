@@ -22,6 +22,7 @@ from aesi.tracer.case.energies import ACTIVATION_ENERGIES, energies_of, far_from
 from aesi.tracer.case.fit_simulation import fit_simulation
 from aesi.tracer.case.free_parameter import (
     CAPACITY_SHARE,
+    SHARED_SUFFIX,
     STATE_OF_CHARGE,
     FreeParameter,
     acting_on,
@@ -178,6 +179,13 @@ class InverseProblem:
     def parameters_of(self, effect: str) -> list[FreeParameter]:
         """The parameters of an effect under test, by its id, in order."""
         return effect_parameters(effect, self.effects[effect].parameters, self.cell.nominal_capacity_ah)
+
+    def jumps(self, free: Sequence[FreeParameter]) -> list[int]:
+        """Numbers of the parameters below whose zero, the record as written, the voltage may jump: those of effects on
+        the record. A row at a step of the current was read before the step or, by a clock a millisecond earlier, after
+        it."""
+        owners = [self.effects.get(one.owner.removesuffix(SHARED_SUFFIX)) for one in free]
+        return [j for j, owner in enumerate(owners) if owner is not None and owner.on_record is not None]
 
     def active(self, values: ValuesByOwner, good: bool = False) -> tuple[ActiveEffect, ...]:
         """The effects to simulate with. An effect under test is included even at its neutral point: some rewrite the

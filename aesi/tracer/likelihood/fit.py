@@ -15,7 +15,7 @@ from aesi.numerics.metrics import rms
 from aesi.numerics.threads import side_by_side
 from aesi.numerics.typing import Array, BoolArray
 from aesi.tracer.case.blocks import Blocks
-from aesi.tracer.case.free_parameter import SHARED_SUFFIX, FreeParameter, values_of
+from aesi.tracer.case.free_parameter import FreeParameter, values_of
 from aesi.tracer.case.problem import STEP, InverseProblem
 from aesi.tracer.likelihood.gaussian import (
     Linearised,
@@ -151,9 +151,8 @@ class HypothesisFitter:
     ) -> Array:
         """Coordinates after a descent from x with a fixed size of the model error.
 
-        The voltage may jump where a lag passes zero: a row at a step of the current was read before the step or, a
-        millisecond earlier, after it. On a slow discharge and a drive (blind set, seed 40, case 35) a fit ended 350
-        nats short, at a lag of -1 ms.
+        Both sides of a jump are tried (`InverseProblem.jumps`): on a slow discharge and a drive (blind set, seed 40,
+        case 35) a fit ended 350 nats short, at a lag of -1 ms.
 
         rounds : most evaluations of the jacobian.  slopes_v : (n, k) V, approximate sensitivities at x to begin with.
         without : blocks that are left out.
@@ -162,14 +161,8 @@ class HypothesisFitter:
         begin = None if slopes_v is None else objective.columns(slopes_v)
         e = self.residual(x)
         tolerance = GAIN_NATS * (1.0 if e is None else beyond_expected(objective.errors(e)))
-        return descend(objective, x, self.low, self.high, rounds, tolerance, begin, self._on_record).known_x
-
-    @cached_property
-    def _on_record(self) -> list[int]:
-        """Numbers of the parameters of effects on the record; their coordinate is 0 for the record as written."""
-        effects = self.problem.effects
-        owners = [effects.get(one.owner.removesuffix(SHARED_SUFFIX)) for one in self.free]
-        return [j for j, owner in enumerate(owners) if owner is not None and owner.on_record is not None]
+        jumps = self.problem.jumps(self.free)
+        return descend(objective, x, self.low, self.high, rounds, tolerance, begin, jumps).known_x
 
     def finished(self, x: Array) -> FittedHypothesis | None:
         """The fit that ended at x, with its score; None where the model fails there, or has no score."""

@@ -257,8 +257,7 @@ class EffectGrowth:
             self._parent_error_v, -self.parent.fit.point.x[self.parent_columns][:, None]
         )
         tolerance = GAIN_NATS * beyond_expected(residual[: len(self._parent_error_v)])
-        on_record = self.problem.effects[self.effect].on_record is not None
-        jumps = range(len(start)) if on_record else ()
+        jumps = self.problem.jumps(self.added)
         return descend(self, start, self.low, self.high, ROUNDS, tolerance, jumps=jumps).known_x
 
     @property
