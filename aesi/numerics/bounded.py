@@ -29,6 +29,10 @@ UPDATED_TRIALS = 2
 """Trials of a step with updated slopes: where it fails, the slopes may be wrong."""
 
 
+Tolerance = float | Callable[[Array], float]
+"""A reduction of the cost that counts as none, or a function of a residual (m,) that gives it."""
+
+
 class Residual(Protocol):
     """A residual vector; half its sum of squares is minimised."""
 
@@ -74,14 +78,15 @@ def descend(
     low: Array,
     high: Array,
     rounds: int,
-    tolerance: float,
+    tolerance: Tolerance,
     slopes: Array | None = None,
     jumps: Sequence[int] = (),
 ) -> Minimum:
     """Minimise half a sum of squares within low <= x <= high.
 
     rounds : largest number of times that slopes are computed between jumps.  tolerance : stops where steps with
-    computed slopes reduce the cost by less than this.  slopes : (m, n) start values, from near x0; convergence is not
+    computed slopes reduce the cost by less than this, which may depend on the residual (m,) that they start from: what
+    is little far from the minimum may be much near it.  slopes : (m, n) start values, from near x0; convergence is not
     judged by them.  jumps : numbers of coordinates below whose zero the residual may be another one. A step below it is
     tried above it as well, and so are both ends of the descent, which continues from the second then.
     Where the model fails at x0, the cost is infinite.
@@ -99,8 +104,12 @@ class _Descent:
     model: Residual
     low: Array
     high: Array
-    tolerance: float
+    tolerance: Tolerance
     jumps: tuple[int, ...]
+
+    def negligible(self, gain: float, residual: Array) -> bool:
+        """Whether a reduction of the cost from that of a residual (m,) counts as none."""
+        return gain < (self.tolerance(residual) if callable(self.tolerance) else self.tolerance)
 
     def minimum(self, x: Array, rounds: int, slopes: Array | None) -> Minimum:
         """Where a descent from x within the box ends."""
@@ -117,13 +126,13 @@ class _Descent:
                 return Minimum(x, _half_square(residual), False, x)
             start = _Point(x, residual, computed_slopes)
             last, damping = within._broyden_steps(start, damping, fresh=True)
-            if start.cost - last.cost < self.tolerance:
+            if self.negligible(start.cost - last.cost, start.residual):
                 walled = within._within_walls(start)
                 if walled is not None:
                     within = walled
                     last, damping = within._broyden_steps(start, DAMPING, fresh=True)
             x, residual = last.x, last.residual
-            if start.cost - last.cost < self.tolerance:
+            if self.negligible(start.cost - last.cost, start.residual):
                 return Minimum(x, last.cost, True, start.x)
         return Minimum(x, _half_square(residual), False, x)
 
@@ -138,8 +147,8 @@ class _Descent:
             there = x.copy()
             there[j] = np.clip(0.0, self.low[j], self.high[j])
             residual = None if there[j] == x[j] else self.model.residual(there)
-            if residual is not None and cost - _half_square(residual) > self.tolerance:
-                x, cost = there, _half_square(residual)
+            if residual is not None and not self.negligible(cost - _half_square(residual), here):
+                x, cost, here = there, _half_square(residual), residual
         return x
 
     def _broyden_steps(self, here: _Point, damping: float, fresh: bool) -> tuple[_Point, float]:
@@ -152,8 +161,9 @@ class _Descent:
             accepted, damping = self._accepted_step(here, damping, fresh)
             if accepted is None:
                 return here, damping
-            gain, here, fresh = here.cost - accepted.cost, accepted, False
-            if gain < self.tolerance:
+            little = self.negligible(here.cost - accepted.cost, here.residual)
+            here, fresh = accepted, False
+            if little:
                 break
         return here, damping
 
@@ -169,7 +179,7 @@ class _Descent:
             promising, best = False, None
             for step in self._steps(here, damping):
                 foreseen = here.residual + here.slopes @ step
-                little = here.cost - _half_square(foreseen) < self.tolerance
+                little = self.negligible(here.cost - _half_square(foreseen), here.residual)
                 if not step.any() or (little and (trial or not fresh)):
                     continue
                 promising = True
@@ -204,7 +214,8 @@ class _Descent:
         """
         step, damping = np.zeros(len(here.x)), DAMPING
         while (tried := _step(here, self.low, self.high, damping)).any():
-            if here.cost - _half_square(here.residual + here.slopes @ tried) < self.tolerance:
+            foreseen = _half_square(here.residual + here.slopes @ tried)
+            if self.negligible(here.cost - foreseen, here.residual):
                 break
             step, damping = tried, damping * STRONGER
         low, high, found = self.low.copy(), self.high.copy(), False
@@ -214,7 +225,7 @@ class _Descent:
             residual = self.model.residual(x)
             foreseen = _half_square(here.residual + here.slopes[:, j] * step[j])
             # NaN counts as a wall, too
-            if residual is None or not _half_square(residual) - foreseen <= self.tolerance:
+            if residual is None or not self.negligible(_half_square(residual) - foreseen, here.residual):
                 (low if step[j] < 0.0 else high)[j] = here.x[j]
                 found = True
         return replace(self, low=low, high=high) if found else None

@@ -31,7 +31,8 @@ from aesi.tracer.likelihood.size_sums import SizeSums
 
 GAIN_NATS = 0.05
 """A descent stops where a step gains less than this, nats. The gain counts relative to the mean square of the whitened
-errors, where that exceeds 1 (`beyond_expected`)."""
+errors that the step starts from, where that exceeds 1 (`beyond_expected`). Relative to that at the start of the
+descent, fits of a virtual hysteresis ended 16 to 91 nats short (four draws, NMC cell)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,10 +160,8 @@ class HypothesisFitter:
         """
         objective = _Whitened(self, size, ~np.isin(self.blocks.of_row, without))
         begin = None if slopes_v is None else objective.columns(slopes_v)
-        e = self.residual(x)
-        tolerance = GAIN_NATS * (1.0 if e is None else beyond_expected(objective.errors(e)))
         jumps = self.problem.jumps(self.free)
-        return descend(objective, x, self.low, self.high, rounds, tolerance, begin, jumps).known_x
+        return descend(objective, x, self.low, self.high, rounds, objective.no_gain, begin, jumps).known_x
 
     def finished(self, x: Array) -> FittedHypothesis | None:
         """The fit that ended at x, with its score; None where the model fails there, or has no score."""
@@ -186,6 +185,11 @@ def beyond_expected(white: Array) -> float:
     squares is too large by this factor, as evidence.
     """
     return max(float(np.mean(white**2)), 1.0)
+
+
+def no_gain(white: Array) -> float:
+    """Nats that count as no gain over whitened errors (n,)."""
+    return GAIN_NATS * beyond_expected(white)
 
 
 def scored(problem: InverseProblem, blocks: Blocks, point: Linearised) -> PredictiveScore:
@@ -234,6 +238,10 @@ class _Whitened:
         e = self.fitter.residual(x)
         jacobian = None if e is None else self.fitter.jacobian(x, e)
         return None if jacobian is None else self.columns(jacobian)
+
+    def no_gain(self, residual: Array) -> float:
+        """Nats that count as no gain over a `residual` (n + k + m,)."""
+        return no_gain(residual[: len(residual) - len(self.fitter.free)])
 
     def columns(self, jacobian_v: Array) -> Array:
         """(n + k + m, m) slopes of the residual for the sensitivities (n, m) V of the model."""

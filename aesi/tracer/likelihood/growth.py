@@ -29,7 +29,7 @@ from aesi.tracer.case.free_parameter import (
     values_of,
 )
 from aesi.tracer.case.problem import STEP, InverseProblem, ValuesByOwner
-from aesi.tracer.likelihood.fit import GAIN_NATS, FittedHypothesis, beyond_expected
+from aesi.tracer.likelihood.fit import FittedHypothesis, no_gain
 from aesi.tracer.likelihood.gaussian import (
     BlockSums,
     Linearised,
@@ -253,17 +253,12 @@ class EffectGrowth:
         start = self._most_promising()
         if start is None:
             return None
-        residual = self.projected(
-            self._parent_error_v, -self.parent.fit.point.x[self.parent_columns][:, None]
-        )
-        tolerance = GAIN_NATS * beyond_expected(residual[: len(self._parent_error_v)])
         jumps = self.problem.jumps(self.added)
-        return descend(self, start, self.low, self.high, ROUNDS, tolerance, jumps=jumps).known_x
+        return descend(self, start, self.low, self.high, ROUNDS, self._no_gain, jumps=jumps).known_x
 
-    @property
-    def _parent_error_v(self) -> Array:
-        """(n, 1) V, residual of the parent."""
-        return self.parent.fit.point.residual_v[:, None]
+    def _no_gain(self, residual: Array) -> float:
+        """Nats that count as no gain over a `residual`."""
+        return no_gain(residual[: len(self.problem.measured)])
 
     def _most_promising(self) -> Array | None:
         """The start from which one step reduces the objective most; None where no start can be simulated."""

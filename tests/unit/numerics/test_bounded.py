@@ -198,3 +198,20 @@ def test_a_descent_ended_on_the_wrong_side_of_a_jump_beside_which_its_slopes_are
     assert found.x == pytest.approx([3.0, 0.0], abs=1e-3)
     assert found.cost < beside.cost - 1.9
     assert found.converged
+
+
+def test_what_is_no_gain_far_from_the_minimum_may_be_one_near_it():
+    """A valley along which each step gains little beside what the first one gained: with the tolerance of the start the
+    descent ends in it."""
+    start, box = np.array([-60.0, 1.0]), (np.full(2, -100.0), np.full(2, 4000.0))
+
+    def no_gain(residual):
+        return 1e-4 * max(float(np.mean(residual**2)), 1.0)
+
+    of_the_start = no_gain(rosenbrock().residual(start))
+    early = descend(rosenbrock(), start, *box, 100, of_the_start)
+    found = descend(rosenbrock(), start, *box, 100, no_gain)
+    assert early.converged
+    assert early.cost > 1.0
+    assert found.converged
+    assert found.cost < 1e-3
