@@ -120,7 +120,7 @@ class _Draws:
         names = next(self.recipes)
         known = [RECIPES[name] for name in names if name in RECIPES]
         cell, records = next(self.cells), next(self.records)
-        spread, warmth, given = next(self.spreads), next(self.warmths), next(self.given)
+        spread, warmth = next(self.spreads), next(self.warmths)
         low, high = CELLS[cell].soc0
         for recipe in known:
             if cell not in recipe.cells:
@@ -129,7 +129,6 @@ class _Draws:
                 records = tuple(recipe.test if record == "drive" else record for record in records)
                 low, high = FAST_CHARGE_SOC0
             warmth = "none" if recipe.warm else warmth
-            given = given or recipe.needs_soc0
         return CaseSpec(
             name=f"b{number:03d}",
             cell=cell,
@@ -141,7 +140,7 @@ class _Draws:
             spread=spread,
             warmth=warmth,
             soc0=round(float(self.rng.uniform(low, high)), 3),
-            soc0_given=given,
+            soc0_given=next(self.given),
             dt_s=next(self.rows_s),
             seed=int(self.rng.integers(2**31)),
         )

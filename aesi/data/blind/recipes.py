@@ -51,9 +51,8 @@ class Recipe:
     also : answers that a lenient judge also accepts.  least, most : range of magnitudes: below it, a wrong parameter is
     within the differences of parametrisations of one cell; above, it is not physical.
     test : test that shows the effect, in place of a drive.  cells : cells on which it can be made.
-    needs_soc0 : True where an unknown state of charge would absorb it.  warm : True where it concerns the temperature,
-    which is then in no column.
-    radial_points : of the two runs whose difference is used; their mesh error cancels.
+    warm : True where it concerns the temperature, which is then in no column.  radial_points : of the two runs whose
+    difference is used; their mesh error cancels.
     between : simulated rows per row, for an instrument that reads between rows.
     as_named : converts the values to the package's parameters of those names, by the declared cell file.
     """
@@ -68,7 +67,6 @@ class Recipe:
     most: float = 8.0
     test: RecordKind = "drive"
     cells: tuple[str, ...] = tuple(CELLS)
-    needs_soc0: bool = False
     warm: bool = False
     radial_points: int | None = None
     between: int = 1
@@ -288,7 +286,6 @@ RECIPES: dict[str, Recipe] = {
         lambda m, q, s: {"offset_v": 4e-3 * m},
         instrument=_voltage_offset,
         also=("ocp_shape",),
-        needs_soc0=True,
     ),
     "voltage_lag": Recipe(
         "clock_skew", lambda m, q, s: {"lag_s": 0.3 * m}, instrument=_lag, most=10.0, between=FINER
