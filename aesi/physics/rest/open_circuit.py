@@ -32,6 +32,8 @@ BEYOND_V = 0.05
 """A voltage this far beyond the declared full or empty still belongs to a full or an empty cell of this kind. A
 convention: with half or twice as much `aesi bench start --set cuts=16` refuses none of 48 rows, and what it is to
 refuse, cells of another chemistry, lies hundreds of millivolts off."""
+AROUND = np.linspace(-2.0, 2.0, 17)
+"""Voltages that a reading may be off by, in its standard deviations."""
 GRID = 4001
 """Number of states of charge in the table of open-circuit voltages."""
 
@@ -79,6 +81,33 @@ class OpenCircuit:
     def voltage_at(self, soc: float) -> float:
         """V, the open-circuit voltage."""
         return float(np.interp(soc, self.soc, self.ocv))
+
+    def with_potentials(self, cell: Cell) -> OpenCircuit:
+        """That of the same windows with the potentials of another cell; itself where they are the same."""
+        own = self.cell
+        n, p = (
+            {"ocp": electrode.ocp, "entropic": electrode.entropic}
+            for electrode in (cell.negative, cell.positive)
+        )
+        if all(
+            getattr(own.negative, name) == n[name] and getattr(own.positive, name) == p[name] for name in n
+        ):
+            return self
+        return OpenCircuit(
+            own.with_negative(**n).with_positive(**p), self.kelvin, self.name, self.potentials_v
+        )
+
+    def reread(self, other: OpenCircuit, soc: float, sd: float, higher_v: float) -> float:
+        """State of charge that `other` gives for a rest `higher_v` (V) above the one that reads `soc` here.
+
+        It is the mean over the voltages that the reading, known to `sd`, may be off by: it changes smoothly where a
+        potential is flat.
+        """
+        rest_v = self.voltage_at(soc)
+        spread_v = 0.5 * (self.voltage_at(soc + sd) - self.voltage_at(soc - sd))
+        around_v = rest_v + spread_v * AROUND
+        there = np.interp(around_v + higher_v, other.ocv, other.soc)
+        return soc + float((there - np.interp(around_v, self.ocv, self.soc)).mean())
 
     def full_sd(self, voltage_v: float, doubt_v: float = 0.0) -> float:
         """Standard deviation of the state of charge of a full cell that rests at `voltage_v`.

@@ -16,7 +16,9 @@ from aesi.numerics.typing import Array, BoolArray
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Effect
 from aesi.physics.initial_state import REST_C_RATE
-from aesi.physics.simulation import ModelName
+from aesi.physics.rest.open_circuit import OpenCircuit
+from aesi.physics.rest.voltage import freed_of_instruments, freed_of_series
+from aesi.physics.simulation import ModelName, model_with
 from aesi.records import Hold, Measurement, Run
 from aesi.tracer.case.energies import ACTIVATION_ENERGIES, energies_of, far_from_file
 from aesi.tracer.case.fit_simulation import fit_simulation
@@ -206,15 +208,41 @@ class InverseProblem:
             for i in indices:
                 good = self.records[i].good
                 voltage_v = self._cached_voltage_v if good else self._voltage_v
-                out.append(
-                    voltage_v(
-                        i, values[STATE_OF_CHARGE][str(i)], acting[good], record_capacity_share(values, i)
-                    )
-                )
+                soc0 = self._initial_soc(i, values, acting[good])
+                out.append(voltage_v(i, soc0, acting[good], record_capacity_share(values, i)))
         except (AesiError, *ARITHMETIC):
             return None
         joined = np.concatenate(out)
         return joined if _is_of_a_cell(joined) else None
+
+    def initial_soc(self, i: int, values: ValuesByOwner) -> float:
+        """State of charge at the first row of record `i`, in the declared windows.
+
+        The fitted one is what the voltage reads for the declared cell and its error. One that was read from a voltage
+        is read under the hypothesis: without what the effects add to that voltage (a sensor's offset, a hysteresis).
+        """
+        return self._initial_soc(i, values, self.active(values, self.records[i].good))
+
+    def _initial_soc(self, i: int, values: ValuesByOwner, effects: tuple[ActiveEffect, ...]) -> float:
+        """`initial_soc` with all active effects of the record."""
+        as_declared, record = values[STATE_OF_CHARGE][str(i)], self.records[i]
+        if record.start.basis not in ("rest", "load"):
+            return as_declared
+        model, declared = model_with(self.cell, effects), self._open_circuits[i]
+        supposed_effects = [active for active in effects if active not in self.fixed]
+        seen_v, current_a = float(record.data.voltage_v[0]), float(record.data.current_a[0])
+        supposed = declared.with_potentials(model.cell)
+        terminal_v = freed_of_instruments(model, supposed_effects, seen_v)
+        cell_v = freed_of_series(supposed, model, supposed_effects, terminal_v, current_a)
+        if supposed is declared and cell_v == seen_v:
+            return as_declared
+        return declared.reread(supposed, as_declared, record.soc0_sd, cell_v - seen_v)
+
+    @cached_property
+    def _open_circuits(self) -> tuple[OpenCircuit, ...]:
+        """That of the declared cell, by the potentials of the declared model, at the start of each record."""
+        cell = model_with(self.cell, self.fixed).cell
+        return tuple(OpenCircuit.at_start(self.cell, r.data).with_potentials(cell) for r in self.records)
 
     def _voltage_v(self, i: int, soc0: float, effects: tuple[ActiveEffect, ...], share: float = 1.0) -> Array:
         return self.run(self.fit_parts[i], soc0, effects, self.records[i].thin_hold, share=share).voltage_v

@@ -73,7 +73,7 @@ class ModelState:
         if self.values is None:
             return record.soc0
         if index is not None:
-            return self.values[STATE_OF_CHARGE][str(index)]
+            return self.problem.initial_soc(index, self.values)
         if record.start.basis == "full charge":
             return self._full_charge_soc(record.soc0)
         return record.soc0 if record.start.rest_voltage_v is None else None  # it was given
@@ -98,5 +98,7 @@ class ModelState:
         inside = folded(
             declared, self.effects(), lambda active: active in fixed or active.effect.infers is not None
         )
-        soc0 = self.problem.records[0].soc0 if self.values is None else self.values[STATE_OF_CHARGE]["0"]
+        soc0 = (
+            self.problem.records[0].soc0 if self.values is None else self.problem.initial_soc(0, self.values)
+        )
         return inside, same_rest(declared, inside.cell, soc0)
