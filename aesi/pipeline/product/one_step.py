@@ -42,8 +42,8 @@ class RowsAhead:
 
     @property
     def residual_v(self) -> Array:
-        """(p,) V, measured minus predicted; 0 at the first time, whose error is given."""
-        return self.error_v - self.predicted_v
+        """(p,) V, measured minus predicted; NaN at the first time, which nothing before it predicts."""
+        return np.where(self.stamps == 0, np.nan, self.error_v - self.predicted_v)
 
     @property
     def scored_v(self) -> Array:
