@@ -14,12 +14,13 @@ Barber, Candès, Ramdas & Tibshirani, Ann. Statist. 49 (2021) 486, doi:10.1214/2
 
 A quantile estimated from few pieces is exceeded too often by the next one. (2) widens the band as Student's t does for
 a normal error of unknown variance. Pieces that were cut from one left-out stretch of a drive have similar errors over a
-whole drive, so where the number of stretches is given, m is that. Halves of a repeat that are left out separately count
-as two. If the error of a drive were constant, the bands of three drives would then cover 85 % instead of 90. On
-measured drives it is not: over the development splits of `aesi bench splits` that train on three
-parts of the NMC drive the bands of the declared model cover 92.7 % and score 93.7 mV, and 97.1 % and 112.3 mV with the
-number of drives for m. At short horizons the errors within a piece
-are independent over much shorter times: every CORRELATED_HORIZONS horizons of a piece count as one.
+whole drive, so where the number of stretches is given, m is that of those that calibrate. (If all five that are given
+counted where the rows of two lie outside the range, the bands would cover 83 % of drives with a constant normal error
+instead of 90.) Halves of a repeat that are left out separately count as two. If the error of a drive were constant, the
+bands of three drives would then cover 85 % instead of 90. On measured drives it is not: over the development splits of
+`aesi bench splits` that train on three parts of the NMC drive the bands of the declared model cover 92.7 % and score
+93.7 mV, and 97.1 % and 112.3 mV with the number of drives for m. At short horizons the errors within a piece are
+independent over much shorter times: every CORRELATED_HORIZONS horizons of a piece count as one.
 
 Only rows inside the range that their model was trained on are counted: a model fitted without the first piece of a
 drive extrapolates there, the final model does not. Outside the trained range the inputs are held at its edge, and the
@@ -106,7 +107,8 @@ class FreeRunBands:
         everywhere.
         excess : one (n_i,) array per record, `FreeRun.excess` of that model; None where it has no leverage.
         seen, root, energies_j_mol : of the model that the bands are for.
-        stretches : number of stretches with independent errors over a whole drive; None takes the number of pieces.
+        stretches : number of stretches with independent errors over a whole drive, of which those count that calibrate
+        the band; None takes the number of pieces.
         records : name of the record of each array, where several arrays are of one record (with the same row numbers):
         no piece is scored by a scale that was fitted to its own rows. None where each array is a record of its own.
 

@@ -104,12 +104,14 @@ class HorizonBand:
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """sizes : (n,) V, |error|.  columns : (n, p).  record, rows : of which record, (n,) which of its rows."""
+    """sizes : (n,) V, |error|.  columns : (n, p).  record, rows : of which record, (n,) which of its rows.
+    array : number of the array of errors that it was cut from."""
 
     sizes: Array
     columns: Array
     record: str | int
     rows: IntArray
+    array: int
 
     def shares_rows_with(self, other: _Piece) -> bool:
         """Whether a row is in both pieces, even if predicted by different models; True for the piece itself."""
@@ -130,8 +132,8 @@ def calibrated_band(
 
     errors : one (n_i,) array per record, V, NaN where there is no prediction.  columns : one (n_i, p) per record, see
     `local_scale.covariates`.  inside : one (n_i,) per record, True inside the trained range of the model that
-    predicted.  stretches : number of stretches with independent errors over a whole drive; None, or too small a number,
-    takes the number of pieces.
+    predicted.  stretches : number of stretches with independent errors over a whole drive, of which those count, at
+    least MIN_PIECES, that have a piece; None, or too small a number, takes the number of pieces.
     records : name of the record of each array, where several are of one record (a part of a drive and the whole).
     Raises InputError where lengths differ; FitError for too few pieces, for a piece that shares rows with all others,
     and for errors that are all zero.
@@ -151,7 +153,7 @@ def calibrated_band(
     counts = np.array([float(score.size) for score in scores])
     independent = float(np.maximum(1, counts * dt_s // (CORRELATED_HORIZONS * horizon)).sum())
     if stretches is not None and stretches >= MIN_PIECES and horizon == WHOLE_DRIVE:
-        independent = stretches
+        independent = max(MIN_PIECES, min(stretches, _arrays_apart(pieces)))
     pooled_quantile = np.quantile(np.concatenate(scores), 1 - alpha, method="higher")
     return HorizonBand(
         horizon,
@@ -208,6 +210,19 @@ def _widening(independent: float, alpha: float) -> float:
     return float(stdtrit(independent - 1, 1 - alpha / 2) / ndtri(1 - alpha / 2))
 
 
+def _arrays_apart(pieces: Sequence[_Piece]) -> int:
+    """Largest number of arrays with pieces that share no row; a part of a drive and the whole of it are one."""
+    of_array: dict[int, list[_Piece]] = {}
+    for piece in pieces:
+        of_array.setdefault(piece.array, []).append(piece)
+    spans = [(each[0].record, int(each[0].rows[0]), int(each[-1].rows[-1])) for each in of_array.values()]
+    count, taken_to = 0, dict[str | int, int]()
+    for record, first, last in sorted(spans, key=lambda span: span[-1]):  # the most are those that end first
+        if first > taken_to.get(record, -1):
+            count, taken_to[record] = count + 1, last
+    return count
+
+
 def _scale(pieces: Sequence[_Piece], alpha: float) -> LocalScale:
     return LocalScale.fit(
         np.concatenate([piece.columns for piece in pieces]),
@@ -226,8 +241,8 @@ def _pieces(
     usable = [np.flatnonzero(np.isfinite(e) & i) for e, i in zip(errors, inside, strict=True)]
     longest = max(MIN_ROWS, -(-sum(rows.size for rows in usable) // N_PIECES))
     return [
-        _Piece(np.abs(e[part]), c[part], record, part)
-        for e, c, rows, record in zip(errors, columns, usable, records, strict=True)
+        _Piece(np.abs(e[part]), c[part], record, part, array)
+        for array, (e, c, rows, record) in enumerate(zip(errors, columns, usable, records, strict=True))
         for part in np.array_split(rows, max(1, round(rows.size / longest)))
         if part.size >= MIN_ROWS
     ]

@@ -13,7 +13,7 @@ MOST_TOLD = 3
 class Failed:
     """An expected failure inside a search or a fit: a value, not an exception.
 
-    of_machine : a process that was lost, or time that ran out, which another run may not meet.
+    of_machine : a process that was lost, or time or memory that ran out, which another run may not meet.
     """
 
     reason: str

@@ -54,7 +54,7 @@ def guarded(evaluate: Evaluate, genome: Any) -> Any:
     except AesiError as error:
         return Failed(str(error))
     except MemoryError:
-        return Failed("ran out of memory (search.memory_mb)")
+        return Failed("ran out of memory (search.memory_mb)", of_machine=True)
     except Exception as error:
         where = traceback.extract_tb(error.__traceback__)[-1]
         return Failed(

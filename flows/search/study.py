@@ -46,8 +46,9 @@ class StudyResult:
     scored: dict[int, ScoredCandidate | Failed]
 
     def candidates(self) -> tuple[Candidate, ...]:
-        """All candidates that did not fail."""
-        return tuple(one.candidate for one in self.scored.values() if not isinstance(one, Failed))
+        """All candidates that did not fail, by number: who works beside whom decides in which order they come."""
+        outcomes = (self.scored[number] for number in sorted(self.scored))
+        return tuple(one.candidate for one in outcomes if not isinstance(one, Failed))
 
     def rows(self) -> list[dict[str, Any]]:
         """The candidates that were evaluated, as the report draws them."""

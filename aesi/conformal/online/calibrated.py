@@ -108,6 +108,7 @@ class Stream:
         self._currents = _RecentValues(N_RECENT - 1)
         self._log_ratio = initial_log_ratio(calibrated.scale.log_ratio)
         self._pending: _Pending | None = None
+        self._warm = False
 
     def interval(self, current_a: float | None = None) -> tuple[float, float]:
         """(low, high) V of the next residual.
@@ -118,12 +119,14 @@ class Stream:
         pending = self._pending
         if pending is None or pending.current_a != current_a:
             pending = self._pending = self._make_interval(current_a)
+            self._warm = pending.warm
         return pending.low, pending.high
 
     @property
     def warm(self) -> bool:
-        """False while the history is too short, so that the last `interval` was the marginal one."""
-        return self._pending is not None and self._pending.warm
+        """False while the history is too short, so that the last `interval` was the marginal one, before the first one
+        and after a gap; an `update` changes nothing of it."""
+        return self._warm
 
     def update(self, error_v: float) -> None:
         """Add the residual of the sample of the last interval, V; NaN or infinity where it is missing.
@@ -151,6 +154,7 @@ class Stream:
         self._past.clear()
         self._currents.clear()
         self._pending = None
+        self._warm = False
 
     def _make_interval(self, current_a: float | None) -> _Pending:
         calibrated, group = self._calibrated, 0

@@ -387,9 +387,7 @@ class HybridModel:
         low = high = np.full(len(own), np.nan)
         if self.intervals is not None:
             ahead = rows_ahead(self.correction or Bare(), series)
-            residual = ahead.residual_v
-            residual[0] = np.nan
-            band = self.intervals.intervals(residual, ahead.current_a)
+            band = self.intervals.intervals(ahead.residual_v, ahead.current_a)
             at = np.searchsorted(ahead.stamps, step)
             low, high = (np.where(step == 0, np.nan, bound[at]) for bound in (band.lower_v, band.upper_v))
         alpha = None if self.intervals is None else self.intervals.alpha

@@ -27,8 +27,8 @@ class RowsAhead:
 
     stamps : (p,) number of the stamp at the end of the step of each.  error_v : (p,) V, measured error of the physics.
     predicted_v : (p,) V, its prediction.  known_v : (p,) V, the error that was known before, which persistence repeats.
-    unscored : (p,) True for rows that are not exactly so far ahead of what was known: the first, those without a row in
-    the step before, and the last one where it lies after the last stamp.
+    unscored : (p,) True for rows that are not exactly so far ahead of what was known: the first ones, those that are
+    predicted from before a gap or within it, and the last one where it lies after the last stamp.
     """
 
     dt_s: float
@@ -42,8 +42,8 @@ class RowsAhead:
 
     @property
     def residual_v(self) -> Array:
-        """(p,) V, measured minus predicted; 0 at the first time, whose error is given."""
-        return self.error_v - self.predicted_v
+        """(p,) V, measured minus predicted; NaN at the first time, which nothing before it predicts."""
+        return np.where(self.stamps == 0, np.nan, self.error_v - self.predicted_v)
 
     @property
     def scored_v(self) -> Array:
@@ -70,7 +70,8 @@ def rows_ahead(model: ErrorModel, series: ErrorSeries, steps: int = 1) -> RowsAh
     first = np.append(0, until[:-1])
     stamps = np.flatnonzero(until > first)
     last = until[stamps] - 1
-    unscored = (stamps < steps) | after_gap(own.time_s, series.dt_s)[first[stamps]]
+    known_at = np.maximum(stamps - steps, 0)
+    unscored = (stamps < steps) | after_gap(own.time_s, series.dt_s)[until[known_at]]
     unscored[-1] |= after_last_stamp
     # No measured error helps physics alone, which knows its own current at the row.
     at_rows = isinstance(model, Bare)
@@ -82,6 +83,6 @@ def rows_ahead(model: ErrorModel, series: ErrorSeries, steps: int = 1) -> RowsAh
         soc=own.soc[last],
         error_v=own.error_v[last],
         predicted_v=np.where(stamps == 0, own.error_v[last], predicted_v),
-        known_v=known.error_v[np.maximum(stamps - steps, 0)],
+        known_v=known.error_v[known_at],
         unscored=unscored,
     )

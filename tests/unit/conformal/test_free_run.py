@@ -364,5 +364,41 @@ def test_the_band_of_a_whole_drive_allows_for_as_few_stretches_as_it_is_told_of(
     assert four.horizons[0].widening == pieces.horizons[0].widening
 
 
+def test_a_stretch_outside_the_trained_range_tells_nothing_of_how_drives_differ() -> None:
+    errors, spreads = zip(*(drive(seed) for seed in range(5)), strict=True)
+    within, beyond = np.ones(N, dtype=bool), np.zeros(N, dtype=bool)
+
+    def widening(inside: list[np.ndarray], stretches: int = 5) -> float:
+        fitted_bands = FreeRunBands.fit(
+            {WHOLE_DRIVE: list(errors)}, DT, spreads, inside=inside, stretches=stretches
+        )
+        return fitted_bands.horizons[-1].widening
+
+    # Student's t at 0.95 with four and two degrees of freedom, by its printed table, over the normal quantile.
+    assert widening([within] * 5) == pytest.approx(2.132 / 1.645, rel=1e-3)
+    assert widening([within] * 3 + [beyond] * 2) == pytest.approx(2.920 / 1.645, rel=1e-3)
+    # Two stretches do not show how much they differ: the factor is that of the least number that does.
+    assert widening([within] * 2 + [beyond] * 3) == pytest.approx(2.920 / 1.645, rel=1e-3)
+
+
+def test_a_part_of_a_drive_and_the_whole_of_it_are_one_stretch() -> None:
+    errors = [drive(seed)[0] for seed in range(3)]
+    first, last = np.arange(N) < N // 2, np.arange(N) >= N // 2
+    halves = [np.where(half, error, np.nan) for error in errors for half in (first, last)]
+    names = [f"{i}" for i in range(3) for _ in range(2)]
+    of_halves, of_one_less = (
+        FreeRunBands.fit(
+            {WHOLE_DRIVE: [*halves[:count], *errors]},
+            DT,
+            stretches=count,
+            records=[*names[:count], "0", "1", "2"],
+        ).horizons[-1]
+        for count in (6, 5)
+    )
+    # Six halves; five of them, with the whole of the drive whose other half is missing.
+    assert of_halves.widening == pytest.approx(2.015 / 1.645, rel=1e-3)
+    assert of_one_less.widening == pytest.approx(2.132 / 1.645, rel=1e-3)
+
+
 def test_bands_of_97_5_percent_are_not_called_those_of_98():
     assert repr(FreeRunBands(0.025, ())) == "FreeRunBands(97.5 %, 0 horizons)"

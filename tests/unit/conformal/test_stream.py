@@ -30,6 +30,18 @@ def test_a_gap_brings_back_the_marginal_interval(calibrated) -> None:
     assert not stream.warm
 
 
+def test_a_stream_was_never_warm_once_a_sample_was_added(calibrated) -> None:
+    record = 1e-4 * np.random.default_rng(4).standard_normal(60)
+    stream, warm = calibrated.stream(), []
+    assert not stream.warm
+    for error in record:
+        stream.interval()
+        stream.update(float(error))
+        warm.append(stream.warm)  # of the interval of this sample
+    np.testing.assert_array_equal(warm, calibrated.intervals(record).warm)
+    assert warm[-1]
+
+
 def test_infinity_counts_as_missing(calibrated) -> None:
     record = 1e-4 * np.random.default_rng(2).standard_normal(60)
     broken, missing = record.copy(), record.copy()

@@ -10,6 +10,7 @@ from aesi.pipeline.experiment.fit import build_problem, final_models
 from aesi.pipeline.experiment.intervals import conformalise as intervals
 from aesi.pipeline.experiment.load import load
 from aesi.sparse import ENSEMBLES, Candidate, Genome, evaluate
+from aesi.sparse.bare import Bare
 
 
 @pytest.fixture(scope="module")
@@ -53,3 +54,14 @@ def test_a_faded_model_was_calibrated_on_what_it_said_before_its_leverage_was_kn
             # The leverage does something there, or the order would not matter.
             unfaded = chosen.ensembles[ENSEMBLES.index(one.model.name)]
             assert np.ptp(model.free_run(series).error_v - unfaded.free_run(series).error_v) > 1e-4
+
+
+def test_the_first_sample_of_a_drive_calibrated_intervals_of_physics_as_predicted_exactly(faded):
+    problem, _, config = faded
+
+    class Given:
+        def fit(self, residuals, *rest, current_a):
+            return residuals
+
+    (residual_v,) = intervals._intervals([(Bare(), problem.split.train[0], slice(0, 50))], config, Given())
+    np.testing.assert_array_equal(np.isfinite(residual_v), np.arange(50) > 0)

@@ -64,6 +64,17 @@ def test_a_row_with_none_a_step_before_it_is_no_prediction_one_step_ahead():
     np.testing.assert_array_equal(rows_ahead(Held(), SEVERAL, 2).scored_v, [np.nan, np.nan, 2.0, 2.0])
 
 
+def test_rows_some_steps_after_a_gap_were_judged_by_what_was_known_before_it():
+    time_s = np.concatenate([np.arange(20.0), np.arange(50.0, 70.0)])
+    series = series_of(time_s, np.arange(70.0), time_s)  # an error that grows by one each second
+    ahead = rows_ahead(Held(), series, 5)
+    assert np.array_equal(ahead.stamps, time_s)
+    scored = np.isfinite(ahead.persistence_v)
+    # From 50 s on a measured error is known, so that 55 s is the first row that is five steps ahead of one.
+    np.testing.assert_array_equal(time_s[scored], [*range(5, 20), *range(55, 70)])
+    np.testing.assert_array_equal(ahead.persistence_v[scored], 5.0)
+
+
 SEVERAL = replace(series_of(np.arange(4.0), np.arange(4.0), np.arange(4.0)), own=None)
 
 

@@ -96,7 +96,6 @@ def _judge(one: Fitted, series: ErrorSeries, role: Role) -> _Judged:
     free = replace(free, outside=outside_trained(free.outside, series, trained_on(one.model, one.bands)))
     ahead = rows_ahead(one.model, series)
     residual = ahead.residual_v
-    residual[0] = np.nan  # the first sample cannot be predicted one step ahead
     return _Judged(
         series=series,
         free=free,

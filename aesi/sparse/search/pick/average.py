@@ -2,7 +2,11 @@
 
 The losses of the fittest candidates differ by less than chance, and their differences are mostly errors. A map without
 feedback is linear in its coefficients, so that its free run is the mean of their free runs; where terms hold the error
-it is the mean of the maps over one step.
+it is the mean of the maps over one step, without the memories of those that have no such terms. One step ahead a mean
+of both kinds therefore errs more than these, and in free run less than a mean without them: on the NMC drive (60
+candidates that may feed back, the declared physics, three seeds) the means of the fittest six, of which one or two have
+no term in the error, err by 3.7 to 4.2 mV one step ahead, and those two kinds apart by 2.7 to 3.8 mV and 0.9 to 1.1 mV;
+they take 30 to 52 % off the squared error of a free run, those with such terms alone 0 to 47 %.
 Hoeting, Madigan, Raftery & Volinsky, Stat. Sci. 14 (1999) 382, with equal weights.
 """
 
