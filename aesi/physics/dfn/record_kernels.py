@@ -31,6 +31,9 @@ FIRST_LENGTH = 0.25
 """Share of a step that is taken first where there are double layers and the current changes, or did in the row before.
 Under pulses to 3C, the error of whole steps of 1 s between edges of 0.1 s is 0.52 mV RMS; with a quarter step first,
 0.05. It is also taken within a linear change: its end could only be told by slopes, which rows between others round."""
+FIRST_OF_LONGEST = 0.125
+"""The same share of the longest step: in rows of 10 s at 0 degC the file of an LG 18650HG2 with a steep diffusivity is
+0.68 mV off steps of 1/16 s with it, and 1.09 with a quarter of its steps of 2 s."""
 TEMPERATURE_STEP_K = 0.01
 """Change of temperature after which the rates of diffusion are computed again (0.04 % of a rate at 30 kJ/mol)."""
 
@@ -68,7 +71,9 @@ def step_porous_record(  # type: ignore[no-untyped-def]
             moved_before, moves = moves, not drive.backward and current[k] != current[k - 1]
             restless = moves or moved_before or jumped
         # In parts: of the way between the samples, and of the next step.
-        reached, length = 0.0, FIRST_LENGTH if restless else 1.0
+        reached, length = 0.0, 1.0
+        if restless:
+            length = min(FIRST_LENGTH, FIRST_OF_LONGEST * drive.substep / drive.finer * parts / whole)
         while reached < parts - ROUND_OFF:
             length = min(length, math.floor(reached + ROUND_OFF) + 1.0 - reached)
             dt = whole / parts * length

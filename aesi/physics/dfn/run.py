@@ -17,8 +17,8 @@ from aesi.records import Hold
 LONGER_STEPS = 2.0
 """Length of steps over that for the single particle, whose deviations are of first order. Under pulses of an LG M50 in
 rows of 10 s, steps of 2 s are 0.004 mV RMS off steps of 0.25 s, and 5 s 0.012; a C/20 discharge of 37 h takes 0.7 s and
-0.3. Where a diffusivity spans three decades, at the end of one of twenty pulses of 10 s at 0 degC, they are 0.5 and 2.0
-mV off steps of 1/16 s in rows of 5 s, and 0.7 and 1.3 in rows of 10 s."""
+0.3. Where a diffusivity spans three decades, at the end of one of twenty pulses of 10 s at 0 degC, they are 0.95 and
+2.6 mV off steps of 1/16 s in rows of 5 s, and 0.7 and 1.1 in rows of 10 s."""
 
 
 def run_porous_electrode(

@@ -149,7 +149,7 @@ def advance(  # type: ignore[no-untyped-def]
         if e.plating[0] > 0.0:
             commit_metal(p, e, state, t, dt, t_k)
         if e.has_layers:
-            commit_layers(p, e, state, t, dt)
+            commit_layers(p, e, state, t, dt, w)
     return phi_n, phi_p, steps
 
 
@@ -261,12 +261,19 @@ def commit_metal(p, e, state, t, dt, t_k):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def commit_layers(p, e, state, t, dt):  # type: ignore[no-untyped-def]
-    """Set the currents into double layers at the end of the step; particles get the exact remainder."""
+def commit_layers(p, e, state, t, dt, w):  # type: ignore[no-untyped-def]
+    """Set the currents into double layers at the end of the step; particles get the exact remainder at its start.
+
+    It is in their modes, too: there an error of the prediction that recurs at every step would stay."""
     for r in range(e.capacity.shape[0]):
         begun = state.layer[r]
         state.layer[r] = t.layer_c[r] * state.psi[r] - t.layer_old[r]
         t.lag[r] -= t.skew[r] * (begun - state.layer[r])
     for u in range(p.place.shape[0]):
         r = p.place[u]
-        state.mean[u] += 1.5 * p.scale[u] * dt * p.share[u] / e.node_share[r] * t.lag[r]
+        given = p.scale[u] * p.share[u] / e.node_share[r] * t.lag[r]
+        state.mean[u] += 1.5 * dt * given
+        for j in range(p.gains.shape[0]):
+            more = p.gains[j] * w[p.kind[u], 1, j] * given
+            state.z[u, j] += more
+            state.flow[u, j] += t.near[p.kind[u]] * more

@@ -2,6 +2,8 @@
 
     i = i_reaction + C d(phi_s - phi_e)/dt        C per reactive area, each electrode
 
+Lithium ions charge the layer, so that its current counts in the salt as that of the reaction does.
+
 Leaves out dependence of C on potential, and diffuse layers. Holds where samples are no further apart than a few
 C R_ct; with slower sampling the data do not determine it.
 
