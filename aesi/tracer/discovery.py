@@ -42,7 +42,7 @@ from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.report.candidate_effects import CandidateEffect, ranking
 from aesi.tracer.report.explain import explain
 from aesi.tracer.report.outcome import FileOutcome, State, States, depletion_notes, held_out_rmse_v, outcomes
-from aesi.tracer.report.own_parameters import OwnParameter, ages_told, own_parameters
+from aesi.tracer.report.own_parameters import OwnParameter, ages_told, own_parameters, starts_told
 from aesi.tracer.report.tell_apart import telling_experiment
 from aesi.tracer.report.warning import contradicted_by_v, warnings
 from aesi.tracer.report.yardstick import Yardstick, yardstick_of
@@ -410,6 +410,7 @@ def _notes(evidence: Evidence, tested: Sequence[PreparedRecord], left: ResidualS
     notes += [*evidence.verdict.look_alike_notes, *evidence.limits]
     ages = ages_told((evidence.after, evidence.recalibrated))
     notes += [ages] if ages else []
+    notes += starts_told(evidence.after)
     if left.yardstick.explained_v is None:
         notes.append(NO_YARDSTICK)
     if (

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aesi.tracer.case.free_parameter import CAPACITY_SHARE, FreeParameter
+from aesi.tracer.case.free_parameter import CAPACITY_SHARE, STATE_OF_CHARGE, FreeParameter
 from aesi.tracer.likelihood.model_state import ModelState
 
 LIMIT_SHARE = 0.01
@@ -19,8 +19,9 @@ class OwnParameter:
     """A declared parameter after a fit.
 
     owner : id of the effect that restates it, or one of RECORD_OWNERS; `name` is then that of the record.
-    declared, value : in `unit`; a factor is declared as 1.  deviations : value - declared, in prior standard deviations
-    of that fit.  one_sd : size of one standard deviation on the side to which it moved, in `unit`.
+    declared, value : in `unit`; a factor is declared as 1, a state of charge as this model reads it from the voltage.
+    deviations : value - declared, in prior standard deviations of that fit.  one_sd : size of one standard deviation on
+    the side to which it moved, in `unit`.
     at_limit : whether it ended at the end of its range.
     """
 
@@ -38,13 +39,41 @@ def own_parameters(state: ModelState) -> tuple[OwnParameter, ...]:
     """The declared parameters that a fit moved, largest deviation first; empty where nothing was fitted."""
     if state.values is None:
         return ()
-    problem = state.problem
-    found = [
-        _own_parameter(free, state.values[free.owner][free.name], _name(state, free))
-        for free in problem.free(state.hypothesis)
-        if free.own and free.name in state.values.get(free.owner, {})
-    ]
+    starts = _read_and_fitted(state)
+    found = []
+    for free in state.problem.free(state.hypothesis):
+        if not free.own or free.name not in state.values.get(free.owner, {}):
+            continue
+        one = _own_parameter(free, state.values[free.owner][free.name], _name(state, free))
+        if free.owner == STATE_OF_CHARGE:
+            read, fitted = starts[int(free.name)]
+            one = replace(one, declared=read, value=fitted)
+        found.append(one)
     return tuple(sorted(found, key=lambda one: -abs(one.deviations)))
+
+
+def starts_told(state: ModelState) -> list[str]:
+    """A sentence for each record whose first voltage reads as another state of charge with what was found, beyond the
+    uncertainty of that reading."""
+    records = state.problem.records
+    return [
+        f"with what was found, the first voltage of {record.name} is that of a state of charge of {read:.3f}, not "
+        f"{record.soc0:.3f}."
+        for record, (read, _) in zip(records, _read_and_fitted(state), strict=True)
+        if abs(read - record.soc0) > record.soc0_sd
+    ]
+
+
+def _read_and_fitted(state: ModelState) -> list[tuple[float, float]]:
+    """(state of charge that the first voltage of a record reads as in this model, the fitted one) of each record."""
+    problem, values = state.problem, state.values
+    if values is None:
+        return [(record.soc0, record.soc0) for record in problem.records]
+    as_declared = {str(i): record.soc0 for i, record in enumerate(problem.records)}
+    read = {**values, STATE_OF_CHARGE: as_declared}
+    return [
+        (problem.initial_soc(i, read), problem.initial_soc(i, values)) for i in range(len(problem.records))
+    ]
 
 
 def ages_told(states: Sequence[ModelState]) -> str:
