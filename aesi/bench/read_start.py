@@ -27,6 +27,7 @@ from aesi.tracer import discover
 
 CELLS = ("lg_m50_chen2020", "nmc_30ah", "lfp_prada2013", "nca_kim2011", "panasonic_ncr18650pf")
 STARTS = (0.55, 0.92)
+"""States of charge at the first row: a flat and a steep part of most potentials. A convention."""
 HYSTERESIS = {"rate": 20.0, "start": 1.0}
 SHIFTING: tuple[tuple[str, Mapping[str, float]], ...] = (
     ("voltage_sensor_offset", {"offset_v": 8e-3}),
@@ -54,9 +55,10 @@ COMPETING = (
 )
 """The effects that the finder may name."""
 DURATION_S, STEP_S, NOISE_V = 3600, 20, 1e-3
+"""Length of a record and of a step of its current, s, and standard deviation of its noise, V. A convention."""
 
 
-def record(cell: Cell, soc0: float, effect: str, values: Mapping[str, float]) -> Measurement:
+def record_at_rest(cell: Cell, soc0: float, effect: str, values: Mapping[str, float]) -> Measurement:
     """A record at 1 Hz with one effect, at rest in its first row."""
     rng = np.random.default_rng(int(abs(next(iter(values.values()))) * 1e4 + 100 * soc0))
     time_s = np.arange(float(DURATION_S))
@@ -76,7 +78,7 @@ def rows(cells: Path) -> Iterator[dict[str, Any]]:
         cell = Cell.from_bpx(cells / f"{name}.bpx.json")
         for soc0 in STARTS:
             for effect, values in (*SHIFTING, *OTHERS):
-                found = discover(cell, [record(cell, soc0, effect, values)], effects=competing)
+                found = discover(cell, [record_at_rest(cell, soc0, effect, values)], effects=competing)
                 yield {
                     "cell": name,
                     "soc0": soc0,

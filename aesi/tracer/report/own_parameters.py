@@ -39,14 +39,13 @@ def own_parameters(state: ModelState) -> tuple[OwnParameter, ...]:
     """The declared parameters that a fit moved, largest deviation first; empty where nothing was fitted."""
     if state.values is None:
         return ()
-    starts = _read_and_fitted(state)
     found = []
     for free in state.problem.free(state.hypothesis):
         if not free.own or free.name not in state.values.get(free.owner, {}):
             continue
         one = _own_parameter(free, state.values[free.owner][free.name], _name(state, free))
         if free.owner == STATE_OF_CHARGE:
-            read, fitted = starts[int(free.name)]
+            read, fitted = _read_and_fitted(state)[int(free.name)]
             one = replace(one, declared=read, value=fitted)
         found.append(one)
     return tuple(sorted(found, key=lambda one: -abs(one.deviations)))

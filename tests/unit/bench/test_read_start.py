@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aesi.bench.read_start import COMPETING, NOISE_V, OTHERS, SHIFTING, record, rows
+from aesi.bench.read_start import COMPETING, NOISE_V, OTHERS, SHIFTING, record_at_rest, rows
 from aesi.physics import Cell, simulate
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
@@ -14,7 +14,7 @@ CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
 
 def test_a_record_begins_at_rest_and_holds_the_effect_alone():
     cell = Cell.from_bpx(CELLS / "nmc_30ah.bpx.json")
-    made = record(cell, 0.55, "voltage_sensor_offset", {"offset_v": 16e-3})
+    made = record_at_rest(cell, 0.55, "voltage_sensor_offset", {"offset_v": 16e-3})
     plain = simulate(cell, made.time_s, made.current_a, 0.55, hold="backward").voltage_v
     assert made.current_a[0] == 0.0
     assert np.mean(made.voltage_v - plain) == pytest.approx(16e-3, abs=5 * NOISE_V / 60)
