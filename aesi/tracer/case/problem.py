@@ -218,8 +218,9 @@ class InverseProblem:
     def initial_soc(self, i: int, values: ValuesByOwner) -> float:
         """State of charge at the first row of record `i`, in the declared windows.
 
-        The fitted one is what the voltage reads for the declared cell and its error. One that was read from a voltage
-        is read under the hypothesis: without what the effects add to that voltage (a sensor's offset, a hysteresis).
+        The fitted value is what the declared cell reads from the voltage, and the error of that reading. Where it was
+        read and not given, the same voltage is read under the hypothesis: by its potentials, without what its effects
+        add (a sensor's offset, a hysteresis).
         """
         return self._initial_soc(i, values, self.active(values, self.records[i].good))
 

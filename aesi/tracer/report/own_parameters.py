@@ -52,12 +52,12 @@ def own_parameters(state: ModelState) -> tuple[OwnParameter, ...]:
 
 
 def starts_told(state: ModelState) -> list[str]:
-    """A sentence for each record whose first voltage reads as another state of charge with what was found, beyond the
-    uncertainty of that reading."""
+    """A sentence for each record whose first voltage reads as another state of charge in this model than in the
+    declared cell, beyond the uncertainty of that reading."""
     records = state.problem.records
     return [
-        f"with what was found, the first voltage of {record.name} is that of a state of charge of {read:.3f}, not "
-        f"{record.soc0:.3f}."
+        f"in the written model the first voltage of {record.name} is that of a state of charge of {read:.3f}; the "
+        f"declared cell reads it as {record.soc0:.3f}."
         for record, (read, _) in zip(records, _read_and_fitted(state), strict=True)
         if abs(read - record.soc0) > record.soc0_sd
     ]

@@ -76,4 +76,4 @@ def test_an_effect_that_shifts_the_first_voltage_far_is_named_on_a_flat_potentia
     assert estimate.value == pytest.approx(true, rel=0.15)
     moved = next(one for one in found.own["after"] if one.owner == "soc0")
     assert max(abs(moved.declared - SOC0), abs(moved.value - SOC0)) < 0.03  # declared: 0.18 off
-    assert any("with what was found, the first voltage of made is that of" in note for note in found.notes)
+    assert any("in the written model the first voltage of made is that of" in note for note in found.notes)
