@@ -208,24 +208,22 @@ class InverseProblem:
             for i in indices:
                 good = self.records[i].good
                 voltage_v = self._cached_voltage_v if good else self._voltage_v
-                soc0 = self._initial_soc(i, values, acting[good])
+                soc0 = self.initial_soc(i, values, acting[good])
                 out.append(voltage_v(i, soc0, acting[good], record_capacity_share(values, i)))
         except (AesiError, *ARITHMETIC):
             return None
         joined = np.concatenate(out)
         return joined if _is_of_a_cell(joined) else None
 
-    def initial_soc(self, i: int, values: ValuesByOwner) -> float:
+    def initial_soc(self, i: int, values: ValuesByOwner, effects: tuple[ActiveEffect, ...]) -> float:
         """State of charge at the first row of record `i`, in the declared windows.
 
         The fitted value is what the declared cell reads from the voltage, and the error of that reading. Where it was
         read and not given, the same voltage is read under the hypothesis: by its potentials, without what its effects
         add (a sensor's offset, a hysteresis).
-        """
-        return self._initial_soc(i, values, self.active(values, self.records[i].good))
 
-    def _initial_soc(self, i: int, values: ValuesByOwner, effects: tuple[ActiveEffect, ...]) -> float:
-        """`initial_soc` with all active effects of the record."""
+        effects : all that act on the record, as `active` has them.
+        """
         as_declared, record = values[STATE_OF_CHARGE][str(i)], self.records[i]
         if record.start.basis not in ("rest", "load"):
             return as_declared

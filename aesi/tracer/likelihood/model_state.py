@@ -73,10 +73,14 @@ class ModelState:
         if self.values is None:
             return record.soc0
         if index is not None:
-            return self.problem.initial_soc(index, self.values)
+            return self.fitted_soc(index, self.values)
         if record.start.basis == "full charge":
             return self._full_charge_soc(record.soc0)
         return record.soc0 if record.start.rest_voltage_v is None else None  # it was given
+
+    def fitted_soc(self, index: int, values: ValuesByOwner) -> float:
+        """State of charge at the first row of a fitted record by these values, with the effects of this model."""
+        return self.problem.initial_soc(index, values, self.effects(self.problem.records[index].good))
 
     def start_slope_v(self, record: PreparedRecord) -> Array:
         """(n,) V, change of the voltage on a whole record that was not fitted, by one standard deviation of its initial
@@ -98,7 +102,6 @@ class ModelState:
         inside = folded(
             declared, self.effects(), lambda active: active in fixed or active.effect.infers is not None
         )
-        soc0 = (
-            self.problem.records[0].soc0 if self.values is None else self.problem.initial_soc(0, self.values)
-        )
+        first = self.problem.records[0]
+        soc0 = first.soc0 if self.values is None else self.fitted_soc(0, self.values)
         return inside, same_rest(declared, inside.cell, soc0)

@@ -45,8 +45,8 @@ def own_parameters(state: ModelState) -> tuple[OwnParameter, ...]:
             continue
         one = _own_parameter(free, state.values[free.owner][free.name], _name(state, free))
         if free.owner == STATE_OF_CHARGE:
-            read, fitted = _read_and_fitted(state)[int(free.name)]
-            one = replace(one, declared=read, value=fitted)
+            index = int(free.name)
+            one = replace(one, declared=_read_soc(state, index), value=state.fitted_soc(index, state.values))
         found.append(one)
     return tuple(sorted(found, key=lambda one: -abs(one.deviations)))
 
@@ -54,25 +54,19 @@ def own_parameters(state: ModelState) -> tuple[OwnParameter, ...]:
 def starts_told(state: ModelState) -> list[str]:
     """A sentence for each record whose first voltage reads as another state of charge in this model than in the
     declared cell, beyond the uncertainty of that reading."""
-    records = state.problem.records
+    read = [(record, _read_soc(state, i)) for i, record in enumerate(state.problem.records)]
     return [
-        f"in the written model the first voltage of {record.name} is that of a state of charge of {read:.3f}; the "
+        f"in the written model the first voltage of {record.name} is that of a state of charge of {soc:.3f}; the "
         f"declared cell reads it as {record.soc0:.3f}."
-        for record, (read, _) in zip(records, _read_and_fitted(state), strict=True)
-        if abs(read - record.soc0) > record.soc0_sd
+        for record, soc in read
+        if abs(soc - record.soc0) > record.soc0_sd
     ]
 
 
-def _read_and_fitted(state: ModelState) -> list[tuple[float, float]]:
-    """(state of charge that the first voltage of a record reads as in this model, the fitted one) of each record."""
-    problem, values = state.problem, state.values
-    if values is None:
-        return [(record.soc0, record.soc0) for record in problem.records]
-    as_declared = {str(i): record.soc0 for i, record in enumerate(problem.records)}
-    read = {**values, STATE_OF_CHARGE: as_declared}
-    return [
-        (problem.initial_soc(i, read), problem.initial_soc(i, values)) for i in range(len(problem.records))
-    ]
+def _read_soc(state: ModelState, index: int) -> float:
+    """State of charge that the first voltage of a fitted record reads as in this model."""
+    read = state.problem.records[index].soc0
+    return read if state.values is None else state.fitted_soc(index, {STATE_OF_CHARGE: {str(index): read}})
 
 
 def ages_told(states: Sequence[ModelState]) -> str:
