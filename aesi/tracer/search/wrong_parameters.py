@@ -64,11 +64,14 @@ def _with_another(path: Path, chosen: FittedHypothesis) -> list[FittedHypothesis
     return [fit for fit in fits if names < set(fit.hypothesis) and len(fit.hypothesis) == len(names) + 1]
 
 
-def beyond_spread(problem: InverseProblem, fit: FittedHypothesis) -> list[str]:
-    """Ids of the effects whose own parameters are off by more than files are, with 95 % probability."""
+def beyond_spread(problem: InverseProblem, fit: FittedHypothesis, sure_sds: float = NINETY_SDS) -> list[str]:
+    """Ids of the effects whose own parameters are off by more than files are, with 95 % probability.
+
+    sure_sds : standard deviations of the fit by which a value has to be beyond; 0 takes the fitted values themselves.
+    """
     sds = np.sqrt(np.diagonal(fit.score.covariance))
     declared = [
-        (f.owner, abs(float(x)) - NINETY_SDS * float(sd))
+        (f.owner, abs(float(x)) - sure_sds * float(sd))
         for f, x, sd in zip(fit.free, fit.point.x, sds, strict=True)
         if f.own and f.owner in problem.effects and problem.effects[f.owner].refines is None
     ]

@@ -388,6 +388,25 @@ def test_all_that_may_be_written_is_held_against_each_other_on_the_same_rows(cel
     assert model_to_write(declared, [], options)[1] is None
 
 
+def test_what_needs_an_impossible_cell_is_not_written(path):
+    """Eight coefficients of an LFP cell's potential at their limits left 254 mV of a slow discharge, the file 7."""
+
+    def option(left_mv, *beyond):
+        left_v = (1e-3 * left_mv,)
+        return Option(ModelState(path.problem), LeftOut(left_v, left_v), beyond_spread=beyond)
+
+    declared, impossible, usual = option(20.0), option(8.0, "ocp_shape", "solid_diffusivity"), option(12.0)
+    assert model_to_write(declared, [impossible, usual])[0] is usual.state
+    assert model_to_write(declared, [impossible])[0] is declared.state
+    state, why = model_to_write(declared, [], [impossible])
+    assert state is declared.state
+    assert "it needs ocp_shape and solid_diffusivity further from the declared value than" in str(why)
+    off = replace(path.chosen, point=replace(path.chosen.point, x=np.full(len(path.chosen.free), 9.0)))
+    needed = {one.owner for one in off.free if one.own and one.owner in path.problem.effects}
+    assert set(Option.of(path.problem, path.blocks, off).beyond_spread) == needed
+    assert Option.of(path.problem, path.blocks, path.chosen).beyond_spread == ()
+
+
 def test_effects_that_stand_in_are_written_where_they_leave_less_and_are_said_to_be_no_finding(path):
     def option(left_mv, *effects):
         left_v = (1e-3 * left_mv,)
