@@ -11,13 +11,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from aesi.bench import some_chosen
-from aesi.bench.detectable import SEEN_NATS, seen_nats
+from aesi.bench.detectable import SEEN_NATS, Detectability, detectability
 from aesi.bench.limit import LOST, NO_ANSWER, NO_TIME, NoAnswer, Stopwatch, answer_of, timed
 from aesi.bench.scoring import TO_THE_NOISE, calibration, judge, rate
 from aesi.constants import MV_PER_V
@@ -27,6 +28,7 @@ from aesi.physics import Cell
 from aesi.pipeline.discovery.discover import discovery_content
 from aesi.tracer import discover
 from aesi.tracer.report.outcome import STATES
+from aesi.tracer.search.plausible import ALIKE_NATS
 
 LIMIT_S = 180.0
 """Limit of the processor time of one case, s. A case that takes longer counts as not answered. A convention."""
@@ -69,7 +71,7 @@ def judged(spec: CaseSpec, cells: str, limit_s: float | None = LIMIT_S) -> dict[
 
 def lost(spec: CaseSpec) -> dict[str, Any]:
     """The row of a case whose process the operating system ended. It counts as wrong; its detectability is unknown."""
-    told = {"label": label_of(spec), "unexplained_mv": None, "seen_nats": None}
+    told = {"label": label_of(spec), "unexplained_mv": None, **asdict(Detectability())}
     return _planned(spec) | told | LOST.row | MISSED | NO_TIME
 
 
@@ -98,7 +100,8 @@ def _judged(case: BlindCase, limit_s: float | None) -> dict[str, Any]:
     row = _planned(case.spec) | {"label": case.label, "unexplained_mv": case.truth["rms_mv"]}
     content = answer_of(lambda: _content(case), limit_s)
     row |= content.row | MISSED if isinstance(content, NoAnswer) else _scored(case, content)
-    return row | spent.row | {"seen_nats": seen_nats(case)}
+    other = row["effects"] if row["verdict"] not in NO_ANSWER and not row["exact"] else None
+    return row | spent.row | asdict(detectability(case, other))
 
 
 def _content(case: BlindCase) -> dict[str, Any]:
@@ -166,7 +169,8 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     confidence, and the confusion matrix.
 
     Keys that begin with `seen` are of the cases with effects that the data can tell (`SEEN_NATS`); `stranger` means a
-    case whose effect is in no catalogue. `after_over_noise_median` is the error on held-out data over the noise.
+    case whose effect is in no catalogue. `seen_missed_alike` is the share of wrong answers among the former that say as
+    much of held-out data as the label. `after_over_noise_median` is the error on held-out data over the noise.
     """
     planned, rows = rows, [r for r in rows if r["verdict"] != NOT_MADE]
     effect = [r for r in rows if r["label"] not in ("none", "unknown")]
@@ -176,6 +180,8 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     fitted = [{**r, "called_found": r["verdict"] == "found"} for r in effect if r["fitted"]]
     named = [r for r in effect if r["grouped"]]
     seen = [r for r in effect if r["seen_nats"] is not None and r["seen_nats"] > SEEN_NATS]
+    compared = [r for r in seen if not r["exact"] and r.get("ahead_nats") is not None]
+    missed = [{"alike": r["ahead_nats"] < ALIKE_NATS} for r in compared]
     answered = _answered(rows)
     unknown = [r for r in answered if r["verdict"] == "unknown" and r["label"] not in ("none", "unknown")]
     claimed = [r for r in answered if r["verdict"] in ("found", "none")]
@@ -194,6 +200,7 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "effects_to_be_seen": len(seen),
         **rate(seen, "exact").named("seen_exact"),
         **rate(seen, "grouped").named("seen_grouped"),
+        **rate(missed, "alike").named("seen_missed_alike"),
         **rate(several, "all_named").named("pair_both_named"),
         **rate(nothing, "right").named("none_lenient"),
         **rate(_answered(nothing), "false_name").named("none_false_name"),

@@ -8,7 +8,7 @@ held-out data under all effects of the label minus that under the best hypothesi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from aesi.data.blind import BlindCase
 from aesi.errors import AesiError
@@ -28,18 +28,38 @@ SEEN_NATS = 5.0
 requires to admit an effect, which surrogates give as 3.8 to 5.4 nats on 14 development cases of `aesi bench blind`."""
 
 
-def seen_nats(case: BlindCase) -> float | None:
-    """Detectability of a blind case, nats: the log likelihood of held-out data under the label minus that under the
-    best hypothesis without one of its effects.
+@dataclass(frozen=True)
+class Detectability:
+    """What held-out data say of the label of a case, in nats of log likelihood; None where that is not known.
 
-    None for a case without effects, for one that the tracer refuses, and for one that the model cannot simulate.
+    seen_nats : under the label, minus that under the best hypothesis without one of its effects.  ahead_nats : under
+    the label, minus that under another answer. Where this is small or negative, no search that judges by these data can
+    prefer the label.
+    """
+
+    seen_nats: float | None = None
+    ahead_nats: float | None = None
+
+
+def detectability(case: BlindCase, answer: Sequence[str] | None = None) -> Detectability:
+    """The detectability of a blind case. Nothing is known of a case without effects, of one that the tracer refuses,
+    and of one that the model cannot simulate.
+
+    answer : effects that were named in place of the label; None where there is no other answer.
     """
     if not case.effects:
-        return None
+        return Detectability()
+    archive = Archive(None, "")
     try:
-        return _said_more(label_problem(case), case.effects, Archive(None, ""))
+        problem = label_problem(case)
+        seen = _said_more(problem, case.effects, archive)
+        named = None if answer is None else _fitted(problem, tuple(answer), archive)
+        label = _fitted(problem, case.effects, archive)
     except AesiError:
-        return None
+        return Detectability()
+    if named is None or label is None:
+        return Detectability(seen)
+    return Detectability(seen, label.score.total - named.score.total)
 
 
 def label_problem(case: BlindCase) -> InverseProblem:
@@ -80,13 +100,12 @@ def seen_on_measured(
 def _said_more(problem: InverseProblem, effects: tuple[str, ...], archive: Archive) -> float | None:
     """Log likelihood of held-out data under the effects minus that under the best hypothesis that lacks one of them,
     nats; None if the effects cannot be simulated."""
-    blocks = blocks_of(problem)
-
-    def fit(hypothesis: tuple[str, ...]) -> FittedHypothesis | None:
-        return fitted_hypothesis(problem, blocks, hypothesis, None, archive)
-
-    whole = fit(effects)
+    whole = _fitted(problem, effects, archive)
     if whole is None:
         return None
-    rests = [fit(tuple(e for e in effects if e != name)) for name in effects]
+    rests = [_fitted(problem, tuple(e for e in effects if e != name), archive) for name in effects]
     return whole.score.total - max((r.score.total for r in rests if r is not None), default=-float("inf"))
+
+
+def _fitted(problem: InverseProblem, effects: tuple[str, ...], archive: Archive) -> FittedHypothesis | None:
+    return fitted_hypothesis(problem, blocks_of(problem), effects, None, archive)

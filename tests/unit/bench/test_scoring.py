@@ -1,16 +1,21 @@
 """Judging an answer by hand-worked cases, rates with their intervals, and the limit on processor time."""
 
 import time
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from aesi.bench import blind
+from aesi.bench.detectable import Detectability, detectability
 from aesi.bench.limit import NoAnswer, OutOfTime, answer_of, processor_limit
 from aesi.bench.scoring import calibration, judge, proportion, rate
 from aesi.data.blind import BlindCase
 from aesi.errors import SimulationError
+from aesi.physics import Cell, simulate
+from aesi.physics.effects import CATALOGUE
 from aesi.records import Measurement
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
@@ -147,6 +152,58 @@ def test_a_case_that_the_tracer_refused_ended_all(monkeypatch):
     monkeypatch.setattr(blind, "generate", lambda spec, cells: case)
     row = blind.judged(spec, str(CELLS))
     assert (row["verdict"], row["exact"], row["seen_nats"]) == ("error", False, None)
+
+
+def test_how_far_the_label_is_ahead_of_another_answer():
+    """A contact resistance of 8 mohm, answered with an offset of the voltage, and with a film that grows."""
+    cell = CELLS / "lg_m50_chen2020.bpx.json"
+    rng, time_s = np.random.default_rng(0), np.arange(0.0, 2400.0, 2.0)
+    current_a = np.repeat(rng.normal(3.0, 4.0, 40), 30).clip(-5.0, 12.0)
+    current_a[:30] = 0.0
+    added = CATALOGUE["series_resistance"].activate(resistance_ohm=8e-3)
+    voltage_v = simulate(Cell.from_bpx(cell), time_s, current_a, 0.8, [added]).voltage_v
+    record = Measurement(time_s, current_a, voltage_v + 1e-3 * rng.standard_normal(1200), name="drive")
+    spec = SimpleNamespace(model="SPMe")
+    case = BlindCase(spec, (record,), "series_resistance", (), (), 0.8, cell, {"rms_mv": 20.0})
+    answers = (["voltage_sensor_offset"], ["film_growth"], [], case.effects)
+    offset, film, none, same = (detectability(case, answer) for answer in answers)
+    assert 100.0 < film.ahead_nats < offset.ahead_nats
+    assert none.ahead_nats == none.seen_nats == offset.seen_nats > 100.0
+    assert same.ahead_nats == 0.0
+    assert detectability(case) == Detectability(offset.seen_nats)
+    assert detectability(replace(case, label="none"), ["ocp_shape"]) == Detectability()
+
+
+def test_misses_that_say_as_much_as_the_label_are_counted():
+    kept = {
+        "label": "clock_skew",
+        "kind": "single",
+        "processor_s": 1.0,
+        "confidence": None,
+        "verdict": "found",
+        "contradicted": False,
+        "false_name": True,
+        "seen_nats": 9.0,
+        "parameters_covered": [],
+    }
+    wrong = kept | {
+        "exact": False,
+        "grouped": False,
+        "right": False,
+        "fitted": False,
+        "effects": ["ocp_shape"],
+    }
+    right = kept | {"exact": True, "grouped": True, "right": True, "fitted": False, "effects": ["clock_skew"]}
+    right |= {"ahead_nats": None, "after_over_noise": 1.0, "parameter_error": None}
+    rows = [
+        right,
+        wrong | {"ahead_nats": -0.4},
+        wrong | {"ahead_nats": 40.0},
+        wrong,
+    ]  # the last by earlier code
+    told = blind.summary([row | {"all_named": row["exact"]} for row in rows])
+    assert (told["seen_exact_cases"], told["seen_missed_alike_cases"]) == (4, 2)
+    assert told["seen_missed_alike_pct"] == 50.0
 
 
 def test_cases_that_somebody_has_seen_are_left_out():
