@@ -14,8 +14,8 @@ in addition to the published schema a row may have
     free_run_intervals   the same keys, in free run; with inside_coverage_pct, pieces and worst_piece_coverage_pct of
                          the calibration, and start_v, change of the voltage by a standard deviation of the start
     bands_by_horizon     {"1": the same keys, ...}, by the time since the last measurement in seconds
-    test_records         {record: rmse_mv, mser_pct, outside_pct, kept_pct, mean_degc, beyond_k; where a simulation ran
-                         out ran_out_s, until_ran_out_mv}, in free run
+    test_records         {record: rmse_mv, mser_pct, outside_pct, kept_pct, amplitude, mean_degc, beyond_k; where a
+                         simulation ran out ran_out_s, until_ran_out_mv}, in free run
     seeds      how many runs the row is the mean of; a group then holds spread, {key: [lowest, highest]}
     seconds    wall time of fit and evaluation
 
