@@ -637,6 +637,22 @@ def test_a_damaged_file_is_one_sentence(tmp_path, name, module):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("name", ["cell.nda", "cell.ndax"])
+def test_a_damaged_file_of_newares_was_told_by_a_log_and_a_list_of_readers_that_was_cut_short(
+    tmp_path, caplog, name
+):
+    pytest.importorskip("bdf")
+    path = tmp_path / name
+    path.write_bytes(b"abc")
+    with pytest.raises(DataError) as caught:
+        read_measurement(path)
+    told = str(caught.value)
+    assert told.startswith(f"{name} cannot be read by batterydf: ")
+    assert told.endswith("; copy it again, or export the test as CSV.")
+    assert "ImportError" not in told
+    assert not caplog.records
+
+
 def test_an_empty_current_of_a_resting_row_is_refused_not_taken_for_none(tmp_path):
     path = tmp_path / "rest.csv"
     path.write_text("time_s,current_a,voltage_v,State\n0,1,4,D\n1,1,3.99,D\n2,,4,R\n3,1,3.98,D\n")
