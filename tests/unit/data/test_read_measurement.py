@@ -760,11 +760,18 @@ def test_an_si_unit_of_the_header_was_overruled_in_silence(tmp_path):
     assert read_measurement(path, units={"time_s": "ms"}).notes[-1].endswith(note)
 
 
+def test_a_quantity_that_was_cut_short_was_taken_for_another(tmp_path):
+    """Of 'temp': did you mean 'step'?"""
+    with pytest.raises(DataError, match=r"did you mean 'temperature_degc'\? There are"):
+        read_measurement(written(tmp_path, text()), columns={"temp": "T"})
+
+
 def test_a_time_in_hours_is_doubted(tmp_path):
     path = written(tmp_path, text(time=TIME / 3600.0))
     (note,) = read_measurement(path).notes
     assert (
-        "every 0.278 ms, quicker than cyclers write them; if the time is in hours: --unit time_s=h (" in note
+        "every 0.278 ms, quicker than cyclers write them; if the time is in another unit: --unit time_s=h, min or d ("
+        in note
     )
     profile = written(
         tmp_path, "time_s,current_a\n" + "".join(f"{t / 3600},1\n" for t in TIME), "profile.csv"
