@@ -579,7 +579,14 @@ def test_a_number_that_no_column_has_is_told(tmp_path):
 
 def test_a_header_with_a_name_too_few_is_no_table_without_names(tmp_path):
     said = refusal(tmp_path, "time_s,current_a,voltage_v\n0,1,3.7,25\n1,1,3.7,25\n")
-    assert "4 cells where the header has 3" in said
+    assert "4 cells where the header has 3; a column has no name, or a separator stands within a cell" in said
+
+
+def test_a_row_with_decimal_commas_between_commas_was_said_to_be_cut_short(tmp_path):
+    said = refusal(tmp_path, "time_s,current_a,voltage_v\n0,0,1,5,3,7\n1,0,1,5,3,69\n")
+    assert "row 1 (line 2): 6 cells where the header has 3; " in said
+    assert "cut short" not in said
+    assert said.endswith("separate the cells by semicolons.")
 
 
 def test_no_file_and_a_folder(tmp_path):
