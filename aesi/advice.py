@@ -21,6 +21,7 @@ KEYS = {
     "--column": "data.columns",
     "--unit": "data.units",
     "--state": "data.columns: {state: COLUMN}",
+    "--state-word": "data.state_words",
     "--duplicates": "data.duplicates",
     "--soc0": "cell.soc0",
     "--step": "a file of its own, by `aesi data convert --step`",
@@ -80,7 +81,8 @@ def told(reader: Reader, sentence: str) -> str:
 
 def with_keys(sentence: str) -> str:
     """The sentence, with the keys of an experiment file added that mean the same as the options it names."""
-    keys = [key for option, key in KEYS.items() if option in sentence]
+    options = OPTION.findall(sentence)
+    keys = [key for option, key in KEYS.items() if option in options]
     return f"{sentence.removesuffix('.')} (in an experiment file: {', '.join(keys)})." if keys else sentence
 
 

@@ -88,10 +88,13 @@ def not_written(path: object, error: OSError) -> str:
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """End of a sentence about an unknown name: the known name with the most similar spelling, or a full stop."""
+    """End of a sentence about an unknown name: the only known name that it begins, as `temp` does, or else the one with
+    the most similar spelling, or a full stop."""
     from difflib import get_close_matches
 
-    near = get_close_matches(name, list(known), n=1)
+    every = list(known)
+    begun = [each for each in every if each.startswith(name)] if name else []
+    near = begun if len(begun) == 1 else get_close_matches(name, every, n=1)
     return f"; did you mean {near[0]!r}?" if near else "."
 
 

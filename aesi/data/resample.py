@@ -125,7 +125,8 @@ def to_even(measurement: Measurement, dt_s: float, hold: Hold = "backward") -> M
         )
     if dt_s > length:
         raise DataError(
-            f"{measurement.name} lasts {length:g} s, which is less than a step of {dt_s:g} s; give a longer record."
+            f"{measurement.name} lasts {length:g} s, which is less than a step of {dt_s:g} s; give a shorter step, or "
+            "a longer record."
         )
     if length / dt_s > MOST_EVEN_ROWS:
         raise DataError(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Literal, get_args
 
 import numpy as np
@@ -23,11 +23,17 @@ larger current makes the word for rest doubtful, which a note says. A convention
 
 
 def directions(
-    words: Sequence[str], current_a: Array, given: Mapping[str, Direction], file: str, column: str
+    words: Sequence[str],
+    current_a: Array,
+    given: Mapping[str, Direction],
+    file: str,
+    column: str,
+    where: Callable[[int], str],
 ) -> tuple[Array, str]:
     """((n,) 1 on discharge, -1 on charge, 0 at rest; a note on the meaning that each word was given).
 
     words : (n,) cells of the column.  current_a : (n,) A, of any sign.  given : word -> direction, as the user states.
+    where : row index -> its place in the file.
     Raises DataError for a word of unknown meaning in a row with a current.
     """
     for word, said in given.items():
@@ -45,7 +51,7 @@ def directions(
         if meaning in (None, "rest") and np.any(flows):
             row = int(np.argmax(flows))
             raise DataError(
-                f"{file}, row {row + 1}: column {column!r} says {word!r} beside a current of {sizes[row]:.4g} A; say "
+                f"{file}, {where(row)}: column {column!r} says {word!r} beside a current of {sizes[row]:.4g} A; say "
                 f"which way it flows: --state-word {word}=charge or {word}=discharge."
             )
         result[rows] = {"discharge": 1.0, "charge": -1.0}.get(meaning or "", 0.0)

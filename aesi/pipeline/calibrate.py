@@ -75,6 +75,10 @@ class Request:
 
 def check_request(cell: Declared, request: Request) -> None:
     """Raises CellError, DataError or InputError, one sentence, for a request that can be refused without a record."""
+    if request.title is not None and not request.title.strip():
+        raise InputError(
+            "--title is empty; give the cell a name, or leave it out for that of the start file."
+        )
     check_posterior(request.posterior)
     check_distinct_spectra(request.conditions.spectra, request.impedance)
     given = declared_model(cell).cell

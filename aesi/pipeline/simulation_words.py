@@ -185,8 +185,6 @@ def band_sentences(
         )
         starts = bool(np.isfinite(record.voltage_v[0]))
         said = [trained_sentence(record.name, figures, one_step=measured, first_measured=starts)]
-        if model.correction.fade is not None and model.correction.fade.amplitude == 0.0:
-            said.append("the correction improved no left-out training drive, so that it is applied nowhere.")
         if prediction.diverged_s is not None:
             said.append(
                 f"{record.name}: the correction, which feeds its own prediction back, diverges at "

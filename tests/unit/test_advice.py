@@ -38,6 +38,13 @@ def test_a_state_of_charge_that_a_run_may_be_given_was_called_by_a_command_s_opt
     assert with_keys(sentence).endswith("if it is known (in an experiment file: cell.soc0).")
 
 
+def test_a_word_of_a_state_was_advised_as_the_column_of_the_state():
+    sentence = (
+        "column 'State' says 'X' beside a current of 2 A; say which way it flows: --state-word X=charge."
+    )
+    assert with_keys(sentence).endswith("--state-word X=charge (in an experiment file: data.state_words).")
+
+
 def test_who_calls_python_was_advised_to_give_options_of_a_command(written):
     path = written(Zeit=TIME, Strom=CURRENT, Spannung=VOLTAGE)
     said = refused(aesi.read_measurement, path)

@@ -113,11 +113,17 @@ def _orient_by_words(
     if signed and not asked:
         return False
     (words,) = table.read_text((mapped.position["state"],))
-    way, note = directions(words, current, reading.state_words, table.path.name, mapped.header["state"])
+    file, column = table.path.name, mapped.header["state"]
+    way, note = directions(words, current, reading.state_words, file, column, table.where)
     if not asked and not np.any(way != 0):
         return False
     data["current_a"], changes = with_directions(current, way, data["time_s"], bool(signed))
     notes += [note, *changes]
+    if reading.sign is not None:
+        notes.append(
+            f"The current was declared {reading.sign}, and column {column!r} says which way it flows: the column was "
+            "followed."
+        )
     return True
 
 

@@ -102,10 +102,9 @@ def time_doubts(data: Columns) -> list[str]:
     step_s = float(np.median(np.diff(data["time_s"]))) if len(data["time_s"]) > 1 else np.inf
     if step_s >= QUICKEST_S:
         return []
-    unit = "d" if _of_a_spreadsheet(data["time_s"]) else "h"
     return [
-        f"Its rows come every {MILLI * step_s:.3g} ms, quicker than cyclers write them; if the time is in "
-        f"{'days' if unit == 'd' else 'hours'}: --unit time_s={unit}."
+        f"Its rows come every {MILLI * step_s:.3g} ms, quicker than cyclers write them; if the time is in another "
+        f"unit: --unit time_s={longer_unit(data['time_s'])}."
     ]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import warnings
 from pathlib import Path
 
@@ -22,19 +23,36 @@ def open_nda(path: Path) -> FrameTable:
             f"{path.name} is a cycler's own file; install its reader (pip install batterydf), "
             "or export the test as CSV."
         ) from None
+    logger = logging.getLogger(ITS_READER)
+    logger.disabled = True  # what it logs of a damaged file, it raises too
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             frame = bdf.read(path, validate=False)
     except Exception as error:
         # Each of its plugins raises its own.
-        raise DataError(f"{path.name} cannot be read as a cycler's file: {first_line(error)}") from None
+        raise DataError(
+            f"{path.name} cannot be read by batterydf: {_reason(error)}; copy it again, or export the test as CSV."
+        ) from None
+    finally:
+        logger.disabled = False
     columns = {str(name): frame[name].to_numpy() for name in frame.columns}
     notes = ["Read by batterydf, which converted its units and names to BDF."]
     table = table_of_columns(path, _with_test_time(columns, notes), tuple(notes))
     # Its columns have BDF's names. Of a known export two rows may share a stamp.
     table.format = neware.FORMAT
     return table
+
+
+ITS_READER = "newarenda"
+"""Package that batterydf reads such files by, and its logger."""
+
+
+def _reason(error: Exception) -> str:
+    """What the first reader that batterydf tried says, the one of such files. It lists what all of them say."""
+    every = " ".join(str(error).split())
+    said = every.partition(" failed: ")[2].partition("; ")[0]
+    return said.rstrip(".") or first_line(error).rstrip(".")
 
 
 TEST_TIME, STEP, CYCLE = "Test Time / s", "Step Count / 1", "Cycle Count / 1"

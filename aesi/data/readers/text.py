@@ -198,9 +198,14 @@ class TextTable:
     def _check(self, place: str, cells: list[str], positions: tuple[int, ...]) -> None:
         width = len(self.header)
         if len(cells) != width:
+            cause = (
+                "the row is cut short or damaged: correct or remove it"
+                if len(cells) < width
+                else "a column has no name, or a separator stands within a cell, as a decimal comma between commas "
+                "does: name the column, or separate the cells by semicolons"
+            )
             raise DataError(
-                f"{place}: {len(cells)} cell{'s' * (len(cells) != 1)} where the header has {width}; the row is cut "
-                "short or damaged: correct or remove it."
+                f"{place}: {len(cells)} cell{'s' * (len(cells) != 1)} where the header has {width}; {cause}."
             )
         for position in positions:
             cell = cells[position].strip()

@@ -15,6 +15,7 @@ from aesi.sparse import SparseModel
 
 ALL_PCT, NONE_PCT = 99.5, 0.5
 """A share, per cent, is reported as 100 from the first on, and as 0 up to the second."""
+NOWHERE = "the correction improved no left-out training drive, so that it is applied nowhere"
 TELLING_K = 2.0
 """K by which the mean temperature has to be off to be told: by itself that leaves 94 % of a fading correction at 25
 degC, and 88 % at -20 degC."""
@@ -48,15 +49,17 @@ def trained_figures(
     """Distance of a record from the training data of a correction.
 
     outside, kept : (n,), of `outside_trained` and of `SparseModel.kept`.
-    Returns outside_pct; kept_pct of the correction in the mean, None of one that does not fade; mean_degc; beyond_k,
-    how far that lies above the trained temperatures, negative below them. None also stands for what is not known.
+    Returns outside_pct; kept_pct of the correction in the mean, and its amplitude (fade.py), both None of one that does
+    not fade; mean_degc; beyond_k, how far that lies above the trained temperatures, negative below them. None also
+    stands for what is not known.
     """
-    fades = isinstance(model, SparseModel) and model.fade is not None
+    fade = model.fade if isinstance(model, SparseModel) else None
     mean = None if temperature_degc is None else float(np.mean(temperature_degc))
     beyond = None if mean is None or visited is None else float(visited.beyond_k(np.array([mean]))[0])
     return {
         "outside_pct": 100.0 * float(np.mean(outside)),
-        "kept_pct": 100.0 * float(np.mean(kept)) if fades else None,
+        "kept_pct": None if fade is None else 100.0 * float(np.mean(kept)),
+        "amplitude": None if fade is None else fade.amplitude,
         "mean_degc": mean,
         "beyond_k": beyond,
     }
@@ -87,7 +90,14 @@ def trained_sentence(
         alone += " and its last measured error"
     elif first_measured:
         alone += " and the error of the first measured voltage, which decays"
+    if is_applied_nowhere(figures):
+        return f"{head}; {NOWHERE}: this is {alone}."
     return f"{head}; {where}none of the correction is applied: this is {alone}."
+
+
+def is_applied_nowhere(figures: Mapping[str, Any]) -> bool:
+    """Whether the correction of these figures is applied to no record, wherever that lies."""
+    return figures.get("amplitude") == 0.0
 
 
 def percent_words(percent: float) -> str:

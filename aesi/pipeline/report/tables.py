@@ -4,8 +4,9 @@ A row is an entry of `models` in a run's summary.json. Every value is optional a
 in addition to the published schema a row may have
 
     validation_mser_pct   over training drives left out in turn
-    free_run   {train,valid,test}_{mser_pct,mser_recalibrated_pct,rmse_mv}, until_ran_out_rmse_mv where one did;
-               diverged (the number of test records on which the correction diverged), outside_pct (test)
+    free_run   {train,valid,test}_{mser_pct,mser_recalibrated_pct,rmse_mv,until_ran_out_rmse_mv}, the last where a
+               simulation did; diverged (the number of test records on which the correction diverged), outside_pct
+               (test)
     one_step   {train,valid,test}_rmse_mv, persistence_rmse_mv (test)
     k_step     {"1": mV, "10": mV, ...}: test RMSE by horizon in seconds; likewise k_step_persistence
     intervals  nominal_pct, coverage_pct, average_width_v, winkler_v, worst_bin_coverage_pct, low_minutes_pct (one step
@@ -14,8 +15,8 @@ in addition to the published schema a row may have
     free_run_intervals   the same keys, in free run; with inside_coverage_pct, pieces and worst_piece_coverage_pct of
                          the calibration, and start_v, change of the voltage by a standard deviation of the start
     bands_by_horizon     {"1": the same keys, ...}, by the time since the last measurement in seconds
-    test_records         {record: rmse_mv, mser_pct, outside_pct, kept_pct, mean_degc, beyond_k; where a simulation ran
-                         out ran_out_s, until_ran_out_mv}, in free run
+    test_records         {record: rmse_mv, mser_pct, outside_pct, kept_pct, amplitude, mean_degc, beyond_k; where a
+                         simulation ran out ran_out_s, until_ran_out_mv}, in free run
     seeds      how many runs the row is the mean of; a group then holds spread, {key: [lowest, highest]}
     seconds    wall time of fit and evaluation
 
@@ -134,7 +135,8 @@ def record_table(models: Sequence[Row]) -> Table:
     caption = (
         "Each test record by itself. Regime: free run. MSER: against the declared physics. Outside: share of samples "
         "with an input, or the temperature, outside the range that the correction was trained on. Kept: what is left "
-        "of a correction that fades towards the physics with the distance from there, in the mean."
+        "of a correction that fades towards the physics with the distance from there, in the mean; nothing anywhere of "
+        "one that improved no left-out training drive."
     )
     return _table("records", caption, columns, rows)
 

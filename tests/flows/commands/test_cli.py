@@ -411,6 +411,7 @@ def test_a_workspace_that_may_not_be_written_to_says_where_else_it_can_be(
         ("--cut-offs", "2500:4200", "the upper cut-off is 4200 V; one of them is in another unit"),
         ("--body", "0.0184x0.065", "a body of (0.0184, 0.065) mm: give diameter and height of a cylinder"),
         ("--mass", "0.047", "the mass is in g"),
+        ("--title", " ", "--title is empty; give the cell a name, or leave it out"),
     ],
 )
 def test_what_no_fit_can_be_asked_for_was_told_after_it_was_announced(

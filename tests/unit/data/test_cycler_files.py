@@ -455,10 +455,21 @@ def test_magnitudes_that_nothing_turns_are_told_and_the_state_turns_them(tmp_pat
     path.write_text("\n".join([head, *rows(60.0 * np.arange(120), np.abs(long), voltage, kinds), ""]))
     with pytest.raises(DataError, match=r"holds magnitudes.*--state"):
         read_measurement(path)
-    with pytest.raises(DataError, match="--state-word E=charge or E=discharge"):
+    with pytest.raises(DataError, match=r"row 1 \(line 2\): .*--state-word E=charge or E=discharge"):
         read_measurement(path, state="Richtung")
     said = Reading({"state": "Richtung"}, state_words={"E": "discharge", "L": "charge"})
     np.testing.assert_allclose(read(path, said).current_a, long)
+    assert not any("was declared" in note for note in read(path, said).notes)
+
+
+def test_a_sign_beside_a_column_of_states_had_no_effect_and_nothing_said_so(tmp_path):
+    path = tmp_path / "plain.csv"
+    body = rows(TIME, np.abs(CURRENT), VOLTAGE, words("D", "C", "R"))
+    path.write_text("\n".join(["time_s,current_a,voltage_v,State", *body, ""]))
+    record = read_measurement(path, state="State", sign="charge-positive")
+    np.testing.assert_allclose(record.current_a, CURRENT)
+    told = "declared charge-positive, and column 'State' says which way it flows: the column was followed."
+    assert any(told in note for note in record.notes)
 
 
 @pytest.mark.parametrize(
@@ -635,6 +646,22 @@ def test_a_damaged_file_is_one_sentence(tmp_path, name, module):
     with pytest.raises(DataError, match=name.replace(".", r"\.")) as caught:
         read_measurement(path)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["cell.nda", "cell.ndax"])
+def test_a_damaged_file_of_newares_was_told_by_a_log_and_a_list_of_readers_that_was_cut_short(
+    tmp_path, caplog, name
+):
+    pytest.importorskip("bdf")
+    path = tmp_path / name
+    path.write_bytes(b"abc")
+    with pytest.raises(DataError) as caught:
+        read_measurement(path)
+    told = str(caught.value)
+    assert told.startswith(f"{name} cannot be read by batterydf: ")
+    assert told.endswith("; copy it again, or export the test as CSV.")
+    assert "ImportError" not in told
+    assert not caplog.records
 
 
 def test_an_empty_current_of_a_resting_row_is_refused_not_taken_for_none(tmp_path):

@@ -579,7 +579,14 @@ def test_a_number_that_no_column_has_is_told(tmp_path):
 
 def test_a_header_with_a_name_too_few_is_no_table_without_names(tmp_path):
     said = refusal(tmp_path, "time_s,current_a,voltage_v\n0,1,3.7,25\n1,1,3.7,25\n")
-    assert "4 cells where the header has 3" in said
+    assert "4 cells where the header has 3; a column has no name, or a separator stands within a cell" in said
+
+
+def test_a_row_with_decimal_commas_between_commas_was_said_to_be_cut_short(tmp_path):
+    said = refusal(tmp_path, "time_s,current_a,voltage_v\n0,0,1,5,3,7\n1,0,1,5,3,69\n")
+    assert "row 1 (line 2): 6 cells where the header has 3; " in said
+    assert "cut short" not in said
+    assert said.endswith("separate the cells by semicolons.")
 
 
 def test_no_file_and_a_folder(tmp_path):
@@ -760,11 +767,18 @@ def test_an_si_unit_of_the_header_was_overruled_in_silence(tmp_path):
     assert read_measurement(path, units={"time_s": "ms"}).notes[-1].endswith(note)
 
 
+def test_a_quantity_that_was_cut_short_was_taken_for_another(tmp_path):
+    """Of 'temp': did you mean 'step'?"""
+    with pytest.raises(DataError, match=r"did you mean 'temperature_degc'\? There are"):
+        read_measurement(written(tmp_path, text()), columns={"temp": "T"})
+
+
 def test_a_time_in_hours_is_doubted(tmp_path):
     path = written(tmp_path, text(time=TIME / 3600.0))
     (note,) = read_measurement(path).notes
     assert (
-        "every 0.278 ms, quicker than cyclers write them; if the time is in hours: --unit time_s=h (" in note
+        "every 0.278 ms, quicker than cyclers write them; if the time is in another unit: --unit time_s=h, min or d ("
+        in note
     )
     profile = written(
         tmp_path, "time_s,current_a\n" + "".join(f"{t / 3600},1\n" for t in TIME), "profile.csv"

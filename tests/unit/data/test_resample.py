@@ -77,6 +77,14 @@ def test_a_record_without_rows_ended_in_an_index_error():
         to_even(Measurement([], [], []), 1.0)
 
 
+def test_a_step_longer_than_its_record_was_answered_by_a_longer_record_alone():
+    record = Measurement(np.arange(20.0), np.zeros(20), np.full(20, 3.7), name="short")
+    with pytest.raises(
+        DataError, match=r"lasts 19 s, .* a step of 5000 s; give a shorter step, or a longer record"
+    ):
+        to_even(record, 5000.0)
+
+
 def test_a_step_in_words_ended_in_a_type_error():
     with pytest.raises(DataError, match="a step of '1' s is not possible"):
         to_even(measurement(np.arange(10.0), np.ones(10)), "1")

@@ -233,6 +233,15 @@ def test_hypotheses_stand_as_far_as_they_are_behind_the_best():
     assert worse.layout.yaxis.categoryarray[-1] == "nothing: as declared"
 
 
+def test_a_ranking_without_a_star_was_said_to_have_one():
+    rows = [{"effect": "a", "kind": "physics", "score": 3.0}]
+    captions = [hypotheses.ranking_figure(rows, {}, chosen).layout.meta["caption"] for chosen in (["a"], [])]
+    assert [("(star)" in caption, "ahead of what was chosen" in caption) for caption in captions] == [
+        (True, False),
+        (False, True),
+    ]
+
+
 def test_a_kind_nobody_foresaw_is_still_shown():
     fig = hypotheses.ranking_figure([{"effect": "x", "kind": "numerical", "score": 1.0}], {}, [])
     assert [dots.name for dots in fig.data] == ["numerical", "declared"]

@@ -403,7 +403,7 @@ def test_a_correction_that_is_applied_nowhere_was_said_to_fade_to_a_share_of_its
     said = []
     asked = ProfileRequest(soc0=SOC0)
     predict_file(folder, tmp_path / "drive.csv", tmp_path / "out.csv", asked, say_notes=said.extend)
-    alone = "none of the correction is applied: this is the physics model"
+    alone = "improved no left-out training drive, so that it is applied nowhere: this is the physics model"
     assert any(f"{alone} and the error of the first measured voltage, which decays." in note for note in said)
     assert not any("fades" in note for note in said)
     assert (pd.read_csv(tmp_path / "out.csv")["weight"] == 0.0).all()

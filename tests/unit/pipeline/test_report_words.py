@@ -76,6 +76,24 @@ def test_a_correction_was_judged_by_records_on_which_none_of_it_is_applied(views
     assert finding(near=20.0, full=None) == f"{before}."
 
 
+def test_a_correction_that_is_applied_nowhere_was_laid_to_test_records_outside_its_range(views):
+    """'... none of it is applied so far outside the range it was trained on: train on records that span ...', of one
+    that had improved no left-out drive, also on rows that it was trained on."""
+    view = views.run_view(200)
+    physics, chosen, other = view.models
+    known = {"kept_pct": 0.0, "amplitude": 0.0, "outside_pct": 0.0, "mean_degc": 24.0, "beyond_k": 0.0}
+    cold = known | {"outside_pct": 83.0, "mean_degc": 12.0, "beyond_k": -11.6}
+    row = chosen | {"test_records": {"known": known, "cold": cold}}
+    nowhere = "the correction improved no left-out training drive, so that it is applied nowhere"
+    before = runs.run_finding(view).removesuffix(".")
+    assert runs.run_finding(replace(view, models=(physics, row, other))) == f"{before}; {nowhere}."
+    alone = "this is the physics model and the error of the first measured voltage, which decays."
+    assert runs.outside_finding(row) == (
+        f"known: 0 % of the rows lie outside the range the correction was trained on; {nowhere}: {alone} "
+        f"cold: 83 % of the rows lie outside the range the correction was trained on; {nowhere}: {alone}"
+    )
+
+
 def test_a_correction_that_does_not_beat_the_physics_it_was_learned_on_is_told_so(views):
     view = views.run_view(200)
     row = {"name": "ESPM recalibrated", "free_run": {"test_rmse_mv": 3.9}}

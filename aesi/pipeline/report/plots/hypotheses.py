@@ -25,12 +25,13 @@ def ranking_figure(candidates: Sequence[Row], titles: Mapping[str, str], chosen:
     """Distance of each hypothesis, and of the declared model, behind the best; a star marks the added effects."""
     rows = sorted(candidates, key=lambda row: -row["score"])[:MOST_HYPOTHESES]
     best = max(rows[0]["score"], 0.0)
+    starred = any(row["effect"] in chosen for row in rows)
     caption = (
         "Log-likelihood of unseen data under each hypothesis, as the distance behind the best one in nats: 2.3 nats "
         f"are odds of ten to one. In the shaded part, up to {ALIKE_NATS:g} nats, the score does not distinguish "
         "hypotheses. A further effect is added only where it gains more than chance would at its step, so that a "
-        "hypothesis with more effects may lie ahead of the chosen one (star). An effect that is shown beside another "
-        "has the score of both together."
+        f"hypothesis with more effects may lie ahead of {'the chosen one (star)' if starred else 'what was chosen'}. "
+        "An effect that is shown beside another has the score of both together."
     )
     fig = style.figure(
         "Score of each hypothesis, behind the best", caption, max(240, 130 + 20 * (len(rows) + 1))

@@ -7,7 +7,7 @@ import numpy as np
 from aesi.advice import listed
 from aesi.constants import MV_PER_V
 from aesi.over_time import stamp
-from aesi.pipeline.product.trained import ALL_PCT, NONE_PCT, trained_sentence
+from aesi.pipeline.product.trained import ALL_PCT, NONE_PCT, NOWHERE, is_applied_nowhere, trained_sentence
 from aesi.pipeline.report.views import Row, RunView
 from aesi.records import Role
 
@@ -63,9 +63,11 @@ def _before_mv(view: RunView, role: Role, key: str) -> float | None:
 
 
 def _not_applied(view: RunView) -> str:
-    """Clause, from '; ' on, on the test records that say nothing of the correction, since it has faded there; '' where
-    there is none."""
+    """Clause, from '; ' on, on the test records that say nothing of the correction, since it has faded there, or on one
+    that is applied nowhere; '' where there is none."""
     records = (view.model(view.chosen) or {}).get("test_records") or {}
+    if any(map(is_applied_nowhere, records.values())):
+        return f"; {NOWHERE}"
     names = [
         name for name, one in records.items() if (kept := one.get("kept_pct")) is not None and kept < NONE_PCT
     ]
