@@ -19,6 +19,7 @@ from aesi.tracer.decide.model_to_write import (
     carries_best,
     fast_load_limits,
     model_to_write,
+    refused_refit,
     stand_in_notes,
     why_not_refit,
 )
@@ -185,6 +186,9 @@ def _unexplained(problem: InverseProblem, path: Path, verdict: Verdict, searches
     if after.values is None or not after.hypothesis:
         why = "; ".join(filter(None, (why_not_refit(declared, recalibrations, options, after), why))) or None
     limits = (*stand_in_notes(after, verdict.effects), *fast_load_limits(after)) if after.hypothesis else ()
+    limits += tuple(
+        s for one in named if one.state is after for s in refused_refit(declared, recalibrations, one)
+    )
     recalibrated = _recalibrated(problem, recalibrations)
     return Evidence(path, searches.paths, recalibrated, after, with_confidence(verdict), why, limits)
 

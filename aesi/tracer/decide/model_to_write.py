@@ -154,6 +154,16 @@ def why_not_refit(
     return f"{why}; model/ holds another fit of its parameters, {_left_clause(other, declared)}"
 
 
+def refused_refit(declared: Option, recalibrations: Sequence[Option], taken: Option) -> tuple[str, ...]:
+    """A sentence on a recalibrated model that carries over better than the written one with the named effects, `taken`,
+    and is not written; empty where there is none."""
+    if not recalibrations:
+        return ()
+    best = carries_best(recalibrations)
+    fault = _fault(best, declared, (*ORDINARY_C, *FAST_C)) if carries_best((taken, best)) is best else None
+    return () if fault is None else (f"the recalibrated model is not written: {fault}.",)
+
+
 def stand_in_notes(state: ModelState, named: Sequence[str]) -> tuple[str, ...]:
     """A sentence on effects of the written model that the verdict does not name; empty where there is none."""
     beside = [name for name in state.hypothesis if name not in named]

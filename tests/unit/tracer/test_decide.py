@@ -34,6 +34,7 @@ from aesi.tracer.decide.model_to_write import (
     Option,
     carries_best,
     model_to_write,
+    refused_refit,
     stand_in_notes,
     why_not_refit,
     worst_ratio,
@@ -401,6 +402,12 @@ def test_what_needs_an_impossible_cell_is_not_written(path):
     state, why = model_to_write(declared, [], [impossible])
     assert state is declared.state
     assert "it needs ocp_shape and solid_diffusivity further from the declared value than" in str(why)
+    (said,) = refused_refit(declared, [usual, impossible], option(13.0))
+    assert said.startswith(
+        "the recalibrated model is not written: it needs ocp_shape and solid_diffusivity further"
+    )
+    assert refused_refit(declared, [impossible], option(7.0)) == ()  # it is no better
+    assert refused_refit(declared, [usual], option(13.0)) == refused_refit(declared, [], option(13.0)) == ()
     off = replace(path.chosen, point=replace(path.chosen.point, x=np.full(len(path.chosen.free), 9.0)))
     needed = {one.owner for one in off.free if one.own and one.owner in path.problem.effects}
     assert set(Option.of(path.problem, path.blocks, off).beyond_spread) == needed
