@@ -211,12 +211,11 @@ def test_what_is_said_of_left_out_records_is_what_their_table_says():
         (row["cell"], row["left-out record"]): float(row["as written / better"].strip("*")) for row in rows
     }
     holds = [each <= AS_GOOD for each in times.values()]
-    *others, worst = sorted(each for each in times.values() if each > AS_GOOD)
+    others = sorted(each for each in times.values() if each > AS_GOOD)
     better = [each for each in times.values() if each <= 0.98]
     said = text_of(LEFT_OUT)
     assert f"On {sum(holds)} of {len(holds)} records" in said
-    assert f"On {len(others)} others it is {others[0]:.2f} to {others[-1]:.2f} times as far off" in said
-    assert re.search(rf"on the .* {worst:.1f} times\. On", said)
+    assert f"On the {len(others)} others it is {others[0]:.2f} to {others[-1]:.2f} times as far off" in said
     assert (
         f"On {len(better)} records it is {100 * (1 - max(better)):.0f} to {100 * (1 - min(better)):.0f} % better"
         in said
