@@ -7,7 +7,7 @@ held-out data under all effects of the label minus that under the best hypothesi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from aesi.data.blind import BlindCase
@@ -49,12 +49,10 @@ def detectability(case: BlindCase, answer: Sequence[str] | None = None) -> Detec
     """
     if not case.effects:
         return Detectability()
-    archive = Archive(None, "")
     try:
-        problem = label_problem(case)
-        seen = _said_more(problem, case.effects, archive)
-        named = None if answer is None else _fitted(problem, tuple(answer), archive)
-        label = _fitted(problem, case.effects, archive)
+        fit = _fits(label_problem(case))
+        seen, label = _said_more(fit, case.effects), fit(case.effects)
+        named = None if answer is None else fit(tuple(answer))
     except AesiError:
         return Detectability()
     if named is None or label is None:
@@ -90,22 +88,28 @@ def seen_on_measured(
     try:
         problem = inverse_problem(declared, [data], soc0, holdout, good=good)
         problem = replace(problem, trust="beside" if good else "measured")
-        archive = Archive(None, "")  # shared, so that hypotheses without them are fitted once
-        said = [_said_more(problem, (name,), archive) for name in answers]
+        fit = _fits(problem)
+        said = [_said_more(fit, (name,)) for name in answers]
     except AesiError:
         return None
     return max((nats for nats in said if nats is not None), default=None)
 
 
-def _said_more(problem: InverseProblem, effects: tuple[str, ...], archive: Archive) -> float | None:
+Fits = Callable[[tuple[str, ...]], FittedHypothesis | None]
+"""Effects -> their fit to the records of a problem; None if the model cannot be simulated with them."""
+
+
+def _fits(problem: InverseProblem) -> Fits:
+    """Fits to one problem, each of them made once."""
+    blocks, archive = blocks_of(problem), Archive(None, "")
+    return lambda effects: fitted_hypothesis(problem, blocks, effects, None, archive)
+
+
+def _said_more(fit: Fits, effects: tuple[str, ...]) -> float | None:
     """Log likelihood of held-out data under the effects minus that under the best hypothesis that lacks one of them,
     nats; None if the effects cannot be simulated."""
-    whole = _fitted(problem, effects, archive)
+    whole = fit(effects)
     if whole is None:
         return None
-    rests = [_fitted(problem, tuple(e for e in effects if e != name), archive) for name in effects]
+    rests = [fit(tuple(e for e in effects if e != name)) for name in effects]
     return whole.score.total - max((r.score.total for r in rests if r is not None), default=-float("inf"))
-
-
-def _fitted(problem: InverseProblem, effects: tuple[str, ...], archive: Archive) -> FittedHypothesis | None:
-    return fitted_hypothesis(problem, blocks_of(problem), effects, None, archive)

@@ -186,9 +186,8 @@ def _unexplained(problem: InverseProblem, path: Path, verdict: Verdict, searches
     if after.values is None or not after.hypothesis:
         why = "; ".join(filter(None, (why_not_refit(declared, recalibrations, options, after), why))) or None
     limits = (*stand_in_notes(after, verdict.effects), *fast_load_limits(after)) if after.hypothesis else ()
-    limits += tuple(
-        s for one in named if one.state is after for s in refused_refit(declared, recalibrations, one)
-    )
+    if (written := next((one for one in named if one.state is after), None)) is not None:
+        limits += refused_refit(declared, recalibrations, written)
     recalibrated = _recalibrated(problem, recalibrations)
     return Evidence(path, searches.paths, recalibrated, after, with_confidence(verdict), why, limits)
 

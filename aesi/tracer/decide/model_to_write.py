@@ -117,7 +117,7 @@ def model_to_write(
     recalibrated : models with own parameters fitted, some of them with effects that stand in for what the cell lacks.
     named : models with the named effects, own parameters as declared first, then fitted.
     """
-    own = [one for one in recalibrated if _fault(one, declared, (*ORDINARY_C, *FAST_C)) is None]
+    own = [one for one in recalibrated if _refit_fault(one, declared) is None]
     faults = [_fault(one, declared, ORDINARY_C) for one in named]
     sound = [one for one, fault in zip(named, faults, strict=True) if fault is None]
     preferred = [*sound, declared]
@@ -144,7 +144,7 @@ def why_not_refit(
     if not recalibrations:
         return None
     best = carries_best(recalibrations)
-    fault = None if best.state is taken else _fault(best, declared, (*ORDINARY_C, *FAST_C))
+    fault = None if best.state is taken else _refit_fault(best, declared)
     if fault is None:
         return None
     why = f"the recalibrated model: {fault}"
@@ -160,7 +160,7 @@ def refused_refit(declared: Option, recalibrations: Sequence[Option], taken: Opt
     if not recalibrations:
         return ()
     best = carries_best(recalibrations)
-    fault = _fault(best, declared, (*ORDINARY_C, *FAST_C)) if carries_best((taken, best)) is best else None
+    fault = _refit_fault(best, declared) if carries_best((taken, best)) is best else None
     return () if fault is None else (f"the recalibrated model is not written: {fault}.",)
 
 
@@ -179,6 +179,11 @@ def fast_load_limits(state: ModelState) -> tuple[str, ...]:
     """Sentences on fast full discharges and charges that the declared model can run and the written one cannot."""
     fast = range_fault(state, FAST_C)
     return () if fast is None else (f"with the finding, {fast}; the declared model does not.",)
+
+
+def _refit_fault(one: Option, declared: Option) -> str | None:
+    """Why a recalibrated model may not be written, a clause; None where it may."""
+    return _fault(one, declared, (*ORDINARY_C, *FAST_C))
 
 
 def _fault(one: Option, declared: Option, rates_c: Sequence[float]) -> str | None:
