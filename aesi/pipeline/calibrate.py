@@ -28,7 +28,7 @@ from aesi.numerics.files.whole import write_whole
 from aesi.over_time import stamp
 from aesi.physics.arguments import check_temperature
 from aesi.physics.cell import Cell
-from aesi.physics.cell.bpx_values import check_values
+from aesi.physics.cell.bpx.values import check_values
 from aesi.physics.cell.energies import SPAN_K
 from aesi.physics.record_checks import check_measured
 from aesi.physics.simulation import MODEL_WORDS

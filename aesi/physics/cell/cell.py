@@ -16,9 +16,9 @@ import numpy as np
 
 from aesi.constants import CM_PER_M, MILLI
 from aesi.errors import CellError
-from aesi.physics.cell.bpx_read import read_bpx
-from aesi.physics.cell.bpx_values import check_values
-from aesi.physics.cell.bpx_write import write_bpx
+from aesi.physics.cell.bpx.read import read_bpx
+from aesi.physics.cell.bpx.values import check_values
+from aesi.physics.cell.bpx.write import write_bpx
 from aesi.physics.cell.parts import CellParameters
 from aesi.physics.cell.relations import hashed_once
 

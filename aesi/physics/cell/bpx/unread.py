@@ -9,7 +9,7 @@ import numpy as np
 
 from aesi.constants import MV_PER_V
 from aesi.numerics.typing import Array
-from aesi.physics.cell.bpx_transport import inside_window
+from aesi.physics.cell.bpx.transport import inside_window
 from aesi.physics.cell.parts import (
     CAPACITY_SHARES,
     CONTACT_RESISTANCE,

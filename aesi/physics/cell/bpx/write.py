@@ -1,4 +1,4 @@
-"""Conversion of a cell to the content of a BPX file; values without a BPX field are written where `bpx_read` looks."""
+"""Conversion of a cell to the content of a BPX file; values without a BPX field are written where `read` looks."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ import numpy as np
 from aesi.constants import COLDEST_DEGC, SECONDS_PER_HOUR, WARMEST_DEGC, ZERO_CELSIUS_K
 from aesi.errors import CellError
 from aesi.numerics.typing import Array
-from aesi.physics.cell.bpx_transport import POINTS, inside_window
+from aesi.physics.cell.bpx.transport import POINTS, inside_window
 from aesi.physics.cell.parts import (
     CAPACITY_SHARES,
     CONTACT_RESISTANCE,

@@ -10,16 +10,16 @@ from os import PathLike
 from typing import Any
 
 from aesi.errors import CellError
-from aesi.physics.cell.bpx_schema import load_bpx
-from aesi.physics.cell.bpx_transport import check_kinetics, check_transport
-from aesi.physics.cell.bpx_unread import (
+from aesi.physics.cell.bpx.schema import load_bpx
+from aesi.physics.cell.bpx.transport import check_kinetics, check_transport
+from aesi.physics.cell.bpx.unread import (
     capacity_sentences,
     replaced_relation_sentences,
     rising_potential_sentences,
     unread_field_sentences,
     version_0_sentences,
 )
-from aesi.physics.cell.bpx_values import check_energies, check_values
+from aesi.physics.cell.bpx.values import check_energies, check_values
 from aesi.physics.cell.parts import (
     CAPACITY_SHARES,
     CONTACT_RESISTANCE,
