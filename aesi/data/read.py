@@ -14,7 +14,8 @@ from aesi.data.channels.checks import Columns, Context, check_constant, check_fi
 from aesi.data.channels.columns import QUANTITIES, REQUIRED, Mapped
 from aesi.data.channels.gaps import ambiguous_charge_notes, without_gaps
 from aesi.data.channels.glitches import glitch_doubts, glitches
-from aesi.data.channels.implausible import check_scale, check_sign, check_signed
+from aesi.data.channels.implausible.scale import check_scale
+from aesi.data.channels.implausible.sign import check_magnitudes, check_sign
 from aesi.data.channels.load_columns import keep_rows, load_columns
 from aesi.data.channels.stamps import aligned, time_doubts
 from aesi.data.channels.stuck import check_stuck_current, check_stuck_voltage, held_doubts
@@ -169,7 +170,7 @@ def _examine_course(data: Columns, context: Context, header: Sequence[str], sign
     """Check current, voltage and time against each other."""
     check_stuck_current(data, context)
     check_scale(data, context)
-    check_signed(data, context, header)
+    check_magnitudes(data, context, header)
     check_sign(data, context, sign_advice)
     check_stuck_voltage(data, context)
 
