@@ -16,8 +16,9 @@ from aesi.data.channels.gaps import ambiguous_charge_notes, without_gaps
 from aesi.data.channels.glitches import glitch_doubts, glitches
 from aesi.data.channels.implausible.scale import check_scale
 from aesi.data.channels.implausible.sign import check_magnitudes, check_sign
+from aesi.data.channels.lag import aligned
 from aesi.data.channels.load_columns import keep_rows, load_columns
-from aesi.data.channels.stamps import aligned, time_doubts
+from aesi.data.channels.stamps import time_doubts
 from aesi.data.channels.stuck import check_stuck_current, check_stuck_voltage, held_doubts
 from aesi.data.channels.temperature import temperature_doubts
 from aesi.data.readers import open_table
