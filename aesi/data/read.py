@@ -102,9 +102,9 @@ def read(
 
 
 def measurement_in(
-    table: TableFile, reading: Reading, max_rows: int | None = MAX_ROWS, name: str | None = None
+    table: TableFile, reading: Reading, max_rows: int | None, name: str | None = None
 ) -> Measurement:
-    """The measurement in a table that is open already."""
+    """The measurement in a table that is open already.  max_rows, name : as for `read_measurement`."""
     data, context, mapped, notes = load_columns(table, reading, REQUIRED)
     data = _examine(data, context, notes, table.header, _sign_advice(mapped, reading))
     measurement = Measurement(

@@ -156,7 +156,7 @@ def track_result(
     summary: Mapping[str, Any],
     numbers: Sequence[int],
     fitted: Sequence[Fitted],
-    note: str = "",
+    note: str,
 ) -> None:
     """The models, the tables, the report and the chosen model; `numbers` are of the candidates that they are the mean
     of, the fittest first.

@@ -63,17 +63,17 @@ class Mapped:
     unit: dict[str, str]
     bdf_current: bool
     notes: tuple[str, ...]
-    maker: str = ""
-    maker_sign: Sign | None = None
-    stated_degc: float | None = None
+    maker: str
+    maker_sign: Sign | None
+    stated_degc: float | None
 
 
 def map_columns(
     table: TableFile,
-    columns: Mapping[str, str | None] | None,
-    declared: Mapping[str, str] | None = None,
-    required: tuple[str, ...] = REQUIRED,
-    selectors: tuple[str, ...] = (),
+    columns: Mapping[str, str | None],
+    declared: Mapping[str, str],
+    required: tuple[str, ...],
+    selectors: tuple[str, ...],
 ) -> Mapped:
     """Find the quantities among the names of a table's columns.
 
@@ -86,8 +86,8 @@ def map_columns(
     Raises DataError for an unknown quantity, a name that is missing or exists twice, a unit that is not SI and is
     neither declared nor a maker's, and a declared unit that contradicts one in the name that is not SI.
     """
-    declared_units = {q: units.declared(q, u) for q, u in (declared or {}).items()}
-    finder = _Finder(table, dict(columns or {}), declared_units, required)
+    declared_units = {q: units.declared(q, u) for q, u in declared.items()}
+    finder = _Finder(table, dict(columns), declared_units, required)
     missing = [q for q in QUANTITIES if not finder.take(q) and q in required]
     if missing:
         raise finder.missing(missing)

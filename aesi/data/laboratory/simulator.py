@@ -88,7 +88,7 @@ class Setup:
     """A cell file, a model, and changes of both."""
 
     bpx: Path
-    model: LaboratoryModel = "DFN"
+    model: LaboratoryModel
     applied: tuple[Applied, ...] = ()
     radial_points: int | None = None
 

@@ -159,8 +159,8 @@ class TrainingDrives:
             others,
             self.config.data.hold,
             cell.start,
-            fitted,
             declared.model,
+            fitted,
             own_charges=self.of_several_records,
         )
 

@@ -294,7 +294,7 @@ def _physics(given: HybridModel, training: TrainingDrives) -> tuple[PhysicsModel
         training.records,
         config.data.hold,
         config.cell.start,
-        model=given.model,
+        given.model,
         own_charges=training.of_several_records,
     )
     if len(training.drives) > 1:

@@ -156,15 +156,15 @@ def physics_models(
     records: Mapping[str, FitRecord],
     hold: Hold,
     start: str,
+    model: ModelName,
     warm_start: PhysicsModels | None = None,
-    model: ModelName = "espm",
     *,
     own_charges: bool,
 ) -> PhysicsModels:
     """All physics models, fitted to the open rows of the records.
 
-    start : the model that is corrected, "declared" or "recalibrated".  warm_start : models fitted to nearly the same
-    rows, from which the fits begin.  model : kind of the physics.  own_charges : see `recalibrate`.
+    start : the model that is corrected, "declared" or "recalibrated".  model : kind of the physics.
+    warm_start : models fitted to nearly the same rows, from which the fits begin.  own_charges : see `recalibrate`.
     """
     known = {} if warm_start is None else warm_start.by_name
     fitted = {

@@ -114,7 +114,7 @@ def test_a_candidate_that_fits_noise_was_admitted_by_its_correlation_on_rows_tha
     candidate = evaluate(problem, whole(problem, 1e-6, 1e-6, feedback=False, p_c=3))
     seen = np.corrcoef(noise.error_v[1:], candidate.bagging.free_run(noise).error_v[1:])[0, 1]
     assert candidate.pearson_train < 0.1 < 0.25 < seen
-    single = evaluate_sindy_c(problem, candidate.genome)
+    single = evaluate_sindy_c(problem, candidate.genome, FitnessWeights())
     assert single.pearson_train == pytest.approx(candidate.pearson_train, abs=0.02)
 
 
