@@ -84,6 +84,12 @@ class SparseModel:
         """Name of each term -> coefficient, in scaled variables."""
         return dict(zip(self.terms, self.coefficients.tolist(), strict=True))
 
+    def inclusion_table(self) -> dict[str, float]:
+        """Name of each term -> share of the ensemble's members that hold it; empty where that is not known."""
+        if self.inclusion is None:
+            return {}
+        return dict(zip(self.terms, self.inclusion.tolist(), strict=True))
+
     @property
     def has_feedback(self) -> bool:
         """Whether any term holds the error."""

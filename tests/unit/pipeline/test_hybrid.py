@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from small_experiment import SOC0, experiment, fitted, write_record
+from small_experiment import SOC0, experiment, fitted
 
 import aesi
 from aesi.data.resample import to_even
@@ -31,11 +31,6 @@ from aesi.sparse.fade import Fade
 from aesi.sparse.terms.library import Library, Term
 from aesi.sparse.terms.scaling import Scaling
 from aesi.sparse.trained_region import TrainedRegion
-
-
-@pytest.fixture(scope="module")
-def record(tmp_path_factory):
-    return write_record(tmp_path_factory.mktemp("record"))
 
 
 @pytest.fixture(scope="module")
