@@ -228,10 +228,11 @@ def _exploding(problem, only):
     return np.tile(factor, (len(problem.factors), 1, 1))
 
 
-def with_column(values, position=1):
+def with_soc_input(values):
+    """A training record whose second input, called soc, has these values."""
     record = make_record(300)
     inputs = record.inputs.copy()
-    inputs[:, position] = values(record)
+    inputs[:, 1] = values(record)
     return Split((replace(record, inputs=inputs),), (), ())
 
 
@@ -239,19 +240,19 @@ SMALL = Options(p_c=1, d=2, mixed=False, resamples=5, block=50)
 
 
 def test_a_constant_input_is_left_out_with_a_note():
-    problem = Problem.build(with_column(lambda record: np.full(len(record), 0.5)), SMALL)
+    problem = Problem.build(with_soc_input(lambda record: np.full(len(record), 0.5)), SMALL)
     assert problem.library.variables == ("e", "I", "c_e0")
     assert problem.notes == ("soc is constant over the training records; its terms were left out.",)
 
 
 def test_a_repeated_input_is_left_out_with_a_note():
-    problem = Problem.build(with_column(lambda record: 5 + 3 * record.inputs[:, 0]), SMALL)
+    problem = Problem.build(with_soc_input(lambda record: 5 + 3 * record.inputs[:, 0]), SMALL)
     assert "soc repeats I up to scale" in problem.notes[0]
     assert isinstance(evaluate(problem, whole(problem, p_c=1)), Candidate)
 
 
 def test_an_input_that_repeats_another_upside_down_was_kept():
-    problem = Problem.build(with_column(lambda record: 5 - 3 * record.inputs[:, 0]), SMALL)
+    problem = Problem.build(with_soc_input(lambda record: 5 - 3 * record.inputs[:, 0]), SMALL)
     assert "soc repeats I up to scale" in problem.notes[0]
 
 
@@ -268,7 +269,7 @@ def test_nan_is_refused_with_its_place():
         return column
 
     with pytest.raises(DataError, match="soc is not a number in row 18, counted from 1"):
-        Problem.build(with_column(broken), SMALL)
+        Problem.build(with_soc_input(broken), SMALL)
 
 
 @pytest.mark.parametrize(
@@ -396,7 +397,7 @@ def test_options_that_no_search_can_have_are_refused(asked, sentence):
 
 
 def test_an_input_of_a_given_library_that_does_not_vary_is_named():
-    flat = with_column(lambda record: np.full(len(record), 0.5))
+    flat = with_soc_input(lambda record: np.full(len(record), 0.5))
     library = Library.build(flat.train[0].input_names, p_c=1, d=1)
     with pytest.raises(DataError, match="soc is constant over the training records and has no range"):
         Problem.build(flat, SMALL, library)
