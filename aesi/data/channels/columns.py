@@ -261,13 +261,7 @@ class _Finder:
         if found is None:
             return False
         name = self._table.header[found[0]]
-        self._only(
-            [
-                i
-                for i, there in enumerate(self._table.header)
-                if _without_blanks(there) == _without_blanks(name)
-            ]
-        )
+        self._place_of(name)  # refuses several columns of that name
         other = form.reference_column(quantity, found[0], self._table.header) if form else None
         if other is not None:
             raise DataError(
@@ -286,12 +280,7 @@ class _Finder:
     def _find_by_bdf(self, quantity: str) -> bool:
         """Find and store the quantity under a name of the battery data format; False where it has none."""
         for label in BDF.get(quantity, ()):
-            places = [
-                i
-                for i, name in enumerate(self._table.header)
-                if _without_blanks(name) == _without_blanks(label)
-            ]
-            found = self._only(places)
+            found = self._place_of(label)
             if found is not None:
                 self.position[quantity] = found
                 self._set_unit(quantity, units.SI.get(quantity, ""))
@@ -395,6 +384,11 @@ class _Finder:
                 f"{quantity} ({', '.join(units.FACTORS[quantity])}); declare the one it is in, as in "
                 f"--unit {quantity}={units.SI[quantity]}, or convert the column."
             )
+
+    def _place_of(self, label: str) -> int | None:
+        """Position of the only column of a name, blanks and case apart; None for none.  Raises as `_only`."""
+        wanted = _without_blanks(label)
+        return self._only([i for i, name in enumerate(self._table.header) if _without_blanks(name) == wanted])
 
     def _only(self, places: list[int]) -> int | None:
         """The only one of the positions of a name, None for none.  Raises DataError for several columns of one name."""
