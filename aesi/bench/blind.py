@@ -23,6 +23,7 @@ from aesi.bench.limit import LOST, NO_ANSWER, NO_TIME, NoAnswer, Stopwatch, answ
 from aesi.bench.scoring import TO_THE_NOISE, calibration, judge, rate
 from aesi.constants import MV_PER_V
 from aesi.data.blind import FULL, BlindCase, CaseSpec, cells_in, generate, label_of, plan, small_plan
+from aesi.data.virtual import INSTRUMENT
 from aesi.errors import SimulationError
 from aesi.physics import Cell
 from aesi.pipeline.discovery.discover import discovery_content
@@ -127,7 +128,7 @@ def _scored(case: BlindCase, content: Mapping[str, Any]) -> dict[str, Any]:
     for state in STATES:
         row[f"{state}_test_mv"] = content[state]["test"]["rmse_mv"]
     judgement = judge(case.label, case.also, case.neutral, content)
-    noise_mv = MV_PER_V * case.spec.voltage_noise_v
+    noise_mv = MV_PER_V * INSTRUMENT.voltage_noise_v
     after_over_noise = row["after_test_mv"] / noise_mv
     errors, covered = _parameters(case, content)
     return row | {

@@ -53,7 +53,7 @@ class HorizonBand:
     counts: Array
     widening: float
     by_piece: tuple[float, ...]
-    extrapolated: bool = False
+    extrapolated: bool
 
     def half_width(self, columns: Array) -> Array:
         """(n,) V; columns : (n, p) of `local_scale.covariates`."""
@@ -125,8 +125,8 @@ def calibrated_band(
     inside: Sequence[BoolArray],
     alpha: float,
     dt_s: float,
-    stretches: int | None = None,
-    records: Sequence[str] | None = None,
+    stretches: int | None,
+    records: Sequence[str] | None,
 ) -> HorizonBand:
     """The band at one horizon (s), calibrated at miss rate `alpha` on records sampled every dt_s (s).
 

@@ -67,7 +67,7 @@ class LocalScale:
         return cls(saved_array(state["weights"], "weights", (3,), 0.0), floor)
 
 
-def covariates(spread_v: Array, excess: Array | None = None) -> Array:
+def covariates(spread_v: Array, excess: Array | None) -> Array:
     """(n, p) columns of (1), from spread_v (n,) V and excess (n,), which is 0 where the model has no leverage."""
     n = len(spread_v)
     beyond = np.zeros(n) if excess is None else np.log1p(excess)

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from aesi.constants import MILLI, SECONDS_PER_HOUR
-from aesi.data.channels.implausible import ENOUGH_STEPS, USUAL_RESISTANCE_OHM_AH, step_resistance_ohm
+from aesi.data.channels.implausible.responses import ENOUGH_STEPS, step_resistance_ohm
+from aesi.data.channels.implausible.scale import USUAL_RESISTANCE_OHM_AH
 from aesi.data.read import read
 from aesi.data.reading import Reading
 from aesi.errors import DataError, not_written

@@ -26,9 +26,9 @@ class CurrentProfile:
 
     time_s: Array
     current_a: Array
-    voltage_v: Array | None = None
-    temperature_degc: Array | None = None
-    notes: tuple[str, ...] = ()
+    voltage_v: Array | None
+    temperature_degc: Array | None
+    notes: tuple[str, ...]
 
 
 def read_current(path: str | Path, reading: Reading | None = None) -> CurrentProfile:

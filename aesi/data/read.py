@@ -14,9 +14,11 @@ from aesi.data.channels.checks import Columns, Context, check_constant, check_fi
 from aesi.data.channels.columns import QUANTITIES, REQUIRED, Mapped
 from aesi.data.channels.gaps import ambiguous_charge_notes, without_gaps
 from aesi.data.channels.glitches import glitch_doubts, glitches
-from aesi.data.channels.implausible import check_scale, check_sign, check_signed
+from aesi.data.channels.implausible.scale import check_scale
+from aesi.data.channels.implausible.sign import check_magnitudes, check_sign
+from aesi.data.channels.lag import aligned
 from aesi.data.channels.load_columns import keep_rows, load_columns
-from aesi.data.channels.stamps import aligned, time_doubts
+from aesi.data.channels.stamps import time_doubts
 from aesi.data.channels.stuck import check_stuck_current, check_stuck_voltage, held_doubts
 from aesi.data.channels.temperature import temperature_doubts
 from aesi.data.readers import open_table
@@ -100,9 +102,9 @@ def read(
 
 
 def measurement_in(
-    table: TableFile, reading: Reading, max_rows: int | None = MAX_ROWS, name: str | None = None
+    table: TableFile, reading: Reading, max_rows: int | None, name: str | None = None
 ) -> Measurement:
-    """The measurement in a table that is open already."""
+    """The measurement in a table that is open already.  max_rows, name : as for `read_measurement`."""
     data, context, mapped, notes = load_columns(table, reading, REQUIRED)
     data = _examine(data, context, notes, table.header, _sign_advice(mapped, reading))
     measurement = Measurement(
@@ -169,7 +171,7 @@ def _examine_course(data: Columns, context: Context, header: Sequence[str], sign
     """Check current, voltage and time against each other."""
     check_stuck_current(data, context)
     check_scale(data, context)
-    check_signed(data, context, header)
+    check_magnitudes(data, context, header)
     check_sign(data, context, sign_advice)
     check_stuck_voltage(data, context)
 

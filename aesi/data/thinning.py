@@ -25,8 +25,11 @@ STEADY_SHARE = 0.01
 
 @dataclass(frozen=True)
 class Spacing:
-    """Distance of the rows of a record of constant currents: `first_s` s directly after a step of the current, later
-    `growth` times the time since that step."""
+    """Distance of the rows of a record of constant currents: about `growth` times (`first_s` + the time since the last
+    step of the current), s.
+
+    first_s : s.  growth : a share.
+    """
 
     first_s: float
     growth: float
@@ -183,24 +186,34 @@ def condensed(
     steps = current_steps(data, capacity_ah)
     if not _steady(data, steps):
         return None
-    t = data.time_s
-    n = len(t)
-    first = np.concatenate([[True], steps])
-    began = np.maximum.accumulate(np.where(first, np.arange(n), 0))
-    since = t - t[np.maximum(began - 1, 0)]
-    even = max(longest_s / spacing.growth - spacing.first_s, 0.0)
-    place = np.log1p(np.minimum(since, even) / spacing.first_s) / spacing.growth
-    place = np.floor(place + np.maximum(since - even, 0.0) / longest_s)
-    opens = first | np.concatenate([[True], np.diff(place) != 0.0])
-    opens[[1, -1]] = True
-    # The first and the last row of each current are kept unaveraged, so that the steps between them are exact.
-    opens[1:] |= first[:-1]
-    opens[:-1] |= first[1:]
-    starts = np.flatnonzero(opens)
-    rows = np.diff(np.append(starts, n)).astype(float)
-    if len(starts) == n:
+    starts = np.flatnonzero(_begins_a_run(data.time_s, np.insert(steps, 0, True), longest_s, spacing))
+    rows = np.diff(np.append(starts, len(data))).astype(float)
+    if len(starts) == len(data):
         return data, rows
     return _averaged(data, Runs(rows, hold)), rows
+
+
+def _begins_a_run(time_s: Array, new_current: BoolArray, longest_s: float, spacing: Spacing) -> BoolArray:
+    """(n,) True for the rows with which an average of `condensed` begins.
+
+    new_current : (n,) True for the first row of each current.
+    """
+    began = np.maximum.accumulate(np.where(new_current, np.arange(len(time_s)), 0))
+    since_s = time_s - time_s[np.maximum(began - 1, 0)]
+    begins: BoolArray = new_current | np.insert(np.diff(_slot(since_s, longest_s, spacing)) != 0.0, 0, True)
+    begins[[1, -1]] = True
+    # The first and the last row of each current are kept unaveraged, so that the steps between them are exact.
+    begins[1:] |= new_current[:-1]
+    begins[:-1] |= new_current[1:]
+    return begins
+
+
+def _slot(since_s: Array, longest_s: float, spacing: Spacing) -> Array:
+    """(n,) number of the slot that a time since a step of the current lies in: slots grow as `spacing` says, and are
+    longest_s (s) from where they would be longer."""
+    grown_s = max(longest_s / spacing.growth - spacing.first_s, 0.0)
+    grown = np.log1p(np.minimum(since_s, grown_s) / spacing.first_s) / spacing.growth
+    return np.asarray(np.floor(grown + np.maximum(since_s - grown_s, 0.0) / longest_s))
 
 
 def _averaged(data: Measurement, window: Averages) -> Averaged:

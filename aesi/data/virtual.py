@@ -28,6 +28,7 @@ DROP_AT_1C_V = 0.008
 PARASITIC_SHARE = 0.005
 """Charge of a parasitic current per hour at magnitude 1, as a share of the capacity."""
 INSTRUMENT = Instrument()
+"""What writes all virtual records."""
 
 STRENGTHS: dict[str, Callable[[float, float], dict[str, float]]] = {
     "self_heating": lambda m, q: {"cooling_w_m2_k": 10.0 / m},
@@ -53,7 +54,7 @@ STRENGTHS: dict[str, Callable[[float, float], dict[str, float]]] = {
 
 @dataclass(frozen=True)
 class Laboratory:
-    """A cell file, changes to its cell, and the instruments that measure it.
+    """A cell file, and changes to its cell.
 
     effects : ids of changes, at `magnitude` times their typical strength.  values : change id -> value name -> value,
     which replaces the typical one.  thermocouple : whether the records have a temperature column; None gives them one
@@ -65,7 +66,6 @@ class Laboratory:
     effects: tuple[str, ...] = DEFAULT_MIX
     magnitude: float = 1.0
     values: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    instrument: Instrument = INSTRUMENT
     thermocouple: bool | None = None
     seed: int = 0
 
@@ -75,8 +75,11 @@ class Laboratory:
         return nominal_capacity_ah(self.bpx)
 
     def setup(self) -> Setup:
-        """LaboratoryModel and changes. Raises DataError for an unknown change, for values of one that is not made, and
-        for a magnitude at which one has no strength."""
+        """The cell file, the model and the changes, as the simulator takes them.
+
+        Raises DataError for an unknown change, for values of one that is not made, and for a magnitude at which one has
+        no strength.
+        """
         for name in self.values:
             if name not in self.effects:
                 made = ", ".join(self.effects) or "none"
@@ -97,7 +100,7 @@ class Laboratory:
         written = "self_heating" in self.effects if self.thermocouple is None else self.thermocouple
         trace = simulate_truth(self.setup(), profile)
         notes = (note, *self._outside(profile.name, trace.voltage_v))
-        return self.instrument.write(trace, profile.name, rng, written, notes)
+        return INSTRUMENT.write(trace, profile.name, rng, written, notes)
 
     def _outside(self, name: str, voltage_v: Array) -> tuple[str, ...]:
         """A note where the voltage leaves the declared window; a cycler would stop there."""
@@ -133,10 +136,11 @@ class VirtualExperiment:
 
 
 def paper_experiment(
-    laboratory: Laboratory, dt_s: float = 0.1, pulse_c: float = PULSE_C, other_load: float = OTHER_LOAD
+    laboratory: Laboratory, dt_s: float, pulse_c: float = PULSE_C, other_load: float = OTHER_LOAD
 ) -> VirtualExperiment:
-    """The paper's experiment: 88,200 training rows at the default 10 Hz, 8,820 at 1 Hz.
+    """The paper's experiment, a row every dt_s (s): 88,200 training rows at 10 Hz, 8,820 at 1 Hz.
 
+    pulse_c, other_load : as for `paper_profiles`.
     Raises DataError or SimulationError as `Laboratory.measure` does.
     """
     profiles = paper_profiles(laboratory.capacity_ah, dt_s, pulse_c, other_load)

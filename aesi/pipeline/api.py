@@ -162,7 +162,7 @@ def calibrate(
     _check_days(dates or {}, as_of)
     check_whole_number("starts", starts, 1)
     check_whole_number("seed", seed, 0, LARGEST_SEED)
-    if cut_offs_v is not None and not _is_row(cut_offs_v, 2):
+    if cut_offs_v is not None and not _is_pair(cut_offs_v):
         raise InputError(f"cut_offs_v = {cut_offs_v!r}: give (lower, upper) V, as in (2.5, 4.2).")
     given = declared_model(cell)
     conditions = Conditions(
@@ -213,13 +213,9 @@ def _names(what: str, ids: str | Sequence[str]) -> tuple[str, ...]:
     return tuple(given)
 
 
-def _is_row(values: object, length: int) -> bool:
-    """Whether a value is a sequence of so many numbers."""
-    return (
-        isinstance(values, Sequence)
-        and len(values) == length
-        and all(isinstance(one, Real) for one in values)
-    )
+def _is_pair(values: object) -> bool:
+    """Whether a value is a sequence of two numbers."""
+    return isinstance(values, Sequence) and len(values) == 2 and all(isinstance(one, Real) for one in values)
 
 
 def _check_asked(holdout: object, max_effects: int, seed: int) -> None:
@@ -245,7 +241,7 @@ def _check_priors(priors: object) -> None:
     if priors is not None and not isinstance(priors, Mapping):
         raise InputError(f"priors = {priors!r} names no parameter; give {form}.")
     for name, prior in (priors or {}).items():
-        if not _is_row(prior, 2):
+        if not _is_pair(prior):
             raise InputError(f"priors[{name!r}] = {prior!r} is no pair of numbers; give {form}.")
 
 

@@ -89,8 +89,8 @@ def check_request(cell: Declared, request: Request) -> None:
 def start_cell(
     cell: Cell,
     cut_offs_v: tuple[float, float] | None,
-    body_mm: Sequence[float] | None = None,
-    mass_g: float | None = None,
+    body_mm: Sequence[float] | None,
+    mass_g: float | None,
 ) -> Cell:
     """The cell that a calibration starts from, between (lower, upper) V and with the body where these are given.
 

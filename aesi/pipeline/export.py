@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -46,8 +46,8 @@ class Exported:
 class _Pybamm:
     """Content for PyBaMM beside the BPX file."""
 
-    options: dict[str, Any] = field(default_factory=dict)
-    values: dict[str, float] = field(default_factory=dict)
+    options: dict[str, Any]
+    values: dict[str, float]
 
 
 def files_written(out: Path, to: Target) -> tuple[Path, ...]:

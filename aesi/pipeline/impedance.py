@@ -192,7 +192,7 @@ class SpectrumError:
     soc: float
     z_ohm: ComplexArray
     ratio_error: float | None
-    fitted: bool = False
+    fitted: bool
 
 
 def compared_spectra(

@@ -18,23 +18,22 @@ LIMIT = 10.0
 
 
 @kept_njit()
-def run_with_feedback(
-    drive: Array, functions: IntArray, start: float, clip: bool, limit: float
-) -> tuple[Array, int]:
-    """One model along one record, in scaled error.
+def run_with_feedback(drive: Array, functions: IntArray, start: float) -> tuple[Array, int]:
+    """One model along one record, in scaled error, which is fed back held within [-1, 1].
 
-    drive : (n_functions, n), g_q at each sample.  Returns (n,) predictions of samples 1 to n, and the index
-    of the first that left `limit` (-1: none); from there on the last value inside is held.
+    drive : (n_functions, n), g_q at each sample.  functions : (n_functions,) number of each q.  start : scaled error of
+    sample 0.  Returns (n,) predictions of samples 1 to n, and the index of the first beyond LIMIT (-1: none); from
+    there on the last value within is held.
     """
     n = drive.shape[1]
     out = np.empty(n)
     x = start
     for k in range(n):
-        inside = min(1.0, max(-1.0, x)) if clip else x
+        inside = min(1.0, max(-1.0, x))
         predicted = 0.0
         for q in range(len(functions)):
             predicted += value(functions[q], inside) * drive[q, k]
-        if not abs(predicted) <= limit:
+        if not abs(predicted) <= LIMIT:
             out[k:] = x
             return out, k
         x = predicted
@@ -44,9 +43,10 @@ def run_with_feedback(
 
 @kept_njit()
 def run_ensemble(
-    drive: Array, functions: IntArray, measured: Array, restart: BoolArray, state: Array, clip: bool
+    drive: Array, functions: IntArray, measured: Array, restart: BoolArray, state: Array
 ) -> Array:
-    """Several models along the same rows, each piece started from its measured error.
+    """Several models along the same rows, each piece started from its measured error; what is fed back is held within
+    [-1, 1].
 
     drive : (n_functions, n, models).  measured : (n,) scaled error at each row.  restart : (n,) where a piece
     starts.  state : (models,) the running prediction, updated in place.  Returns (n, models): the prediction
@@ -59,14 +59,9 @@ def run_ensemble(
     for k in range(n):
         if restart[k]:
             state[:] = measured[k]
-        if clip:
-            for j in range(models):
-                x[j] = min(1.0, max(-1.0, state[j]))
-            clipped_values(functions, x, at)
-        else:
-            for q in functions:
-                for j in range(models):
-                    at[q, j] = value(q, state[j])
+        for j in range(models):
+            x[j] = min(1.0, max(-1.0, state[j]))
+        clipped_values(functions, x, at)
         predicted = out[k]
         predicted[:] = 0.0
         for i in range(len(functions)):
@@ -81,11 +76,11 @@ def run_ensemble(
 
 
 @kept_njit()
-def ahead_with_feedback(
-    drive: Array, functions: IntArray, measured: Array, steps: int, clip: bool, limit: float
-) -> Array:
-    """Predictions `steps` samples ahead of each measured error.
+def ahead_with_feedback(drive: Array, functions: IntArray, measured: Array, steps: int) -> Array:
+    """Predictions `steps` samples ahead of each measured error; where one is beyond LIMIT on its way, the last value
+    within.
 
+    drive, functions : as for `run_with_feedback`.  measured : (n or more,) scaled errors from sample 0 on.
     Returns (n,): entry k predicts sample k + 1 from the measured sample max(0, k + 1 - steps).
     """
     n = drive.shape[1]
@@ -94,11 +89,11 @@ def ahead_with_feedback(
         first = max(0, k + 1 - steps)
         x = measured[first]
         for i in range(first, k + 1):
-            inside = min(1.0, max(-1.0, x)) if clip else x
+            inside = min(1.0, max(-1.0, x))
             predicted = 0.0
             for q in range(len(functions)):
                 predicted += value(functions[q], inside) * drive[q, i]
-            if not abs(predicted) <= limit:
+            if not abs(predicted) <= LIMIT:
                 break
             x = predicted
         out[k] = x

@@ -84,6 +84,12 @@ class SparseModel:
         """Name of each term -> coefficient, in scaled variables."""
         return dict(zip(self.terms, self.coefficients.tolist(), strict=True))
 
+    def inclusion_table(self) -> dict[str, float]:
+        """Name of each term -> share of the ensemble's members that hold it; empty where that is not known."""
+        if self.inclusion is None:
+            return {}
+        return dict(zip(self.terms, self.inclusion.tolist(), strict=True))
+
     @property
     def has_feedback(self) -> bool:
         """Whether any term holds the error."""
@@ -200,10 +206,6 @@ class SparseModel:
                 fade=None if fade is None else Fade.from_dict(fade, n - 1),
             )
 
-    @property
-    def _clip(self) -> bool:
-        return self.scaling.outside == "clip"
-
     @cached_property
     def _error_functions(self) -> IntArray:
         return np.unique(self.library.feedbacks)
@@ -222,9 +224,7 @@ class SparseModel:
         start = self._start_by_inputs_v(drive) if np.isnan(start_v) else start_v
         scaled0 = float(self.scaling.error_to_scaled(np.array(start)))
         if self.has_feedback:
-            scaled, diverged = free_run.run_with_feedback(
-                drive[:, :-1], self._error_functions, scaled0, self._clip, free_run.LIMIT
-            )
+            scaled, diverged = free_run.run_with_feedback(drive[:, :-1], self._error_functions, scaled0)
         else:
             by_inputs = drive[0, :-1]
             scaled, diverged = free_run.held_at_divergence(
@@ -240,9 +240,7 @@ class SparseModel:
         """(n,) V, each predicted from the measured error `steps` samples earlier."""
         measured = self.scaling.error_to_scaled(error_v)
         if self.has_feedback:
-            scaled = free_run.ahead_with_feedback(
-                drive[:, :-1], self._error_functions, measured, steps, self._clip, free_run.LIMIT
-            )
+            scaled = free_run.ahead_with_feedback(drive[:, :-1], self._error_functions, measured, steps)
         else:
             scaled = free_run.autoregressive_ahead(drive[0, :-1], self.memory, measured, steps)
         return np.append(error_v[:1], self.scaling.error_to_volts(scaled))

@@ -15,7 +15,7 @@ from aesi.bench.blind import LIMIT_S, chosen, judged, lost, summary, table
 from flows.benchmarks.cases import Cases, in_order, tracked
 from flows.benchmarks.page import write_between
 
-SHOWN = (
+PARAMETERS = (
     "cell",
     "model",
     "records",
@@ -51,7 +51,7 @@ def run(
     specs = chosen(cases, only, small, seed, every, after)
     judge = partial(judged, cells=cells, limit_s=limit_s)
     rows = []
-    for row in tracked(Cases("blind", seed, specs, judge, summary, lost, SHOWN), workers, address):
+    for row in tracked(Cases("blind", seed, specs, judge, summary, lost, PARAMETERS), workers, address):
         rows.append(row)
         yield row
     if write is not None:

@@ -39,7 +39,7 @@ class Cases:
     name : of the experiment in the tracking store.  judge : a specification -> its row, a function that a process
     elsewhere can import (or a partial of one).  summary : rows -> the last line.  lost : a specification -> its row
     where the system ended the process that judged it.
-    shown : keys of a row that are parameters of its run; other numbers are metrics.
+    parameters : keys of a row that are tracked as parameters of its run; its other numbers are metrics.
     """
 
     name: str
@@ -48,7 +48,7 @@ class Cases:
     judge: Callable[[Any], CaseRow]
     summary: Callable[[list[CaseRow]], CaseRow]
     lost: Callable[[Any], CaseRow]
-    shown: tuple[str, ...]
+    parameters: tuple[str, ...]
 
 
 def tracked(cases: Cases, workers: int = 1, address: str | None = None) -> Iterator[CaseRow]:
@@ -73,7 +73,7 @@ def tracked(cases: Cases, workers: int = 1, address: str | None = None) -> Itera
         for row in _rows(cases, workers, address):
             rows.append(row)
             if tracker is not None:
-                _track(tracker, row, cases.shown)
+                _track(tracker, row, cases.parameters)
             yield row
         rows.sort(key=lambda row: str(row["case"]))
         last = {"seed": cases.seed, **cases.summary(rows)}
@@ -168,10 +168,10 @@ def _rows(cases: Cases, workers: int, address: str | None) -> Iterator[CaseRow]:
     return in_processes(cases.judge, cases.specs, workers, cases.lost)
 
 
-def _track(tracker: Tracker, row: CaseRow, shown: tuple[str, ...]) -> None:
-    parameters = {k: v if isinstance(v, str) else json.dumps(v) for k, v in row.items() if k in shown}
-    metrics = _other_numbers(row, shown)
-    tracker.nested(f"case:{row['case']}", row["case"], "case", parameters, metrics, seconds=row["ours_s"])
+def _track(tracker: Tracker, row: CaseRow, parameters: tuple[str, ...]) -> None:
+    values = {k: v if isinstance(v, str) else json.dumps(v) for k, v in row.items() if k in parameters}
+    metrics = _other_numbers(row, parameters)
+    tracker.nested(f"case:{row['case']}", row["case"], "case", values, metrics, seconds=row["ours_s"])
 
 
 def _other_numbers(row: CaseRow, without: tuple[str, ...]) -> dict[str, float]:

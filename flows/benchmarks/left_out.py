@@ -13,7 +13,7 @@ from aesi.bench.left_out import LIMIT_S, LeftOutCase, judged, lost, plan, summar
 from flows.benchmarks.cases import Cases, available_files, in_order, judged_once, tracked
 from flows.benchmarks.page import write_between
 
-SHOWN = ("cell", "record", "verdict", "effects", "error")
+PARAMETERS = ("cell", "record", "verdict", "effects", "error")
 BEGIN, END = "<!-- table of aesi bench left_out -->", "<!-- end of left_out -->"
 
 
@@ -42,7 +42,7 @@ def run(
         keep=keep,
         files=partial(_files, cells=cells),
     )
-    for row in tracked(Cases("left_out", 0, specs, judge, summary, lost, SHOWN), workers, address):
+    for row in tracked(Cases("left_out", 0, specs, judge, summary, lost, PARAMETERS), workers, address):
         rows.append(row)
         yield row
     if write is not None:

@@ -18,7 +18,7 @@ from aesi.bench.real.judge import LIMIT_S
 from flows.benchmarks.cases import Cases, available_files, in_order, judged_once, tracked
 from flows.benchmarks.page import write_between
 
-SHOWN = ("group", "cell", "record", "put_in", "answer", "verdict", "effects", "source", "error")
+PARAMETERS = ("group", "cell", "record", "put_in", "answer", "verdict", "effects", "source", "error")
 BEGIN, END = "<!-- table of aesi bench real -->", "<!-- end of real -->"
 ARCHIVE_MARKS = "<!-- table of aesi bench real, archive -->", "<!-- end of real, archive -->"
 
@@ -53,7 +53,7 @@ def run(
         files=partial(_files, cells=cells),
     )
     rows = []
-    for row in tracked(Cases("real", 0, specs, judge, summary, lost, SHOWN), workers, address):
+    for row in tracked(Cases("real", 0, specs, judge, summary, lost, PARAMETERS), workers, address):
         if row.get("summary"):
             if report:
                 write_report(Path(report), rows, row)

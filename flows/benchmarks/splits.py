@@ -37,12 +37,13 @@ BLOCK_S = 100.0
 QUICK_INTERVALS = ("conformal.method=split", "conformal.compare=[]", "conformal.horizons_s=[60.0]")
 """Intervals one step ahead are not judged here."""
 QUICK_MODELS = ("ESPM", "ESPM, one resistor", "ESPM recalibrated", "AESI I", "AESI II")
-
-
-SHOWN = ("split", "cell", "seed", "development", "verdict", "error")
+"""Rows of Table 1 that are worked out unless others are asked for."""
+PARAMETERS = ("split", "cell", "seed", "development", "verdict", "error")
+"""Keys of a row that are parameters of its run (`Cases`)."""
 TRACKED = ("mser_pct", "coverage_pct", "winkler_mv")
 """Figures of each model that are metrics of its run."""
 BEGIN, END = "<!-- table of aesi bench splits -->", "<!-- end of splits -->"
+"""Marks on a page between which the table stands."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +126,7 @@ def run(
             )
     rows = []
     judge = partial(judged_once, judge=_row, keep=keep, files=_files)
-    for row in tracked(Cases("splits", 0, runs, judge, summary, _lost, SHOWN), workers, address):
+    for row in tracked(Cases("splits", 0, runs, judge, summary, _lost, PARAMETERS), workers, address):
         rows.append(row)
         yield row
     if write is not None:

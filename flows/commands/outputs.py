@@ -51,7 +51,7 @@ def check_table(out: Path, inputs: Iterable[Path]) -> None:
         raise InputError(f"--out {out}: what is written is a CSV; give a name that ends in .csv or .csv.gz.")
 
 
-def check_json(out: Path, inputs: Iterable[Path], written: Sequence[Path] = ()) -> None:
+def check_json(out: Path, inputs: Iterable[Path], written: Sequence[Path]) -> None:
     """`check_file` for a cell file (BPX).  Raises InputError also if the name does not end in .json."""
     check_file(out, inputs, written)
     if out.suffix.lower() != ".json":

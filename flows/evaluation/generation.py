@@ -19,11 +19,10 @@ POLL_S = 0.2
 
 @dataclass
 class Tally:
-    """Where the outcomes came from."""
+    """How many outcomes were evaluated here, and how many were found in the store."""
 
     evaluated: int = 0
     found: int = 0
-    seconds: float = 0.0
 
 
 class Evaluation:
@@ -61,7 +60,6 @@ class Evaluation:
         return fingerprint.key(self._study, codec.dumps(genome))
 
     def __call__(self, genomes: Sequence[Any]) -> Iterator[tuple[int, Any]]:
-        started = time.monotonic()
         waiting: dict[str, list[int]] = {}
         for position, genome in enumerate(genomes):
             waiting.setdefault(self.key(genome), []).append(position)  # twins are evaluated once
@@ -79,7 +77,6 @@ class Evaluation:
                 yield from ((position, outcome) for position in waiting.pop(key))
             if waiting and not working:
                 time.sleep(POLL_S)
-        self.tally.seconds += time.monotonic() - started
 
     def _stored_or_begun(self, key: str, genome: Any, working: set[str]) -> Any:
         """The stored outcome; None where there is none.  Then an idle pool begins the candidate, and its key is added

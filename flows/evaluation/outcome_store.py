@@ -40,7 +40,7 @@ class Outcomes(Protocol):
         ...
 
 
-def open_outcomes(folder: Path, url: str | None = None) -> Outcomes:
+def open_outcomes(folder: Path, url: str | None) -> Outcomes:
     """A database where a URL is given, else the folder."""
     if not url:
         return FileOutcomes(folder)

@@ -21,7 +21,7 @@ from aesi.pipeline.experiment.load import Loaded
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.written import COEFFICIENTS, EXPERIMENT, FIGURES, MODEL, REPORT, SUMMARY, TABLES
 from aesi.records import ROLES, Failed
-from aesi.sparse import Candidate, Genome, Problem, SparseModel
+from aesi.sparse import Candidate, Genome, Problem
 from flows.base import codec
 from flows.tracking.provenance import versions
 from flows.tracking.tracker import Tracker, flat
@@ -156,7 +156,7 @@ def track_result(
     summary: Mapping[str, Any],
     numbers: Sequence[int],
     fitted: Sequence[Fitted],
-    note: str = "",
+    note: str,
 ) -> None:
     """The models, the tables, the report and the chosen model; `numbers` are of the candidates that they are the mean
     of, the fittest first.
@@ -216,7 +216,7 @@ def coefficients(candidate: Candidate) -> dict[str, dict[str, float]]:
     return {
         "bagging": bagging.coefficient_table(),
         "stability": stability.coefficient_table(),
-        "inclusion": _inclusion(stability) | _inclusion(bagging),
+        "inclusion": stability.inclusion_table() | bagging.inclusion_table(),
     }
 
 
@@ -245,12 +245,6 @@ def _metrics(scored: ScoredCandidate, shares: Mapping[str, float]) -> dict[str, 
         "intervals/valid_coverage_pct_aesi_ii": scored.stable_coverage_pct,
         "intervals/valid_width_v_aesi_ii": scored.stable_width_v,
     }
-
-
-def _inclusion(model: SparseModel) -> dict[str, float]:
-    if model.inclusion is None:
-        return {}
-    return dict(zip(model.terms, model.inclusion.tolist(), strict=True))
 
 
 def _flat_metrics(row: Mapping[str, Any], prefix: str = "") -> dict[str, float]:

@@ -75,7 +75,7 @@ class StoreAway(AesiError):
     """The tracking store does not answer."""
 
 
-def check_reached(uri: str | None = None) -> None:
+def check_reached(uri: str | None) -> None:
     """Raises as a `Store` would, before the work that leads to one; of a SQLite file only its address is looked at."""
     if not checked_address(uri).startswith(SQLITE):
         Store(uri)

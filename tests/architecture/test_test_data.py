@@ -21,6 +21,7 @@ MAY = {
     "aesi/pipeline/experiment/drives.py": "cuts the split",
     "aesi/pipeline/experiment/sources.py": "reads the records of every role",
     "aesi/pipeline/experiment/judging/evaluate.py": "judges the models, already chosen",
+    "aesi/pipeline/experiment/judging/figures.py": "works out their figures",
     "aesi/pipeline/api.py": "takes them from the caller",
     "aesi/pipeline/experiment/comparison.py": "compares runs by what the evaluation left",
     "aesi/pipeline/distinct.py": "refuses what is fitted too",

@@ -9,6 +9,7 @@ import urllib.request
 from pathlib import Path
 
 import pytest
+import synthetic_views
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FLAGS = (
@@ -143,10 +144,4 @@ def _port(file, process):
 @pytest.fixture(scope="session")
 def views():
     """The synthetic views of tests/unit/pipeline."""
-    from importlib.util import module_from_spec, spec_from_file_location
-
-    path = Path(__file__).parents[1] / "unit" / "pipeline" / "synthetic_views.py"
-    spec = spec_from_file_location("synthetic_views", path)
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return synthetic_views

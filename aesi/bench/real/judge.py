@@ -110,9 +110,9 @@ class Truth:
     """
 
     parameters: Mapping[str, float]
-    temperature_degc: Array | None = None
-    lost: float | None = None
-    spectra: tuple[Spectrum, ...] = ()
+    temperature_degc: Array | None
+    lost: float | None
+    spectra: tuple[Spectrum, ...]
 
 
 def _truth(case: RealCase, data: Measurement, declared: Cell) -> Truth:

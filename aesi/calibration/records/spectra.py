@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aesi.data.channels.implausible import HIGHEST_CHARGE_RESISTANCE_OHM_AH
+from aesi.data.channels.implausible.scale import HIGHEST_CHARGE_RESISTANCE_OHM_AH
 from aesi.errors import DataError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, BoolArray

@@ -22,8 +22,8 @@ class History:
     with_current : the columns of `numerics.drive` follow those of the residuals."""
 
     window: int
-    view: View = "features"
-    with_current: bool = False
+    view: View
+    with_current: bool
 
     @property
     def needed(self) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -41,8 +41,6 @@ class CaseSpec:
     soc0_given: bool = True
     dt_s: float = 1.0
     seed: int = 0
-    voltage_noise_v: float = 1e-3
-    current_noise_a: float = 4e-3
 
     @property
     def kind(self) -> str:
@@ -72,7 +70,7 @@ class BlindCase:
     neutral: tuple[str, ...]
     soc0: float | None
     declared: Path
-    truth: Mapping[str, float] = field(default_factory=dict)
+    truth: Mapping[str, float]
 
     @property
     def effects(self) -> tuple[str, ...]:

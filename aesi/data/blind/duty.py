@@ -39,7 +39,7 @@ class DutyConditions:
     capacity_ah: float
     rate: float
     soc0: float
-    dt_s: float = 1.0
+    dt_s: float
 
     @property
     def builder(self) -> ProfileBuilder:

@@ -16,10 +16,9 @@ from aesi.data.blind.recipes import RECIPES, Recipe, Written
 from aesi.data.blind.spread import parametrisation
 from aesi.data.blind.strangers import STRANGERS
 from aesi.data.laboratory.change import Values
-from aesi.data.laboratory.instrument import Instrument
 from aesi.data.laboratory.simulator import Applied, LaboratoryModel, Setup, TrueRun, simulate_truth
 from aesi.data.profiles.profile import Profile
-from aesi.data.virtual import nominal_capacity_ah
+from aesi.data.virtual import INSTRUMENT, nominal_capacity_ah
 from aesi.errors import DataError, did_you_mean
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
@@ -286,7 +285,6 @@ def _label(known: list[str], strange: list[str]) -> tuple[str, tuple[str, ...]]:
 def _as_measured(
     spec: CaseSpec, written: Written, trace: TrueRun, rng: np.random.Generator, between: int
 ) -> Measurement:
-    instrument = Instrument(spec.voltage_noise_v, spec.current_noise_a)
     degc = trace.temperature_degc[::between]
     shown = TrueRun(written.time_s, written.current_a, written.voltage_v, degc)
-    return instrument.write(shown, spec.name, rng, spec.warmth != "none")
+    return INSTRUMENT.write(shown, spec.name, rng, spec.warmth != "none")

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from aesi.data.laboratory.simulator import Applied
+from aesi.data.laboratory.simulator import Applied, evaluated_at
 
 DIFFERENCES = {"diffusivity": 0.61, "kinetics": 0.31, "electrolyte_diffusivity": 0.49, "conductivity": 0.038}
 """Absolute natural logarithms of the ratios; `python -m aesi.data.blind.spread` prints them."""
@@ -77,27 +77,18 @@ def published_differences() -> dict[str, float]:
 
 def _diffusivity(values: Any, side: str) -> float:
     name = f"{side} particle diffusivity [m2.s-1]"
-    logs = [math.log(_evaluated(values, name, x, REFERENCE_K)) for x in np.linspace(0.1, 0.9, 17)]
+    logs = [math.log(evaluated_at(values, name, x, REFERENCE_K)) for x in np.linspace(0.1, 0.9, 17)]
     return math.exp(float(np.mean(logs)))
 
 
 def _in_electrolyte(values: Any, name: str) -> float:
-    return _evaluated(values, f"Electrolyte {name}", 1000.0, REFERENCE_K)
+    return evaluated_at(values, f"Electrolyte {name}", 1000.0, REFERENCE_K)
 
 
 def _exchange(values: Any, side: str) -> float:
     full = float(values[f"Maximum concentration in {side.lower()} electrode [mol.m-3]"])
     name = f"{side} electrode exchange-current density [A.m-2]"
-    return _evaluated(values, name, 1000.0, 0.5 * full, full, REFERENCE_K)
-
-
-def _evaluated(values: Any, name: str, *inputs: float) -> float:
-    import pybamm
-
-    function = values[name]
-    if not callable(function):
-        return float(function)
-    return float(values.evaluate(function(*(pybamm.Scalar(one) for one in inputs))))
+    return evaluated_at(values, name, 1000.0, 0.5 * full, full, REFERENCE_K)
 
 
 if __name__ == "__main__":

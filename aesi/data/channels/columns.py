@@ -63,17 +63,17 @@ class Mapped:
     unit: dict[str, str]
     bdf_current: bool
     notes: tuple[str, ...]
-    maker: str = ""
-    maker_sign: Sign | None = None
-    stated_degc: float | None = None
+    maker: str
+    maker_sign: Sign | None
+    stated_degc: float | None
 
 
 def map_columns(
     table: TableFile,
-    columns: Mapping[str, str | None] | None,
-    declared: Mapping[str, str] | None = None,
-    required: tuple[str, ...] = REQUIRED,
-    selectors: tuple[str, ...] = (),
+    columns: Mapping[str, str | None],
+    declared: Mapping[str, str],
+    required: tuple[str, ...],
+    selectors: tuple[str, ...],
 ) -> Mapped:
     """Find the quantities among the names of a table's columns.
 
@@ -86,8 +86,8 @@ def map_columns(
     Raises DataError for an unknown quantity, a name that is missing or exists twice, a unit that is not SI and is
     neither declared nor a maker's, and a declared unit that contradicts one in the name that is not SI.
     """
-    declared_units = {q: units.declared(q, u) for q, u in (declared or {}).items()}
-    finder = _Finder(table, dict(columns or {}), declared_units, required)
+    declared_units = {q: units.declared(q, u) for q, u in declared.items()}
+    finder = _Finder(table, dict(columns), declared_units, required)
     missing = [q for q in QUANTITIES if not finder.take(q) and q in required]
     if missing:
         raise finder.missing(missing)
@@ -261,13 +261,7 @@ class _Finder:
         if found is None:
             return False
         name = self._table.header[found[0]]
-        self._only(
-            [
-                i
-                for i, there in enumerate(self._table.header)
-                if _without_blanks(there) == _without_blanks(name)
-            ]
-        )
+        self._place_of(name)  # refuses several columns of that name
         other = form.reference_column(quantity, found[0], self._table.header) if form else None
         if other is not None:
             raise DataError(
@@ -286,12 +280,7 @@ class _Finder:
     def _find_by_bdf(self, quantity: str) -> bool:
         """Find and store the quantity under a name of the battery data format; False where it has none."""
         for label in BDF.get(quantity, ()):
-            places = [
-                i
-                for i, name in enumerate(self._table.header)
-                if _without_blanks(name) == _without_blanks(label)
-            ]
-            found = self._only(places)
+            found = self._place_of(label)
             if found is not None:
                 self.position[quantity] = found
                 self._set_unit(quantity, units.SI.get(quantity, ""))
@@ -395,6 +384,11 @@ class _Finder:
                 f"{quantity} ({', '.join(units.FACTORS[quantity])}); declare the one it is in, as in "
                 f"--unit {quantity}={units.SI[quantity]}, or convert the column."
             )
+
+    def _place_of(self, label: str) -> int | None:
+        """Position of the only column of a name, blanks and case apart; None for none.  Raises as `_only`."""
+        wanted = _without_blanks(label)
+        return self._only([i for i, name in enumerate(self._table.header) if _without_blanks(name) == wanted])
 
     def _only(self, places: list[int]) -> int | None:
         """The only one of the positions of a name, None for none.  Raises DataError for several columns of one name."""

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from aesi.data.channels.checks import Columns, Context, scatter
-from aesi.data.channels.implausible import ENOUGH_STEPS, STEP_SHARE
+from aesi.data.channels.implausible.responses import ENOUGH_STEPS, STEP_SHARE
 from aesi.numerics.typing import Array, BoolArray, IntArray
 
 EXPLAINED = 5.0

@@ -6,7 +6,12 @@ from __future__ import annotations
 import numpy as np
 
 from aesi.data.channels.checks import Columns, Context, scatter
-from aesi.data.channels.implausible import ENOUGH_STEPS, STEP_SHARE, clearest_step_response, step_response
+from aesi.data.channels.implausible.responses import (
+    ENOUGH_STEPS,
+    STEP_SHARE,
+    clearest_step_response,
+    step_response,
+)
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 
@@ -65,12 +70,12 @@ def check_stuck_current(columns: Columns, context: Context) -> None:
             raise _stands_still(columns, context, rows, turns, least)
     turns = _turns(voltage, least)
     clearest = clearest_step_response(columns) if turns >= 2 * ENOUGH_STEPS else None
-    if clearest is not None and abs(clearest[1]) < FOLLOWS:
+    if clearest is not None and abs(clearest.correlation) < FOLLOWS:
         raise DataError(
             f"{context.at('current_a', 0)}: the voltage turns {turns} times, rising and falling by more than "
             f"{least:.2g} V, and the steps of the current ({np.min(current):.4g} to {np.max(current):.4g} A) do "
-            f"not move it (their correlation is {abs(clearest[1]):.2f}, and above 0.8 where they do); check the "
-            "sensor, and whether the columns are of one test."
+            f"not move it (their correlation is {abs(clearest.correlation):.2f}, and above 0.8 where they do); check "
+            "the sensor, and whether the columns are of one test."
         )
 
 
@@ -133,9 +138,10 @@ def check_stuck_voltage(columns: Columns, context: Context) -> None:
     """
     voltage, time = columns["voltage_v"], columns["time_s"]
     found, answer = step_response(columns), np.abs(np.diff(voltage))
-    if found is None or found[0] >= 0 or not answer.any():
+    if found is None or found.slope_ohm >= 0 or not answer.any():
         return
-    expected = -found[0] * np.diff(columns["current_a"])
+    ohm = -found.slope_ohm
+    expected = ohm * np.diff(columns["current_a"])
     sizes = np.abs(expected)
     of_current = min(CLEAR_RESOLUTIONS * _smallest(sizes), STEP_SHARE * float(np.max(sizes)))
     least = max(CLEAR_RESOLUTIONS * _resolution_v(voltage), of_current)
@@ -143,7 +149,7 @@ def check_stuck_voltage(columns: Columns, context: Context) -> None:
     for k in np.flatnonzero(np.diff(ends) > 2 * ENOUGH_STEPS):
         begin, end = int(ends[k]) + 1, int(ends[k + 1])
         moves = expected[begin:end]
-        of_noise = SCATTERS * -found[0] * scatter(columns["current_a"][begin : end + 1])
+        of_noise = SCATTERS * ohm * scatter(columns["current_a"][begin : end + 1])
         ways = [int(np.sum(way * moves > max(least, of_noise))) for way in (1, -1)]
         if min(ways) >= ENOUGH_STEPS and not _is_hold(columns, slice(begin, end + 1)):
             raise DataError(
@@ -157,11 +163,11 @@ def check_stuck_voltage(columns: Columns, context: Context) -> None:
 def held_doubts(columns: Columns) -> list[str]:
     """A note on a voltage that is written less often than the current; else empty."""
     clearest, answer = clearest_step_response(columns), np.abs(np.diff(columns["voltage_v"]))
-    if clearest is None or clearest[0] >= 0 or not answer.any():
+    if clearest is None or clearest.slope_ohm >= 0 or not answer.any():
         return []
     steps = np.abs(np.diff(columns["current_a"]))
     clear = steps > STEP_SHARE * float(np.max(steps))
-    clear &= -clearest[0] * steps > CLEAR_RESOLUTIONS * _smallest(answer)
+    clear &= -clearest.slope_ohm * steps > CLEAR_RESOLUTIONS * _smallest(answer)
     unanswered = float(np.mean(answer[clear] == 0)) if int(np.sum(clear)) >= 2 * ENOUGH_STEPS else 0.0
     if unanswered <= UNANSWERED_SHARE:
         return []

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K, SECONDS_PER_HOUR
+from aesi.data.laboratory.simulator import evaluated_at
 
 REFERENCE_K = 298.15
 """The temperature of the published parameters."""
@@ -181,10 +182,10 @@ def _electrode(values: Any, side: str, ocp: str, least: float, most: float) -> d
 
     def exchange(kelvin: float) -> float:
         name = f"{side} electrode exchange-current density [A.m-2]"
-        return _at(values, name, salt, 0.5 * full, full, kelvin)
+        return evaluated_at(values, name, salt, 0.5 * full, full, kelvin)
 
     def diffusivity(kelvin: float) -> float:
-        return _at(values, f"{side} particle diffusivity [m2.s-1]", 0.5, kelvin)
+        return evaluated_at(values, f"{side} particle diffusivity [m2.s-1]", 0.5, kelvin)
 
     return {
         "Particle radius [m]": radius,
@@ -211,7 +212,7 @@ def _electrolyte(values: Any, published: PublishedSet) -> dict[str, Any]:
     salt = float(values["Initial concentration in electrolyte [mol.m-3]"])
 
     def of(name: str) -> float:
-        return _activation(lambda kelvin: _at(values, name, salt, kelvin))
+        return _activation(lambda kelvin: evaluated_at(values, name, salt, kelvin))
 
     return {
         "Cation transference number": values["Cation transference number"],
@@ -232,15 +233,6 @@ def _effective_conductivity(values: Any, side: str) -> float:
     solid = 1 - values[f"{side} electrode porosity"]
     exponent = values[f"{side} electrode Bruggeman coefficient (electrode)"]
     return _digits(values[f"{side} electrode conductivity [S.m-1]"] * solid**exponent)
-
-
-def _at(values: Any, name: str, *inputs: float) -> float:
-    import pybamm
-
-    function = values[name]
-    if not callable(function):
-        return float(function)
-    return float(values.evaluate(function(*(pybamm.Scalar(one) for one in inputs))))
 
 
 def _activation(of_kelvin: Any) -> float:

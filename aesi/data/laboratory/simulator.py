@@ -88,7 +88,7 @@ class Setup:
     """A cell file, a model, and changes of both."""
 
     bpx: Path
-    model: LaboratoryModel = "DFN"
+    model: LaboratoryModel
     applied: tuple[Applied, ...] = ()
     radial_points: int | None = None
 
@@ -175,6 +175,17 @@ def parameter_values(bpx: Path, soc0: float) -> Any:
     return values
 
 
+def evaluated_at(values: Any, name: str, *inputs: float) -> float:
+    """A parameter of PyBaMM's at these inputs, in its order (stoichiometry or concentrations, then kelvin); a number as
+    it is."""
+    import pybamm
+
+    parameter = values[name]
+    if callable(parameter):
+        parameter = values.evaluate(parameter(*(pybamm.Scalar(one) for one in inputs)))
+    return float(np.asarray(parameter).item())
+
+
 def stretch(values: Any, electrode: str) -> float:
     """Grading (see STRETCH) of the radial mesh of an electrode, as its initial diffusivity requires.
 
@@ -182,16 +193,14 @@ def stretch(values: Any, electrode: str) -> float:
     have an error of (h / sqrt(D))**2 / sqrt(D): the narrowest is in proportion to D**(3/4).  values : PyBaMM's
     parameters.
     """
-    import pybamm
-
     name = electrode.capitalize()
-    diffusivity = values[f"{name} particle diffusivity [m2.s-1]"]
-    if callable(diffusivity):
-        initial = values[f"Initial concentration in {electrode} electrode [mol.m-3]"]
-        start = float(initial) / float(values[f"Maximum concentration in {electrode} electrode [mol.m-3]"])
-        kelvin = float(values["Initial temperature [K]"])
-        diffusivity = values.evaluate(diffusivity(pybamm.Scalar(start), pybamm.Scalar(kelvin)))
-    rate = np.asarray(diffusivity).item() / float(values[f"{name} particle radius [m]"]) ** 2
+    initial, full = (
+        float(values[f"{which} concentration in {electrode} electrode [mol.m-3]"])
+        for which in ("Initial", "Maximum")
+    )
+    kelvin = float(values["Initial temperature [K]"])
+    diffusivity = evaluated_at(values, f"{name} particle diffusivity [m2.s-1]", initial / full, kelvin)
+    rate = diffusivity / float(values[f"{name} particle radius [m]"]) ** 2
     if rate >= RESOLVED_1_S:
         return STRETCH
     narrowest = STRETCH / np.expm1(STRETCH) * (rate / RESOLVED_1_S) ** 0.75

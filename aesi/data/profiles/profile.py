@@ -39,13 +39,11 @@ class Profile:
 class ProfileBuilder:
     """Builds a current profile from pieces: rests, pulses and drives, each the current (n,) A, discharge positive.
 
-    capacity_ah : of the cell, Ah.  dt_s : interval of rows, s.  vehicle : in which schedules are driven; None takes one
-    for the capacity.  scale : factor on the currents of drives.
+    capacity_ah : of the cell, Ah.  dt_s : interval of rows, s.  scale : factor on the currents of drives.
     """
 
     capacity_ah: float
-    dt_s: float = 0.1
-    vehicle: Vehicle | None = None
+    dt_s: float
     scale: float = 1.0
 
     def rest(self, seconds: float) -> Array:
@@ -57,8 +55,9 @@ class ProfileBuilder:
         return np.full(self._rows(seconds), c_rate * self.capacity_ah)
 
     def drive(self, name: str) -> Array:
-        """The current of a bundled schedule in the vehicle, times `scale`, without the schedule's last row."""
-        vehicle = self.vehicle or Vehicle(pack=Pack.for_capacity(self.capacity_ah))
+        """The current of a bundled schedule in a vehicle with a pack of such cells, times `scale`, without the
+        schedule's last row."""
+        vehicle = Vehicle(pack=Pack.for_capacity(self.capacity_ah))
         return self.scale * vehicle.cell_current_a(schedule(name), self.dt_s)[:-1]
 
     def profile(self, name: str, pieces: Sequence[Array], soc0: float) -> Profile:
@@ -89,7 +88,7 @@ def with_pulses(
     name: str,
     schedules: Sequence[str],
     soc0: float,
-    pulse_c: float = PULSE_C,
+    pulse_c: float,
 ) -> Profile:
     """A rest, then each schedule followed by a rest, a charge pulse of `pulse_c` and a rest.
 
@@ -107,17 +106,17 @@ def with_pulses(
 
 
 def paper_profiles(
-    capacity_ah: float, dt_s: float = 0.1, pulse_c: float = PULSE_C, other_load: float = OTHER_LOAD
+    capacity_ah: float, dt_s: float, pulse_c: float = PULSE_C, other_load: float = OTHER_LOAD
 ) -> dict[str, tuple[Profile, ...]]:
-    """The paper's experiment by role: train, valid, test.
+    """The paper's experiment by role: train, valid, test; a row every dt_s (s).
 
     Training: UDDS, HWFET, US06, WLTC, then the first three again, each followed by rest, pulse and rest:
     8,820 s, 88,200 rows at 10 Hz. The paper states that number and the four schedules, not how they add up to
     it; one more pass of three with 220 s around each pulse is this project's reading. Validation and test
     profiles have no pulses, start inside the range of charge that training goes through, and stay in it.
 
-    other_load : times the vehicle's current in the validation and test profiles, whose schedules are milder than
-    those of training.
+    pulse_c : C-rate of the training profile's charge pulses.  other_load : times the vehicle's current in the
+    validation and test profiles, whose schedules are milder than those of training.
     """
     builder, loaded = ProfileBuilder(capacity_ah, dt_s), ProfileBuilder(capacity_ah, dt_s, scale=other_load)
     return {

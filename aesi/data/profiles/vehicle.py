@@ -22,6 +22,8 @@ from aesi.numerics.typing import Array
 GRAVITY_M_S2 = 9.81
 AIR_DENSITY_KG_M3 = 1.2
 """At 20 degC and sea level."""
+PACK_CAPACITY_AH = 90.0
+"""Of the pack, whatever its cells: three of 30 Ah in parallel."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +38,9 @@ class Pack:
     cell_nominal_v: float = 3.65
 
     @classmethod
-    def for_capacity(cls, cell_capacity_ah: float, pack_capacity_ah: float = 90.0) -> Pack:
+    def for_capacity(cls, cell_capacity_ah: float) -> Pack:
         """The pack of the same capacity with cells of another size, so that a schedule has the same C-rates."""
-        return cls(parallel=pack_capacity_ah / cell_capacity_ah)
+        return cls(parallel=PACK_CAPACITY_AH / cell_capacity_ah)
 
     @property
     def volt_cells(self) -> float:

@@ -41,7 +41,7 @@ class Heading:
         return any(self.units)
 
 
-def find_heading(rows: Sequence[Sequence[str]], wanted: Collection[str] = ()) -> Heading | None:
+def find_heading(rows: Sequence[Sequence[str]], wanted: Collection[str]) -> Heading | None:
     """The heading among rows of cells: a maker's, or a row with two of this project's, BDF's or the wanted names; None
     without one.
     """

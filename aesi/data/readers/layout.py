@@ -7,7 +7,7 @@ import csv
 import io
 import re
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from aesi.data.readers.formats.format import Format
 from aesi.data.readers.heading import (
@@ -55,9 +55,9 @@ class Layout:
     header: tuple[str, ...]
     lines_before_data: int
     notes: tuple[str, ...]
-    format: Format | None = None
-    units: tuple[str, ...] = field(default=())
-    layer: int = 0
+    format: Format | None
+    units: tuple[str, ...]
+    layer: int
 
 
 def decoded(head: bytes, name: str) -> tuple[str, str]:

@@ -20,7 +20,7 @@ NO_STRUCTURE = ""
 """Name of the table of vectors that are in no structure."""
 
 
-def open_mat(path: Path, wanted: Collection[str] = ()) -> FrameTable:
+def open_mat(path: Path, wanted: Collection[str]) -> FrameTable:
     """The table of a `.mat` file.
 
     wanted : names of columns that the user gave.

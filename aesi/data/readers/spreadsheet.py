@@ -28,7 +28,7 @@ LAST_YEAR_OF_CLOCKS = 1900
 that old."""
 
 
-def open_sheet(path: Path, wanted: Collection[str] = ()) -> FrameTable:
+def open_sheet(path: Path, wanted: Collection[str]) -> FrameTable:
     """The sheet with the table of measurements.
 
     Raises DataError where openpyxl is missing, the file is no workbook, or no sheet has a heading.

@@ -57,7 +57,7 @@ class FinalModels:
     """
 
     fitted: tuple[Fitted, ...]
-    unfitted: tuple[str, ...] = ()
+    unfitted: tuple[str, ...]
 
 
 def build_problem(loaded: Loaded, config: ExperimentConfig) -> Problem:

@@ -159,8 +159,8 @@ class TrainingDrives:
             others,
             self.config.data.hold,
             cell.start,
-            fitted,
             declared.model,
+            fitted,
             own_charges=self.of_several_records,
         )
 
@@ -173,7 +173,7 @@ class TrainingDrives:
         name, rows = self._rows(piece)
         record, hold = self.records[name], self.config.data.hold
         declared_v, recalibrated_v = (
-            physics.by_name[model].simulate(record.measurement, record.soc0, hold).voltage_v[rows]
+            physics.by_name[model].run_as_declared(record.measurement, record.soc0, hold).voltage_v[rows]
             for model in (DECLARED, RECALIBRATED)
         )
         return slope_on(record.voltage_v[rows] - declared_v, recalibrated_v - declared_v)

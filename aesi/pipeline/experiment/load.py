@@ -180,7 +180,7 @@ def _load(config: ExperimentConfig) -> Loaded:
             name: physics.initial_soc(physics.corrected, record, config.data.hold)[0]
             for name, record in records.items()
         },
-        digests={name: measurement.digest for name, (measurement, _) in sources.records.items()},
+        digests={name: measurement.digest for name, measurement in sources.records.items()},
         notes=tuple(notes),
         config=config,
         model=given.model,
@@ -222,13 +222,13 @@ def _declared_sentences(declared: HybridModel, sources: Sources) -> list[str]:
 
 def _judging(sources: Sources) -> list[Measurement]:
     """The records with test rows; `data.record` has training rows as well."""
-    return [sources.records[name][0] for name in sources.roles["test"] or sources.records]
+    return [sources.records[name] for name in sources.roles["test"] or sources.records]
 
 
 def _fitted(sources: Sources) -> list[Measurement]:
     """The records with rows that a model is fitted to, or chosen by."""
     named = {*sources.roles["train"], *sources.roles["valid"]} or sources.records
-    return [record for name, (record, _) in sources.records.items() if name in named]
+    return [record for name, record in sources.records.items() if name in named]
 
 
 def _start_sentences(
@@ -294,7 +294,7 @@ def _physics(given: HybridModel, training: TrainingDrives) -> tuple[PhysicsModel
         training.records,
         config.data.hold,
         config.cell.start,
-        model=given.model,
+        given.model,
         own_charges=training.of_several_records,
     )
     if len(training.drives) > 1:
@@ -344,13 +344,13 @@ def _on_grid(
     records: dict[str, FitRecord] = {}
     starts: dict[str, InitialState] = {}
     notes: list[str] = []
-    for name, (measurement, known_soc0) in sources.records.items():
+    for name, measurement in sources.records.items():
         try:
             check_measured(cell, [measurement])
         except DataError as error:
             raise DataError(with_keys(str(error))) from None
-        declared = known_soc0 if config.cell.soc0 is None else config.cell.soc0
-        state_source = StateSource(measurement, declared, shared)
+        given_soc0 = sources.soc0.get(name) if config.cell.soc0 is None else config.cell.soc0
+        state_source = StateSource(measurement, given_soc0, shared)
         start = starts[name] = state_source.initial_state(cell, given.effects, data.hold, given.model)
         held = hold_sentence(measurement.name, data.hold, data.declared_hold is not None, "data.hold: {}")
         # Resampling comes first, since it refuses a time step that would make too many rows, or none.
@@ -369,11 +369,9 @@ def _on_grid(
             *map(with_keys, even.notes),
         ]
         records[name] = no_rows(even, start.soc, start.read_sd, state_source)
-    measured = [measurement for measurement, _ in sources.records.values()]
+    measured = list(sources.records.values())
     notes += filter(None, [sizes_sentence(cell, measured, cell.capacity_ah)])
-    notes += temperature_range_sentences(
-        cell, (m.temperature_degc for m, _ in sources.records.values()), given.effects
-    )
+    notes += temperature_range_sentences(cell, (m.temperature_degc for m in measured), given.effects)
     return records, starts, notes
 
 

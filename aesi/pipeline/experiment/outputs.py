@@ -245,10 +245,7 @@ def _terms(result: Result) -> list[dict[str, Any]]:
     chosen = result.chosen
     bagging, stability = chosen.bagging.coefficient_table(), chosen.stability.coefficient_table()
     importance = dict(svd_ranking(result.ensemble or chosen.bagging, result.problem.split.train))
-    inclusion: dict[str, float] = {}
-    for model in (chosen.stability, chosen.bagging):
-        if model.inclusion is not None:
-            inclusion |= dict(zip(model.terms, model.inclusion.tolist(), strict=True))
+    inclusion = chosen.stability.inclusion_table() | chosen.bagging.inclusion_table()
     names = dict.fromkeys([*bagging, *stability])
     return [
         {

@@ -19,7 +19,7 @@ states read by the declared cell it leaves 3.6, 28.7, 22.8, 8.9 and 5.4.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -113,22 +113,17 @@ class PhysicsModels:
         """
         runs = {name: self.run(name, record, hold, record.logged) for name in self.by_name}
         voltages_v = {name: each.voltage_v for name, each in runs.items()}
-        of_corrected = [runs[self.corrected]]
-        series = replace(error_series(record.logged, of_corrected[0], dt_s), physics=voltages_v)
+        of_chosen = [runs[self.corrected]]
+        series = replace(error_series(record.logged, runs[self.corrected], dt_s), physics=voltages_v)
         if record.logged is not record.measurement:
-            of_corrected.append(self.run(self.corrected, record, hold))
+            on_grid = self.run(self.corrected, record, hold)
+            of_chosen.append(on_grid)
             # No correction is evaluated at the logged rows, so that their inputs do not matter.
             own = replace(series, inputs=record.logged.current_a[:, None], input_names=("I",))
-            series = as_resampled(error_series(record.measurement, of_corrected[1], dt_s), own)
-        series = replace(
-            series,
-            missed_v=self.by_name[RECALIBRATED].missed_v,
-            ran_out_s=min(
-                (t for run in (*runs.values(), *of_corrected) if (t := _ran_out_s(run)) is not None),
-                default=None,
-            ),
-        )
-        return series, any(_ran_out_s(run) is not None for run in of_corrected)
+            series = as_resampled(error_series(record.measurement, on_grid, dt_s), own)
+        out_s = _first_ran_out_s([*runs.values(), *of_chosen])
+        series = replace(series, missed_v=self.by_name[RECALIBRATED].missed_v, ran_out_s=out_s)
+        return series, _first_ran_out_s(of_chosen) is not None
 
     def with_slopes(self, series: ErrorSeries, record: FitRecord, hold: Hold) -> ErrorSeries:
         """The series of the record with the change of the voltage by one prior standard deviation of each parameter of
@@ -144,10 +139,10 @@ class PhysicsModels:
         return replace(series, slopes_v=slopes, start_v=start_change_v)
 
 
-def _ran_out_s(run: Run) -> float | None:
-    """Time of the first row at which a run is held at the limit of depletion, s; None if it never is."""
-    out = run.series["depleted"] > 0.0
-    return float(run.time_s[np.argmax(out)]) if out.any() else None
+def _first_ran_out_s(runs: Sequence[Run]) -> float | None:
+    """Time of the first row at which any of the runs is held at the limit of depletion, s; None if none ever is."""
+    held = [(run.time_s, run.series["depleted"] > 0.0) for run in runs]
+    return min((float(time_s[np.argmax(out)]) for time_s, out in held if out.any()), default=None)
 
 
 def physics_models(
@@ -156,15 +151,15 @@ def physics_models(
     records: Mapping[str, FitRecord],
     hold: Hold,
     start: str,
+    model: ModelName,
     warm_start: PhysicsModels | None = None,
-    model: ModelName = "espm",
     *,
     own_charges: bool,
 ) -> PhysicsModels:
     """All physics models, fitted to the open rows of the records.
 
-    start : the model that is corrected, "declared" or "recalibrated".  warm_start : models fitted to nearly the same
-    rows, from which the fits begin.  model : kind of the physics.  own_charges : see `recalibrate`.
+    start : the model that is corrected, "declared" or "recalibrated".  model : kind of the physics.
+    warm_start : models fitted to nearly the same rows, from which the fits begin.  own_charges : see `recalibrate`.
     """
     known = {} if warm_start is None else warm_start.by_name
     fitted = {

@@ -153,7 +153,8 @@ class FitRecord:
         if self.logged is self.measurement:
             return self
         logged, even = (
-            declared.simulate(rows, self.soc0, hold).voltage_v for rows in (self.logged, self.measurement)
+            declared.run_as_declared(rows, self.soc0, hold).voltage_v
+            for rows in (self.logged, self.measurement)
         )
         resampled_v = BetweenStamps(self.logged.time_s, self.measurement.time_s).as_voltage(logged)
         return replace(self, resampling_change_v=resampled_v - even)
@@ -271,7 +272,7 @@ class _Fit:
         data = record.measurement
         every, every_s = _spacing(data)
         rows = np.flatnonzero(record.rows)[::every]
-        run = physics.simulate(data, record.soc0, self.hold)
+        run = physics.run_as_declared(data, record.soc0, self.hold)
         weight = np.sqrt(every_s / MEMORY_S) / self.error_v
         left: Array = weight * (record.voltage_v - run.voltage_v)[rows]
         return _without_own(left, weight * self._own_v[data.name][rows]) if self.own_charges else left
@@ -287,8 +288,8 @@ class _Fit:
         )
         return {
             r.measurement.name: np.asarray(
-                more.simulate(r.measurement, r.soc0, self.hold).voltage_v
-                - less.simulate(r.measurement, r.soc0, self.hold).voltage_v
+                more.run_as_declared(r.measurement, r.soc0, self.hold).voltage_v
+                - less.run_as_declared(r.measurement, r.soc0, self.hold).voltage_v
             )
             for r in self.records
         }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,11 +29,13 @@ if TYPE_CHECKING:
 class Sources:
     """The records of an experiment.
 
-    records : name -> (record; state of charge at its first row, None if unknown).  roles : role -> names of records.
+    records : name -> record.  roles : role -> names of records.  soc0 : name -> state of charge at the first row, of
+    the records of which it is known: those of a virtual cell.
     """
 
-    records: dict[str, tuple[Measurement, float | None]]
+    records: dict[str, Measurement]
     roles: dict[Role, tuple[str, ...]]
+    soc0: dict[str, float] = field(default_factory=dict)
 
 
 def sources_of(config: ExperimentConfig, cell: Path) -> Sources:
@@ -47,11 +49,11 @@ def sources_of(config: ExperimentConfig, cell: Path) -> Sources:
     data = config.data
     where = _locator(config)
     roles: dict[Role, tuple[str, ...]] = {role: getattr(data, role) for role in ROLES}
-    records: dict[str, tuple[Measurement, float | None]] = {
-        name: (_record(path, data.reading(name), record_name), None)
+    records = {
+        name: _record(path, data.reading(name), record_name)
         for name, (path, record_name) in _files_and_names(where, data.listed).items()
     }
-    train, valid, test = ([records[name][0] for name in roles[role]] for role in ROLES)
+    train, valid, test = ([records[name] for name in roles[role]] for role in ROLES)
     check_distinct([*train, *valid], test)
     return Sources(records, roles)
 
@@ -162,8 +164,9 @@ def _virtual(config: ExperimentConfig, cell: Path) -> Sources:
     experiment = virtual_experiment(config, cell)
     measurements: dict[Role, tuple[Measurement, ...]] = {role: getattr(experiment, role) for role in ROLES}
     return Sources(
-        records={m.name: (m, experiment.soc0[m.name]) for role in ROLES for m in measurements[role]},
+        records={m.name: m for role in ROLES for m in measurements[role]},
         roles={role: tuple(m.name for m in measurements[role]) for role in ROLES},
+        soc0=experiment.soc0,
     )
 
 

@@ -105,8 +105,8 @@ class PhysicsVariant:
         """The state of charge, by this cell's windows, of a record that was declared to start at soc0."""
         return same_rest(self.declared, self.cell, soc0 + self.shift)
 
-    def simulate(self, record: Measurement, soc0: float, hold: Hold) -> Run:
-        """`run` of a record that was declared to start at soc0."""
+    def run_as_declared(self, record: Measurement, soc0: float, hold: Hold) -> Run:
+        """`run` of a record that starts at soc0 in the windows of the declared cell, as `soc0` translates it."""
         return self.run(record, self.soc0(soc0), hold)
 
     def run(self, record: Measurement, soc0: float, hold: Hold) -> Run:
@@ -173,7 +173,7 @@ def slopes_v(
     one_each = np.eye(len(ENERGIES_J_MOL))
     moved = (deviating(cell, effects, range(len(one_each)), STEP * one, model) for one in one_each)
     return np.column_stack(
-        [(each.simulate(record, soc0, hold).voltage_v - voltage_v) / STEP for each in moved]
+        [(each.run_as_declared(record, soc0, hold).voltage_v - voltage_v) / STEP for each in moved]
     )
 
 

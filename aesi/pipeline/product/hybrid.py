@@ -179,27 +179,12 @@ class HybridModel:
         Raises InputError for a soc0_sd outside 0 to 1, for an error0_v that is not finite, and for one in a free run of
         a model without a correction; else as `predict`.
         """
-        if error0_v is not None and not is_finite_number(error0_v):
-            raise InputError(f"error0_v = {error0_v!r} is no voltage; give volts, or leave it out.")
-        if error0_v is not None and not one_step and self.correction is None:
-            raise InputError(
-                f"error0_v = {error0_v:g} V is where a correction starts, and this model has none: physics alone has "
-                "no error to start from; leave it out."
-            )
-        if not (is_finite_number(soc0_sd) and 0.0 <= soc0_sd <= 1.0):
-            raise InputError(
-                f"soc0_sd = {soc0_sd!r} is no standard deviation of a state of charge; give 0 to 1."
-            )
+        self._check_start(error0_v, soc0_sd, one_step)
         # The rows tell it as they are, not once they are averaged or their voltages hidden.
         record = record.held(self.hold_of(record))
-        measured = record.voltage_v
-        if one_step and not np.isfinite(measured).all():
-            row = int(np.flatnonzero(~np.isfinite(measured))[0])
-            raise DataError(
-                f"voltage_v has no value at {stamp(record.time_s[row])} s ({row_words(row)}); predict the parts before "
-                "and after the gap as records of their own, or leave voltage_v out for a free run."
-            )
-        from_first = error0_v is None and np.isfinite(measured[:1]).any()
+        if one_step:
+            _check_every_voltage(record)
+        from_first = error0_v is None and np.isfinite(record.voltage_v[:1]).any()
         if one_step or from_first:
             check_voltage(self.cell, record.take(slice(0, 1)))  # from which state and error start
         if soc0 is None:
@@ -208,7 +193,7 @@ class HybridModel:
             self._check_dense(record)
         else:
             seen = np.arange(len(record)) < (1 if from_first else 0)
-            record = replace(record, voltage_v=np.where(seen, measured, np.nan))
+            record = replace(record, voltage_v=np.where(seen, record.voltage_v, np.nan))
         even = self._even(record)
         series = self._series(even, soc0)
         own = None if even is record else self._series(record, soc0)
@@ -282,6 +267,20 @@ class HybridModel:
         if self.soc0 is None:
             raise DataError("a free run needs soc0, the state of charge at the first sample; give it.")
         return self.soc0, soc0_sd
+
+    def _check_start(self, error0_v: float | None, soc0_sd: float, one_step: bool) -> None:
+        """Raises InputError for the start of a prediction that is none, or that this model has no use for."""
+        if error0_v is not None and not is_finite_number(error0_v):
+            raise InputError(f"error0_v = {error0_v!r} is no voltage; give volts, or leave it out.")
+        if error0_v is not None and not one_step and self.correction is None:
+            raise InputError(
+                f"error0_v = {error0_v:g} V is where a correction starts, and this model has none: physics alone has "
+                "no error to start from; leave it out."
+            )
+        if not (is_finite_number(soc0_sd) and 0.0 <= soc0_sd <= 1.0):
+            raise InputError(
+                f"soc0_sd = {soc0_sd!r} is no standard deviation of a state of charge; give 0 to 1."
+            )
 
     @property
     def _looks_back(self) -> bool:
@@ -392,6 +391,17 @@ class HybridModel:
             low, high = (np.where(step == 0, np.nan, bound[at]) for bound in (band.lower_v, band.upper_v))
         alpha = None if self.intervals is None else self.intervals.alpha
         return Prediction.of(own, error[step], low, high, outside[step], weight[step], alpha)
+
+
+def _check_every_voltage(record: Measurement) -> None:
+    """Raises DataError for a row without a voltage, from which one step ahead nothing can be predicted."""
+    lacking = np.flatnonzero(~np.isfinite(record.voltage_v))
+    if len(lacking):
+        row = int(lacking[0])
+        raise DataError(
+            f"voltage_v has no value at {stamp(record.time_s[row])} s ({row_words(row)}); predict the parts before "
+            "and after the gap as records of their own, or leave voltage_v out for a free run."
+        )
 
 
 def _on_own_rows(prediction: Prediction, own: ErrorSeries) -> Prediction:

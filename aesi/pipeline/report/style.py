@@ -31,14 +31,14 @@ HEADROOM = 58
 """Margin above a plot, px: a line of the legend below the buttons, which cover the uppermost 30."""
 
 
-def figure(title: str, caption: str, height: int = 380, **layout: Any) -> Figure:
-    """An empty figure; title and caption travel in its `meta` for the page to set."""
+def figure(title: str, caption: str, height: int, **layout: Any) -> Figure:
+    """An empty figure of a height, px; title and caption travel in its `meta` for the page to set."""
     from plotly.graph_objects import Figure
 
     return framed(Figure(), title, caption, height, **layout)
 
 
-def framed(fig: Figure, title: str, caption: str, height: int = 380, **layout: Any) -> Figure:
+def framed(fig: Figure, title: str, caption: str, height: int, **layout: Any) -> Figure:
     """Give a figure the common frame: no title inside, the legend above, room for the units."""
     fig.update_layout(
         template="none",

@@ -32,7 +32,7 @@ _RIDGES = (1.0, 10.0, 100.0, 1000.0)
 """Weights of PySINDy's ridge that are tried."""
 
 
-def pysindy_ensemble(problem: Problem, seed: int = 0, judge: Judge | None = None) -> SparseModel:
+def pysindy_ensemble(problem: Problem, seed: int, judge: Judge | None = None) -> SparseModel:
     """The median of the ensemble. Raises FitError where no setting of the grid runs freely."""
     best = _best_genome(problem, judge or Judge())
     active = np.flatnonzero(best.active(problem.library))

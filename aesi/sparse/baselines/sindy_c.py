@@ -33,16 +33,17 @@ NAME = "SINDy-C"
 
 def tuned_sindy_c(
     problem: Problem,
-    seed: int = 0,
-    candidates: int = 200,
-    population: int = 20,
+    seed: int,
+    candidates: int,
+    population: int,
     space: GenomeSpace | None = None,
     judge: Judge | None = None,
     on_candidate: Callable[[dict[str, Any]], None] | None = None,
 ) -> SparseModel:
     """The fittest of `candidates` models that keep to the constraints, or of all where none does.
 
-    on_candidate : called with each candidate, a row of plain values. Raises FitError where none survives.
+    seed : of the search.  population : size of a generation.  space : ranges of the genes; None takes the widest.
+    on_candidate : called with each candidate, a row of plain values.  Raises FitError where none survives.
     """
     space, judge = space or GenomeSpace.of(problem.library), judge or Judge()
     rng = np.random.default_rng([seed, 1])
@@ -56,9 +57,7 @@ def tuned_sindy_c(
     return fittest(space, evaluate, candidates, population, rng, judge.admits).model
 
 
-def evaluate_sindy_c(
-    problem: Problem, genome: Genome, weights: FitnessWeights | None = None
-) -> Single | Failed:
+def evaluate_sindy_c(problem: Problem, genome: Genome, weights: FitnessWeights) -> Single | Failed:
     """One candidate of the baseline."""
     return evaluate_single(problem, genome, partial(_stlsq, genome.lambda1, genome.lambda2), NAME, weights)
 

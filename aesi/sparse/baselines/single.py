@@ -72,7 +72,7 @@ class Single:
 
 
 def evaluate_single(
-    problem: Problem, genome: Genome, fit: FactorFit, name: str, weights: FitnessWeights | None = None
+    problem: Problem, genome: Genome, fit: FactorFit, name: str, weights: FitnessWeights
 ) -> Single | Failed:
     """One candidate fitted to all training rows at once, and judged.
 
@@ -91,5 +91,5 @@ def evaluate_single(
     if not np.isfinite(folds.loss + valid.loss):
         return Failed("the model diverges in free run")
     losses = (folds.loss, valid.loss, int(np.count_nonzero(coefficients)))
-    score = fitness(losses, len(problem.library), weights or FitnessWeights())
+    score = fitness(losses, len(problem.library), weights)
     return Single(genome, score, model, valid, losses, folds.pearson)

@@ -16,11 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aesi.errors import DataError
 from aesi.numerics.blocks import CountArray, Span, leave_out_weights
 from aesi.numerics.typing import Array
 from aesi.numerics.weighted_grams import orthonormal, triangular_factors, weighted_grams
-from aesi.sparse.search.prepare import not_finite
 from aesi.sparse.search.rows import TrainingRows
 
 
@@ -43,7 +41,7 @@ def factored(
     """The factors of all resamples, folds and of all rows.
 
     own_targets : (n_folds, n) target of each fold, or (0, n) where all folds have the target of the rows.
-    row_weights : (n,).  counts : (resamples, n) of each row.  Raises DataError for a term or target that is not finite.
+    row_weights : (n,).  counts : (resamples, n) of each row.
     """
     m = len(rows.library)
     columns = _columns(rows, (rows.target, *own_targets))
@@ -59,18 +57,13 @@ def factored(
 
 
 def _columns(rows: TrainingRows, targets: Sequence[Array]) -> Array:
-    """(n, m + n_targets), stored by columns: the terms along the training rows, then the targets.
-
-    Raises DataError for the first value that is not finite.
-    """
+    """(n, m + n_targets), stored by columns: the terms along the training rows, then the targets."""
     m = len(rows.library)
     columns = np.empty((rows.products.shape[1], m + len(targets)), order="F")
     for j, (product, q) in enumerate(zip(rows.product_of_term, rows.library.feedbacks, strict=True)):
         columns[:, j] = rows.products[product] * rows.error_functions[q]
     for j, target in enumerate(targets, start=m):
         columns[:, j] = target
-    if not np.isfinite(columns).all():
-        raise DataError(not_finite(rows.library, columns))
     return columns
 
 

@@ -54,8 +54,7 @@ def free_predictions(
     """(rows, models) scaled predictions in free run; `state` carries them from one slice to the next."""
     if not functions.any():
         return np.asarray(drive[0])
-    clip = problem.options.outside == "clip"
-    return np.asarray(free_run.run_ensemble(drive, functions, problem.error[rows], restart, state, clip))
+    return np.asarray(free_run.run_ensemble(drive, functions, problem.error[rows], restart, state))
 
 
 def one_step_predictions(problem: Problem, drive: Array, functions: IntArray, rows: slice) -> Array:

@@ -108,11 +108,3 @@ def _repeats(unit: Array, known: Array) -> bool:
 def variables(record: ErrorSeries) -> Array:
     """(n, 1 + n_inputs) error and inputs of a record, the error first."""
     return np.column_stack([record.error_v, record.inputs])
-
-
-def not_finite(library: Library, theta: Array) -> str:
-    """A sentence on the first value of (n, m + 1) that is not finite: which term, or the target, and where."""
-    j = int(np.flatnonzero(~np.isfinite(theta).all(axis=0))[0])
-    k = int(np.flatnonzero(~np.isfinite(theta[:, j]))[0])
-    name = (*library.names, "the target")[j]
-    return f"{name} is not a number at training {row_words(k)}; keep scaled inputs within [-1, 1] (outside='clip')."

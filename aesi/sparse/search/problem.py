@@ -32,7 +32,6 @@ from aesi.sparse.search.rows import (
 )
 from aesi.sparse.search.unseen import refits_physics_per_fold, unseen_errors
 from aesi.sparse.terms.library import Library
-from aesi.sparse.terms.scaling import Outside
 
 Regime = Literal["free_run", "one_step"]
 
@@ -47,8 +46,7 @@ class Options:
     there are fewer than 5,000).
     best : share of resamples that enters the ensemble.  horizon : rows of a free run (default: the block).
     fold : rows of a left-out piece (default: records, each cut into `cuts`, or an eighth of the rows of a single one).
-    regime : of the losses, free run or one step ahead.  outside : treatment of inputs beyond the trained range.
-    feedback : whether terms may hold the error.
+    regime : of the losses, free run or one step ahead.  feedback : whether terms may hold the error.
     fade : whether a correction without such terms is shrunk towards the physics (fade.py).
     balance : give every record the same weight in fits and losses, whatever its length and its error (very small errors
     excepted). Otherwise a record near the end of discharge, where the error is largest, dominates the model.
@@ -69,7 +67,6 @@ class Options:
     fold: int | None = None
     cuts: int = 1
     regime: Regime = "free_run"
-    outside: Outside = "clip"
     balance: bool = True
     feedback: bool = True
     fade: bool = False
@@ -81,9 +78,8 @@ class Options:
                 check_whole_number(name, given, 1)
         if not 0.0 < self.best <= 1.0:
             raise InputError(f"best = {self.best}: give the share of resamples, above 0 and at most 1.")
-        for name, value, choices in (("regime", self.regime, Regime), ("outside", self.outside, Outside)):
-            if value not in get_args(choices):
-                raise InputError(f"{name} = {value!r}: choose from {', '.join(get_args(choices))}.")
+        if self.regime not in get_args(Regime):
+            raise InputError(f"regime = {self.regime!r}: choose from {', '.join(get_args(Regime))}.")
         if self.inputs is not None and len(set(self.inputs)) < len(self.inputs):
             raise InputError(f"inputs = {', '.join(self.inputs)}: give each name once.")
 
@@ -135,7 +131,7 @@ class Problem(TrainingRows, Factors):
         library = library or Library.build(
             train[0].input_names, options.p_c, options.d, options.factors, options.special, options.mixed
         )
-        rows = training_rows(train, library, options.outside)
+        rows = training_rows(train, library)
         n = len(rows.target)
         block = _checked_block(options.block, rows.spans)
         folds = _checked_pieces(left_out_pieces(rows.spans, options.fold, options.cuts), options.fold)

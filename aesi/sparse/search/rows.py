@@ -15,7 +15,7 @@ from aesi.records import ErrorSeries
 from aesi.sparse.search.prepare import variables
 from aesi.sparse.terms.basis import FUNCTIONS, values
 from aesi.sparse.terms.library import Library, evaluate_terms
-from aesi.sparse.terms.scaling import Outside, Scaling
+from aesi.sparse.terms.scaling import Scaling
 from aesi.sparse.trained_region import TrainedRegion
 
 
@@ -50,9 +50,9 @@ class TrainingRows:
         )
 
 
-def training_rows(train: Sequence[ErrorSeries], library: Library, outside: Outside) -> TrainingRows:
+def training_rows(train: Sequence[ErrorSeries], library: Library) -> TrainingRows:
     """Training rows of records that have the inputs of the library.  Raises DataError for fewer rows than terms."""
-    scaling = Scaling.of([variables(record) for record in train], outside)
+    scaling = Scaling.of([variables(record) for record in train])
     scaled = [scaling.apply(variables(record)[:-1]) for record in train]
     rows = np.vstack(scaled)
     if len(rows) <= len(library):

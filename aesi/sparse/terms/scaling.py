@@ -6,22 +6,22 @@ The range of the error is symmetric, -max |e| to max |e|, so that a scaled error
 shrinks a model towards the physics, and not towards the middle of the training errors.
 
 Outside the trained range Chebyshev polynomials grow like a power and tan has poles, so that terms are meaningless
-there. Scaled values are therefore held at -1 or 1, and the samples are flagged. With `outside="extrapolate"` they are
-left as they are.
+there. Scaled values are therefore held at -1 or 1, and the samples are flagged.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any
 
 import numpy as np
 
 from aesi.numerics.files.restored import saved_array
 from aesi.numerics.typing import Array, BoolArray
 
-Outside = Literal["clip", "extrapolate"]
+HELD = "clip"
+"""How a saved scaling says that it holds what is outside: no other one can be read."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,21 +30,19 @@ class Scaling:
 
     low: Array
     high: Array
-    outside: Outside = "clip"
 
     @classmethod
-    def of(cls, blocks: Sequence[Array], outside: Outside = "clip") -> Scaling:
+    def of(cls, blocks: Sequence[Array]) -> Scaling:
         """The range over several (n, n_variables) blocks, the error first."""
         low = np.min([block.min(axis=0) for block in blocks], axis=0)
         high = np.max([block.max(axis=0) for block in blocks], axis=0)
         high[0] = max(-low[0], high[0])
         low[0] = -high[0]
-        return cls(low, high, outside)
+        return cls(low, high)
 
     def apply(self, data: Array) -> Array:
-        """Scale (n, n_variables)."""
-        scaled = self._not_clipped(data)
-        return np.clip(scaled, -1.0, 1.0) if self.outside == "clip" else scaled
+        """Scale (n, n_variables), held within [-1, 1]."""
+        return np.clip(self._not_clipped(data), -1.0, 1.0)
 
     def cut_off(self, data: Array) -> Array:
         """(n, n_variables) what `apply` has cut off the scaled values, 0 within the trained range."""
@@ -70,18 +68,17 @@ class Scaling:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON values."""
-        return {"low": self.low.tolist(), "high": self.high.tolist(), "outside": self.outside}
+        return {"low": self.low.tolist(), "high": self.high.tolist(), "outside": HELD}
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], n_variables: int) -> Scaling:
         """Inverse of `to_dict`, for so many variables.  Raises ValueError for anything else."""
         low, high = (saved_array(data[key], key, (n_variables,)) for key in ("low", "high"))
-        outside = data["outside"]
         if not (low < high).all():
             raise ValueError("a variable has no range, from low to high")
-        if outside not in get_args(Outside):
-            raise ValueError(f"outside = {outside!r} is not known")
-        return cls(low, high, outside)
+        if data["outside"] != HELD:
+            raise ValueError(f"outside = {data['outside']!r} is not known")
+        return cls(low, high)
 
     def _not_clipped(self, data: Array) -> Array:
         return 2.0 * (data - self.low) / (self.high - self.low) - 1.0

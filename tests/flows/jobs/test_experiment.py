@@ -38,9 +38,9 @@ PARAMETERS = {
 }
 
 
-def tracked_runs(name="smoke", workspace=None):
+def tracked_runs(workspace=None):
     store = Store(f"sqlite:///{workspace}/mlflow.db" if workspace else None)
-    experiment = store.find_experiment(name)
+    experiment = store.find_experiment("smoke")
     (parent, *others) = store.runs(experiment, f"tags.`{KIND}` = 'run'")
     assert not others
     return store, parent, store.children(experiment, parent.info.run_id)
@@ -79,7 +79,7 @@ def test_the_figures_of_the_paper_are_drawn(finished, page):
 
 
 def test_settings_records_and_every_candidate_of_a_run_are_tracked(finished):
-    store, parent, children = tracked_runs(workspace=finished)
+    store, parent, children = tracked_runs(finished)
     assert parent.info.status == "FINISHED"
     assert {"seed", "search.candidates", "versions", "chosen_candidate"} <= parent.data.params.keys()
     assert "aesi.dirty" in parent.data.tags
@@ -298,7 +298,7 @@ def test_a_baseline_was_searched_again_by_every_run_that_went_on(run, monkeypatc
 
 def test_two_workers_give_the_candidates_of_one(run, finished):
     run("search.workers=2")
-    assert fingerprint(tracked_runs()[2]) == fingerprint(tracked_runs(workspace=finished)[2])
+    assert fingerprint(tracked_runs()[2]) == fingerprint(tracked_runs(finished)[2])
 
 
 def test_a_server_that_is_away_is_one_sentence(aesi, arguments):

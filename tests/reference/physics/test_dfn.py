@@ -55,11 +55,9 @@ def nmc_pouch(shared_data):
     return json.loads((shared_data / "measured" / "about_energy_nmc" / "cell.bpx.json").read_text())
 
 
-def agree(peer, effects=(), **options):
-    ours = simulate(
-        peer.cell, peer.time, peer.current, soc0=peer.soc0, effects=effects, model="dfn"
-    ).voltage_v
-    theirs = peer.voltage(model="DFN", through=THROUGH, radial=RADIAL, graded=True, **options)
+def agree(peer):
+    ours = simulate(peer.cell, peer.time, peer.current, soc0=peer.soc0, model="dfn").voltage_v
+    theirs = peer.voltage(model="DFN", through=THROUGH, radial=RADIAL, graded=True)
     error = rmse_mv(ours, theirs)
     assert error < WANTED_MV
     assert np.abs(ours - theirs).max() * 1e3 < WANTED_LARGEST_MV

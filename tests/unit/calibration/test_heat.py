@@ -151,10 +151,10 @@ def test_what_a_cell_released_was_that_of_a_start_which_the_fit_had_left(directi
     assert released_j == pytest.approx(balance_j, rel=2e-3)
 
 
-def in_a_chamber(degc, c_rate: float = 0.1) -> Measurement:
-    """Five hours at one current, after a minute of rest; what the thermocouple says is the chamber's doing alone."""
+def in_a_chamber(degc) -> Measurement:
+    """Five hours at C/10, after a minute of rest; what the thermocouple says is the chamber's doing alone."""
     time = np.arange(0.0, 18000.0, 20.0)
-    current = np.where(time < 60.0, 0.0, c_rate * NMC.capacity_ah)
+    current = np.where(time < 60.0, 0.0, 0.1 * NMC.capacity_ah)
     temperature = degc(time)
     run = simulate(NMC, time, current, 0.9, temperature_degc=temperature, hold="backward")
     return Measurement(time, current, run.voltage_v, temperature, "chamber")

@@ -368,10 +368,8 @@ def test_a_stretch_outside_the_trained_range_tells_nothing_of_how_drives_differ(
     errors, spreads = zip(*(drive(seed) for seed in range(5)), strict=True)
     within, beyond = np.ones(N, dtype=bool), np.zeros(N, dtype=bool)
 
-    def widening(inside: list[np.ndarray], stretches: int = 5) -> float:
-        fitted_bands = FreeRunBands.fit(
-            {WHOLE_DRIVE: list(errors)}, DT, spreads, inside=inside, stretches=stretches
-        )
+    def widening(inside: list[np.ndarray]) -> float:
+        fitted_bands = FreeRunBands.fit({WHOLE_DRIVE: list(errors)}, DT, spreads, inside=inside, stretches=5)
         return fitted_bands.horizons[-1].widening
 
     # Student's t at 0.95 with four and two degrees of freedom, by its printed table, over the normal quantile.

@@ -370,15 +370,15 @@ def test_another_voltage_after_a_while_without_rows_is_no_rest(tmp_path):
     assert "a gap of 450 s after 49 s" in refusal(tmp_path, text(time, current, voltage))
 
 
-def pulses_logged_on_change(begins: bool, charge_a=4.0, rest_s=5400.0):
+def pulses_logged_on_change(begins: bool, charge_a=4.0):
     """Rows of three pulses, (n, 3) s, A, V: a row a second in a pulse of 30 s, one at the end of a rest; then a steady
     current for 600 s with its last row, and a rest alike. `begins`: with the first row of each rest and current too."""
     rows, now, open_v = [(0.0, 0.0, 3.9)], 0.0, 3.9
     for _ in range(3):
         rows += [(now + s, 8.0, open_v - 0.08 - 1e-3 * s) for s in range(1, 31)]
         now, open_v = now + 30.0, open_v - 0.005
-        rows += [(now + 0.5, 0.0, open_v - 0.03)] * begins + [(now + rest_s, 0.0, open_v)]
-        now += rest_s
+        rows += [(now + 0.5, 0.0, open_v - 0.03)] * begins + [(now + 5400.0, 0.0, open_v)]
+        now += 5400.0
         rows += [(now + 0.5, charge_a, open_v - 0.01 * charge_a)] * begins
         open_v -= 0.01 * charge_a
         rows += [(now + 600.0, charge_a, open_v - 0.01 * charge_a)] * begins

@@ -49,13 +49,13 @@ def test_lithium_is_kept_with_every_effect_that_shares_currents(nmc, load):
     assert run.series["soc"] == pytest.approx(plain.series["soc"], abs=1e-9)
 
 
-def pulses_at_0_degc(cell, hold, rows=360, **more):
+def pulses_at_0_degc(cell, hold):
     """Twenty seconds at 1C against ten at -2C, a row a second, then ten minutes of rest; double layers of 10 F/m2."""
-    current = np.r_[0.0, np.tile(np.r_[np.full(20, 1.0), np.full(10, -2.0)], rows // 30), np.zeros(600)]
+    current = np.r_[0.0, np.tile(np.r_[np.full(20, 1.0), np.full(10, -2.0)], 12), np.zeros(600)]
     current = current * cell.nominal_capacity_ah
     layers = CATALOGUE["double_layer"].activate(negative_f_m2=10.0, positive_f_m2=10.0)
     run = simulate(
-        cell, np.arange(len(current)), current, 0.6, effects=[layers], temperature_degc=0.0, hold=hold, **more
+        cell, np.arange(len(current)), current, 0.6, effects=[layers], temperature_degc=0.0, hold=hold
     )
     charge = current[1:] if hold == "backward" else 0.5 * (current[1:] + current[:-1])
     return run, float(charge.sum()) / SECONDS_PER_HOUR

@@ -1,15 +1,16 @@
-"""Synthetic views for the tests of reports and figures."""
-
-from importlib.util import module_from_spec, spec_from_file_location
-from pathlib import Path
+"""Synthetic views for the tests of reports and figures, and the record of the small experiment."""
 
 import pytest
+import synthetic_views
+from small_experiment import write_record
 
 
 @pytest.fixture(scope="session")
 def views():
-    path = Path(__file__).with_name("synthetic_views.py")
-    spec = spec_from_file_location("synthetic_views", path)
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return synthetic_views
+
+
+@pytest.fixture(scope="session")
+def record(tmp_path_factory):
+    """The file of `small_experiment.write_record`; `fitted` keeps what is fitted to it."""
+    return write_record(tmp_path_factory.mktemp("record"))

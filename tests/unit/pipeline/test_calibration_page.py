@@ -27,9 +27,9 @@ START = Path(__file__).resolve().parents[3] / "experiments" / "cells" / "lg_m50_
 HEALTH = {"resistance_mohm": "resistance of contacts and films, mohm", "capacity_ah": "capacity, Ah"}
 
 
-def parameter(value=1.0, of_prior=0.3, **more):
+def parameter(of_prior=0.3, **more):
     return {
-        "value": value, "low": 0.5 * value, "high": 2.0 * value, "unit": "factor", "prior_from": "a convention",
+        "value": 1.0, "low": 0.5, "high": 2.0, "unit": "factor", "prior_from": "a convention",
         "of_prior": of_prior, **more,
     }  # fmt: skip
 
@@ -86,10 +86,10 @@ def content():
     }
 
 
-def traces(names, n=400):
-    time_s = np.arange(n, dtype=float)
+def traces(names):
+    time_s = np.arange(400.0)
     current_a = np.sign(np.sin(time_s / 30))
-    flat = np.full(n, 3.7)
+    flat = np.full(len(time_s), 3.7)
     return tuple(
         DiscoveryTrace(
             name, "fit", time_s, current_a, 0.9 - 1e-3 * time_s, flat + 1e-3, flat, flat, flat + 9e-4

@@ -13,11 +13,6 @@ from aesi.pipeline.report.tables import free_run_band_table, record_table
 
 
 @pytest.fixture(scope="module")
-def record(tmp_path_factory):
-    return write_record(tmp_path_factory.mktemp("record"))
-
-
-@pytest.fixture(scope="module")
 def evaluation(record):
     loaded, _, models = fitted(record)
     return evaluate_models(models, loaded.split)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from small_experiment import SOC0, experiment, fitted, write_record
+from small_experiment import SOC0, experiment, fitted
 
 import aesi
 from aesi.data.resample import to_even
@@ -31,11 +31,6 @@ from aesi.sparse.fade import Fade
 from aesi.sparse.terms.library import Library, Term
 from aesi.sparse.terms.scaling import Scaling
 from aesi.sparse.trained_region import TrainedRegion
-
-
-@pytest.fixture(scope="module")
-def record(tmp_path_factory):
-    return write_record(tmp_path_factory.mktemp("record"))
 
 
 @pytest.fixture(scope="module")
@@ -1071,16 +1066,16 @@ def test_a_correction_that_diverges_is_told_with_the_time(model, data):
     unstable = SparseModel(
         "AESI I",
         Library(("e", "I"), (Term(((0, 1),)),)),
-        np.array([1.5]),
-        Scaling(np.array([-0.01, -50.0]), np.array([0.01, 50.0]), "extrapolate"),
+        np.array([12.0]),
+        Scaling(np.array([-0.01, -50.0]), np.array([0.01, 50.0])),
         1.0,
     )
     alone = replace(model, correction=unstable, bands=None, intervals=None)
-    prediction = alone.predict_record(data, SOC0, error0_v=5e-3)
+    prediction = alone.predict_record(data, SOC0, error0_v=5e-5)
     at = int(np.searchsorted(prediction.time_s, prediction.diverged_s))
     held_v = (prediction.voltage_v - prediction.physics_v)[at - 1 :]
-    np.testing.assert_allclose(held_v, 5e-3 * 1.5 ** (at - 1))
-    assert 0.1 / 1.5 < held_v[0] <= 0.1
+    np.testing.assert_allclose(held_v, 5e-5 * 12.0 ** (at - 1))
+    assert 0.1 / 12.0 < held_v[0] <= 0.1
     sentence = band_sentences(data, prediction, alone, measured=False)[1]
     assert f"diverges at {at} s and is held at its last value" in sentence
     assert model.predict_record(data, SOC0).diverged_s is None

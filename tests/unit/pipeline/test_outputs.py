@@ -31,11 +31,6 @@ from aesi.pipeline.written import MODEL
 from aesi.sparse import Genome
 
 
-@pytest.fixture(scope="module")
-def record(tmp_path_factory):
-    return write_record(tmp_path_factory.mktemp("record"))
-
-
 def result(record, *models):
     """A run that compares these models, on the cell as declared."""
     config = experiment(record, models=list(models))

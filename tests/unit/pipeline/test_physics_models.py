@@ -62,7 +62,7 @@ def test_a_series_knows_from_when_on_a_physics_model_ran_out():
     record = Measurement(time_s, np.full(1800, 30.0), np.full(1800, 3.5))
     series, empty = models.series(no_rows(record, 0.3), 1.0, "linear")
     assert empty
-    run = whole.simulate(record, 0.3, "linear")
+    run = whole.run_as_declared(record, 0.3, "linear")
     first = int(np.argmax(run.series["depleted"] > 0.0))
     assert series.ran_out_s == time_s[first] > 900.0
     np.testing.assert_array_equal(series.before_depletion, time_s < first)
@@ -89,7 +89,7 @@ def test_a_model_that_is_exact_erred_where_rows_are_denser_than_steps(hold, spre
     np.testing.assert_allclose(series.left_by(RECALIBRATED), 0.0, atol=1e-9)
     np.testing.assert_allclose(series.model_v, even.voltage_v, atol=1e-9)
     # At the stamps it says something else, and a fit allows for that.
-    at_stamps_v = exact.simulate(even, 0.6, hold).voltage_v
+    at_stamps_v = exact.run_as_declared(even, 0.6, hold).voltage_v
     assert rms(even.voltage_v - at_stamps_v) > 1e-3
     np.testing.assert_allclose(record.with_resampling_change(exact, hold).voltage_v, at_stamps_v, atol=1e-9)
 

@@ -32,7 +32,7 @@ def discharged(name, charge_off):
 
 
 def left_v(physics, record):
-    given = physics.simulate(record.measurement, record.soc0, "linear").voltage_v
+    given = physics.run_as_declared(record.measurement, record.soc0, "linear").voltage_v
     return float(np.sqrt(np.mean((record.measurement.voltage_v - given) ** 2)))
 
 

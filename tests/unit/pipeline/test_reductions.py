@@ -10,7 +10,6 @@ from small_experiment import (
     conformalise,
     experiment,
     final_models,
-    write_record,
 )
 
 from aesi.pipeline.experiment.judging.evaluate import evaluate_models
@@ -18,11 +17,6 @@ from aesi.pipeline.experiment.judging.reductions import AGAINST, valid_reduction
 from aesi.pipeline.experiment.load import load
 from aesi.sparse import Candidate, Genome, evaluate
 from aesi.sparse.search.fold_models import fold_samples
-
-
-@pytest.fixture(scope="module")
-def record(tmp_path_factory):
-    return write_record(tmp_path_factory.mktemp("record"))
 
 
 def searched(record, **repeats):

@@ -71,7 +71,7 @@ def test_records_of_one_name_in_several_folders_were_taken_for_one(tmp_path, inn
     first, second, test = days(tmp_path, inner)
     content = {"name": "days", "data": {"kind": "files", "train": [first, second], "test": [test]}}
     sources = sources_of(parse_experiment(content), Path("unread.bpx.json"))
-    assert [record.name for record, _ in sources.records.values()] == called
+    assert [record.name for record in sources.records.values()] == called
     assert list(sources.records) == [first, second, test]
 
 
@@ -92,7 +92,7 @@ def test_the_rows_of_a_record_were_cut_for_commands_alone(tmp_path):
     asked = {"fit": [str(path)], "fit_until_s": {str(path): 60}, "good": [str(path)]}
     config = parse_experiment({"name": "cut", "data": data, "discover": asked})
     records = sources_of(config, Path("unread.bpx.json")).records
-    np.testing.assert_array_equal(records[str(path)][0].time_s, taken.time_s)
+    np.testing.assert_array_equal(records[str(path)].time_s, taken.time_s)
     (fit,), _, (good,) = discovery_records(config, config.discover, Path("unread.bpx.json"))
     assert (fit.time_s[0], fit.time_s[-1]) == (20.0, 60.0)
     np.testing.assert_array_equal(good.current_a, taken.current_a)
