@@ -283,7 +283,7 @@ def test_columns_that_are_no_measurement_are_refused(columns, sentence):
         ({"holdout": -0.1}, "holdout = -0.1 is not a share"),
         ({"holdout": "half"}, "holdout = 'half' is not a share"),
         ({"soh": "new"}, "a state of health of 'new'"),
-        ({"cell": None}, "a NoneType is no cell; give a BPX file"),
+        ({"cell": None}, "an object of type NoneType is no cell; give a BPX file"),
         ({"only": 3}, "only = 3: give the id of an effect, or a list of ids"),
         ({"max_effects": -1}, "max_effects = -1 is not a whole number from 0 up to 10"),
         ({"max_effects": 1.5}, "max_effects = 1.5 is not a whole number"),
@@ -335,9 +335,11 @@ def test_a_prior_of_no_parameter_was_told_by_python_once_the_records_were_read(c
         aesi.calibrate(cell, tmp_path / "missing.csv", priors={"no_such_factor": (1.0, 0.1)})
 
 
-@pytest.mark.parametrize("source", [[], 3, None])
-def test_what_is_no_file_of_a_cell_is_told(source):
-    with pytest.raises(CellError, match="is no cell; give the path of a BPX file, or its content as a dict"):
+@pytest.mark.parametrize(("source", "type_"), [([], "list"), (3, "int"), (None, "NoneType")])
+def test_what_is_no_file_of_a_cell_is_told(source, type_):
+    """It said "a int is no cell"."""
+    said = f"^an object of type {type_} is no cell; give the path of a BPX file, or its content as a dict"
+    with pytest.raises(CellError, match=said):
         aesi.Cell.from_bpx(source)
 
 
