@@ -15,6 +15,7 @@ from aesi.calibration import calibrate as fit_cell
 from aesi.data.read import examined
 from aesi.data.spectra import read_spectra
 from aesi.errors import AesiError, CellError, DataError, InputError
+from aesi.physics import initial_state
 from aesi.physics.effects import CATALOGUE
 from aesi.records import Spectrum
 
@@ -341,6 +342,41 @@ def test_what_is_no_file_of_a_cell_is_told(source, type_):
     said = f"^an object of type {type_} is no cell; give the path of a BPX file, or its content as a dict"
     with pytest.raises(CellError, match=said):
         aesi.Cell.from_bpx(source)
+
+
+TABLE = pd.DataFrame({"time_s": [0.0, 1.0], "current_a": [0.0, 0.0], "voltage_v": [3.9, 3.9]})
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        (
+            lambda cell, _: initial_state(cell, TABLE),
+            "the record is an object of type DataFrame, not a Measurement",
+        ),
+        (lambda _, record: initial_state(str(CELL), record), "cell is the text .*, not a Cell"),
+        (
+            lambda cell, _: aesi.HybridModel(cell).predict_record(TABLE),
+            "type DataFrame, not a Measurement; give aesi",
+        ),
+        (
+            lambda cell, _: aesi.HybridModel(cell).predict_record("drive.csv"),
+            "the record is the text 'drive.csv'",
+        ),
+        (
+            lambda _, record: aesi.cross_check(CELL, record.time_s, record.current_a, SOC0),
+            "not a Cell; read one",
+        ),
+        (
+            lambda cell, _: aesi.HybridModel.load(cell),
+            "an object of type Cell is no folder; give the path of a saved",
+        ),
+    ],
+)
+def test_a_table_for_a_record_and_a_path_for_a_cell_ended_in_an_attribute_error(cell, record, asked, said):
+    with pytest.raises(InputError, match=said) as caught:
+        asked(cell, record)
+    assert "\n" not in str(caught.value)
 
 
 def test_a_number_of_numpy_is_a_state_of_charge(cell, current):
