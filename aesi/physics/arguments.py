@@ -11,6 +11,7 @@ from aesi.constants import COLDEST_DEGC, WARMEST_DEGC
 from aesi.errors import InputError
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Effect
+from aesi.records import Measurement
 from aesi.records.checked import numbers
 
 FARTHEST_SOC = 1.0
@@ -22,6 +23,15 @@ def check_cell(cell: object) -> None:
     if not isinstance(cell, Cell):
         raise InputError(
             f"cell is {_described(cell)}, not a Cell; read one from its file with aesi.Cell.from_bpx(path)."
+        )
+
+
+def check_measurement(record: object) -> None:
+    """Raises InputError where `record` is not a Measurement (but a table or the path of its file, for example)."""
+    if not isinstance(record, Measurement):
+        raise InputError(
+            f"the record is {_described(record)}, not a Measurement; give aesi.Measurement(time_s, current_a, "
+            "voltage_v), or what aesi.read_measurement(path) gave."
         )
 
 

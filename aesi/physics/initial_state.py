@@ -28,7 +28,7 @@ import numpy as np
 
 from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.errors import DataError
-from aesi.physics.arguments import checked_soc
+from aesi.physics.arguments import check_cell, check_measurement, checked_soc
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Record, as_cell_saw, instruments_first
@@ -102,8 +102,10 @@ def initial_state(
     voltage, V; a fit that moves the potentials takes `GOOD_READING_V`.
     Where the voltage is missing from some row on, only the rows before it are used.
     Raises DataError where the voltage belongs to no state of this cell, or where there is neither voltage nor `soc0`;
-    InputError for a `soc0` that is no state of charge.
+    InputError for a `soc0` that is no state of charge, and for what is no Cell or no Measurement.
     """
+    check_cell(cell)
+    check_measurement(record)
     soc0 = checked_soc(soc0)
     if not len(record):
         raise DataError(f"{record.name} has no row to start from.")

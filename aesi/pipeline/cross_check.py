@@ -24,7 +24,7 @@ from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, IntArray, Numbers
 from aesi.over_time import extent, over_time
 from aesi.physics import Cell, ModelName, simulate
-from aesi.physics.arguments import check_choice
+from aesi.physics.arguments import check_cell, check_choice
 from aesi.pipeline.export import own_fields_of, pybamm_contacts, without_own_fields
 from aesi.records.checked import numbers
 
@@ -109,6 +109,7 @@ def cross_check(
     Raises SimulationError where PyBaMM ends early or loses charge; DataError and InputError as `simulate`; DataError
     for a single row, InputError for an unknown model.
     """
+    check_cell(cell)
     check_choice("model", model, PybammModel)
     time, current = numbers(time_s, "time_s"), numbers(current_a, "current_a")
     compared = without_own_fields(cell)

@@ -6,6 +6,7 @@ Each module has `run(**options)`, which yields one JSON-ready dict a line.
 from collections.abc import Iterable, Iterator
 from importlib import import_module
 from importlib.util import find_spec
+from inspect import BoundArguments, signature
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -35,6 +36,9 @@ PEERS = {"spci": {"mapie": "mapie>=1.5"}, "scale": {"distributed": "dask[distrib
 PLACES = ("write", "report", "keep")
 """Options that name what a benchmark writes: a page, a page, and a folder."""
 
+OF_A_CLONE = "experiments"
+"""Folder of a clone that the default of an option lies in, where the benchmark reads files of the project."""
+
 
 def missing(names: Iterable[str]) -> dict[str, str]:
     """Package -> what installs it, of the packages that these benchmarks need and that are not here."""
@@ -50,7 +54,8 @@ def run(name: str, **options: Any) -> Iterator[dict[str, Any]]:
     """Lines of one benchmark, as they come; nothing is run before the first is asked for.
 
     Raises InputError at once, so that of several benchmarks none has run in vain, for an option that this one does not
-    have, a value that the option cannot have, and a place that cannot be written to.
+    have, a value that the option cannot have, files of the project that are not there, and a place that cannot be
+    written to.
     """
     module = import_module(BENCHMARKS[name])
     known = get_type_hints(module.run, include_extras=True)
@@ -69,7 +74,29 @@ def run(name: str, **options: Any) -> Iterator[dict[str, Any]]:
     if options.get("write") is not None:
         marks = module.ARCHIVE_MARKS if options.get("archive") else (module.BEGIN, module.END)
         check_marks(str(options["write"]), *marks)
+    _check_inputs(name, signature(module.run).bind_partial(**options))
     return iter(module.run(**options))
+
+
+def _check_inputs(name: str, asked: BoundArguments) -> None:
+    """Of the options that name a file or folder of the project.  Raises InputError where there is none of that name."""
+    given = set(asked.arguments)
+    asked.apply_defaults()
+    for option, parameter in asked.signature.parameters.items():
+        place, default = asked.arguments[option], parameter.default
+        if (
+            not (isinstance(default, str) and Path(default).parts[:1] == (OF_A_CLONE,))
+            or Path(place).exists()
+        ):
+            continue
+        if option in given:
+            raise InputError(
+                f"--set {option}={place}: there is no such file or folder; name one that exists."
+            )
+        raise InputError(
+            f"`aesi bench {name}` reads {place} of a clone of the project, and {Path.cwd()} has none; run it in the "
+            f"folder of a clone, or name the place with --set {option}=PATH."
+        )
 
 
 def _check_places(places: dict[str, str]) -> None:

@@ -72,7 +72,8 @@ def convert(
 ) -> None:
     """Write a measurement as CSV in SI units. Messages say how its columns, signs and rows were understood."""
     read = [file] if not file.is_dir() else []  # a folder is no input; the reader refuses it with a sentence
-    outputs.check_table(out, [*read, *([cell] if cell else [])])
+    inputs = [*read, *([cell] if cell else [])]
+    outputs.check_table(out, inputs, bdf=to == "bdf", advice=", or --to bdf")
     from aesi.data.convert import convert_file, record_lines
 
     admit = None

@@ -44,9 +44,21 @@ def check_file(
         check_writable(out)
 
 
-def check_table(out: Path, inputs: Iterable[Path]) -> None:
-    """`check_file` for a CSV.  Raises InputError also if the name has the suffix of another format."""
+BDF = ".bdf"
+"""Suffix by which the Battery Data Format is known, also before another, as in `drive.bdf.csv`."""
+
+
+def check_table(out: Path, inputs: Iterable[Path], *, bdf: bool = False, advice: str = "") -> None:
+    """`check_file` for a CSV.  Raises InputError also if the name has the suffix of another format.
+
+    bdf : the table is one of the Battery Data Format.  advice : clause on what writes one, for the sentence.
+    """
     check_file(out, inputs)
+    if not bdf and BDF in map(str.lower, out.suffixes):
+        raise InputError(
+            f"--out {out}: the name is that of the Battery Data Format, where current is positive on charge, and what "
+            f"is written is not; give a name without {BDF}{advice}."
+        )
     if out.suffix.lower() in OTHER_FORMATS:
         raise InputError(f"--out {out}: what is written is a CSV; give a name that ends in .csv or .csv.gz.")
 

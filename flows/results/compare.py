@@ -11,7 +11,7 @@ from typing import Any
 from aesi.errors import InputError
 from aesi.pipeline.report.compare import ComparedRun, write_comparison
 from aesi.pipeline.written import COMPARISON, FINDING
-from flows.tracking.experiment_log import OF_A_MODEL
+from flows.tracking.experiment_log import CODE, OF_A_MODEL
 from flows.tracking.store import Store, beginning, is_of_experiment, job_of
 from flows.tracking.tracker import was_cut
 
@@ -19,6 +19,10 @@ FINISHED = "FINISHED"
 """MLflow's word for the state of a run that reached its end."""
 OF_THE_RESULT = ("chosen_candidate", "chosen_model")
 """Parameters that are what came of a run, not what was asked for."""
+PROGRAM = "program (digest of its code)"
+"""What the page calls the tag of the program that ran an experiment."""
+DIGITS = 8
+"""Of that digest on the page. A convention, as of the ids of runs there."""
 
 
 def compare(wanted: Sequence[str], out: Path, uri: str | None = None) -> list[ComparedRun]:
@@ -71,13 +75,20 @@ def _compared(store: Store, experiment: str, run: Any) -> ComparedRun:
         started=datetime.fromtimestamp(run.info.start_time / 1000, UTC).strftime("%Y-%m-%d %H:%M"),
         job=job_of(run),
         finished=run.info.status == FINISHED,
-        settings={k: v for k, v in run.data.params.items() if k not in OF_THE_RESULT},
+        settings=_settings(run),
         metrics=_metrics(run),
         chosen=run.data.params.get("chosen_model", ""),
         judged_on=_judged_on(run.data.params),
         comparison=_content(store, run, COMPARISON),
         discovery=_content(store, run, FINDING) if "verdict" in run.data.tags else {},
     )
+
+
+def _settings(run: Any) -> dict[str, str]:
+    """What was asked for, and the program that ran it: with another one, runs of the same settings differ."""
+    asked = {key: text for key, text in run.data.params.items() if key not in OF_THE_RESULT}
+    code = run.data.tags.get(CODE)  # runs of before it was tracked, discoveries and benchmarks have none
+    return asked if code is None else asked | {PROGRAM: code[:DIGITS]}
 
 
 def _metrics(run: Any) -> dict[str, float]:

@@ -2,9 +2,10 @@
 
 import io
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from aesi.conformal import COMPARED, METHODS, Calibrated, calibrated_from_dict
@@ -262,6 +263,18 @@ def test_too_few_residuals_are_refused(name: str) -> None:
 def test_half_of_the_miss_rate_that_was_given_was_told() -> None:
     with pytest.raises(FitError, match=r"cannot support a miss rate of 0\.0001: at least 19999 are needed"):
         METHODS["split"].fit([series(1000, 9)], alpha=1e-4)
+
+
+@pytest.mark.parametrize("name", sorted(COMPARED))
+@pytest.mark.parametrize("as_given", [np.asarray, list, pd.Series])
+def test_one_record_without_a_list_was_taken_for_as_many_records_of_a_sample(
+    name: str, as_given: Any
+) -> None:
+    """Some methods gave intervals of it, the others said that they lack history."""
+    with pytest.raises(
+        InputError, match=r"^residuals is one row of 1000 numbers; give a list of records, as in \["
+    ):
+        COMPARED[name].fit(as_given(series(1000, 1)), current_a=as_given(series(1000, 2)))
 
 
 @pytest.mark.parametrize("name", sorted(METHODS))

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import get_args
 
 import pytest
-from pydantic import BaseModel
+from pydantic import BaseModel, Field
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -91,6 +91,21 @@ def test_a_key_that_nobody_described_builds_no_table():
     assert experiment.unit_of(experiment.told(Section)["told"]) == ("s", "what it is")
     with pytest.raises(KeyError, match="untold"):
         experiment.tables(Section, {})
+
+
+def test_the_largest_seed_was_told_as_one_that_is_refused():
+    class Section(BaseModel):
+        """A section.
+
+        seed : where it starts.  share : of the rows.
+        """
+
+        seed: int = Field(0, le=2**32 - 1)
+        share: float = Field(0.5, gt=0.0, le=1.5)
+
+    _, *rows = hook("parts/experiment").tables(Section, {}).splitlines()
+    assert "| `seed` | whole number to 4,294,967,295 |" in "\n".join(rows)
+    assert "| `share` | number above 0 to 1.5 |" in "\n".join(rows)
 
 
 def test_the_bands_of_virtual_cells_are_of_the_newest_run(tmp_path, monkeypatch):

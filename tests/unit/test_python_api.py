@@ -15,6 +15,7 @@ from aesi.calibration import calibrate as fit_cell
 from aesi.data.read import examined
 from aesi.data.spectra import read_spectra
 from aesi.errors import AesiError, CellError, DataError, InputError
+from aesi.physics import initial_state
 from aesi.physics.effects import CATALOGUE
 from aesi.records import Spectrum
 
@@ -283,7 +284,7 @@ def test_columns_that_are_no_measurement_are_refused(columns, sentence):
         ({"holdout": -0.1}, "holdout = -0.1 is not a share"),
         ({"holdout": "half"}, "holdout = 'half' is not a share"),
         ({"soh": "new"}, "a state of health of 'new'"),
-        ({"cell": None}, "a NoneType is no cell; give a BPX file"),
+        ({"cell": None}, "an object of type NoneType is no cell; give a BPX file"),
         ({"only": 3}, "only = 3: give the id of an effect, or a list of ids"),
         ({"max_effects": -1}, "max_effects = -1 is not a whole number from 0 up to 10"),
         ({"max_effects": 1.5}, "max_effects = 1.5 is not a whole number"),
@@ -335,10 +336,47 @@ def test_a_prior_of_no_parameter_was_told_by_python_once_the_records_were_read(c
         aesi.calibrate(cell, tmp_path / "missing.csv", priors={"no_such_factor": (1.0, 0.1)})
 
 
-@pytest.mark.parametrize("source", [[], 3, None])
-def test_what_is_no_file_of_a_cell_is_told(source):
-    with pytest.raises(CellError, match="is no cell; give the path of a BPX file, or its content as a dict"):
+@pytest.mark.parametrize(("source", "type_"), [([], "list"), (3, "int"), (None, "NoneType")])
+def test_what_is_no_file_of_a_cell_is_told(source, type_):
+    """It said "a int is no cell"."""
+    said = f"^an object of type {type_} is no cell; give the path of a BPX file, or its content as a dict"
+    with pytest.raises(CellError, match=said):
         aesi.Cell.from_bpx(source)
+
+
+TABLE = pd.DataFrame({"time_s": [0.0, 1.0], "current_a": [0.0, 0.0], "voltage_v": [3.9, 3.9]})
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        (
+            lambda cell, _: initial_state(cell, TABLE),
+            "the record is an object of type DataFrame, not a Measurement",
+        ),
+        (lambda _, record: initial_state(str(CELL), record), "cell is the text .*, not a Cell"),
+        (
+            lambda cell, _: aesi.HybridModel(cell).predict_record(TABLE),
+            "type DataFrame, not a Measurement; give aesi",
+        ),
+        (
+            lambda cell, _: aesi.HybridModel(cell).predict_record("drive.csv"),
+            "the record is the text 'drive.csv'",
+        ),
+        (
+            lambda _, record: aesi.cross_check(CELL, record.time_s, record.current_a, SOC0),
+            "not a Cell; read one",
+        ),
+        (
+            lambda cell, _: aesi.HybridModel.load(cell),
+            "an object of type Cell is no folder; give the path of a saved",
+        ),
+    ],
+)
+def test_a_table_for_a_record_and_a_path_for_a_cell_ended_in_an_attribute_error(cell, record, asked, said):
+    with pytest.raises(InputError, match=said) as caught:
+        asked(cell, record)
+    assert "\n" not in str(caught.value)
 
 
 def test_a_number_of_numpy_is_a_state_of_charge(cell, current):

@@ -13,7 +13,7 @@ from aesi.records.checked import row_words
 
 def checked_record(residuals: Array) -> Array:
     """(n,) V as contiguous floats, missing values (NaN, infinity) as NaN; raises InputError for another shape."""
-    record = np.ascontiguousarray(residuals, dtype=float)
+    record = np.asarray(residuals, dtype=float)
     if record.ndim != 1:
         raise InputError(f"residuals have shape {record.shape}; give one (n,) array a continuous record.")
     return np.where(np.isinf(record), np.nan, record)
@@ -33,7 +33,12 @@ def checked_current(current_a: Array, n: int) -> Array:
 
 
 def checked_records(residuals: Sequence[Array]) -> list[Array]:
-    """`checked_record` of each."""
+    """`checked_record` of each; raises InputError for one row of numbers: it would be as many records of a sample."""
+    if len(residuals) and all(np.ndim(record) == 0 for record in residuals):
+        raise InputError(
+            f"residuals is one row of {len(residuals)} numbers; give a list of records, as in [residuals], and the "
+            "currents as another."
+        )
     return [checked_record(r) for r in residuals]
 
 

@@ -27,8 +27,8 @@ def declared_model(source: Declared) -> HybridModel:
     given: object = source
     if not isinstance(given, str | PathLike):
         raise InputError(
-            f"a {type(given).__name__} is no cell; give a BPX file, the folder of a saved model, a Cell or a "
-            "HybridModel."
+            f"an object of type {type(given).__name__} is no cell; give a BPX file, the folder of a saved model, "
+            "a Cell or a HybridModel."
         )
     path = Path(source)
     return HybridModel.load(path) if path.is_dir() else _alone(Cell.from_bpx(path))

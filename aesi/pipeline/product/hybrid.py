@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from os import PathLike
 from pathlib import Path
 from typing import Any, Self
 
@@ -22,7 +23,7 @@ from aesi.numerics.typing import Array, BoolArray, Numbers
 from aesi.numerics.visited import Visited
 from aesi.over_time import stamp
 from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
-from aesi.physics.arguments import check_cell, check_choice, checked_effects, checked_soc
+from aesi.physics.arguments import check_cell, check_choice, check_measurement, checked_effects, checked_soc
 from aesi.physics.cell import Soh
 from aesi.physics.depletion import RUN_ON
 from aesi.physics.effects import active_effect, saved_effect
@@ -176,9 +177,10 @@ class HybridModel:
         soc0 : None reads it with its standard deviation from the voltage at the start of the record, also for a free
         run; without a voltage it is the model's own.
         soc0_sd : standard deviation of a soc0 that is not read from the voltage; it widens the band of a free run.
-        Raises InputError for a soc0_sd outside 0 to 1, for an error0_v that is not finite, and for one in a free run of
-        a model without a correction; else as `predict`.
+        Raises InputError for what is no Measurement, for a soc0_sd outside 0 to 1, for an error0_v that is not finite,
+        and for one in a free run of a model without a correction; else as `predict`.
         """
+        check_measurement(record)
         self._check_start(error0_v, soc0_sd, one_step)
         # The rows tell it as they are, not once they are averaged or their voltages hidden.
         record = record.held(self.hold_of(record))
@@ -224,8 +226,13 @@ class HybridModel:
         return folder
 
     @staticmethod
-    def load(folder: str | Path) -> HybridModel:
-        """Read a model folder. Raises InputError naming the file that is missing or not as written by `save`."""
+    def load(folder: str | PathLike[str]) -> HybridModel:
+        """Read a model folder. Raises InputError naming the file that is missing or not as written by `save`, and for
+        what is no path."""
+        if not isinstance(folder, str | PathLike):
+            raise InputError(
+                f"an object of type {type(folder).__name__} is no folder; give the path of a saved model."
+            )
         folder = Path(folder)
         head, parts = read_model(folder)
         read: dict[str, Any] = {}

@@ -132,12 +132,17 @@ def _limited(words: str, metadata: Iterable[Any]) -> str:
     """With the limits that pydantic checks; validators of other kinds say theirs when they refuse."""
     bounds = [bound for each in metadata for bound in (getattr(each, "metadata", None) or [each])]
     limits = [
-        said.format(f"{getattr(bound, name):g}")
+        said.format(_exact(getattr(bound, name)))
         for bound in bounds
         for name, said in LIMITS.items()
         if getattr(bound, name, None) is not None
     ]
     return " ".join([words, *limits])
+
+
+def _exact(bound: float) -> str:
+    """A whole number to its last digit: in six digits the largest seed is one that is refused."""
+    return f"{bound:,}" if isinstance(bound, int) else f"{bound:g}"
 
 
 def _default(field: FieldInfo, is_section: bool) -> str:

@@ -33,6 +33,8 @@ from flows.benchmarks.history import (
 from flows.tracking.run_records import RunLock, RunRecord, records
 from flows.tracking.store import KIND, Store
 
+ROOT = Path(__file__).resolve().parents[3]
+
 
 def test_a_search_stores_a_few_values_a_candidate_where_the_peer_stores_one_for_every_term(workspace):
     memory, shared = benchmarks.run("search", terms=200, candidates=4, population=2)
@@ -91,7 +93,8 @@ def test_tracking_costs_something_and_leaves_the_workspace_alone(workspace):
         ("tracking", {"terms": 5000}, "library of 5000 terms: there are 1 to"),
     ],
 )
-def test_an_option_that_a_benchmark_cannot_take_is_refused_before_it_runs(name, options, said):
+def test_an_option_that_a_benchmark_cannot_take_is_refused_before_it_runs(name, options, said, monkeypatch):
+    monkeypatch.chdir(ROOT)
     with pytest.raises(InputError, match=said):
         next(benchmarks.run(name, **options))
 
@@ -107,7 +110,8 @@ def test_the_cells_of_one_benchmark_were_a_folder_and_of_others_a_list_or_a_numb
     assert set(of_cells.values()) == {str}
 
 
-def test_a_name_that_looks_like_a_number_is_a_name():
+def test_a_name_that_looks_like_a_number_is_a_name(monkeypatch):
+    monkeypatch.chdir(ROOT)
     with pytest.raises(InputError, match=r"For only=\.\.\. there are: "):  # no set and no record is called so
         next(benchmarks.run("cells", only=18650))
 
@@ -124,7 +128,8 @@ def test_a_name_that_looks_like_a_number_is_a_name():
         ({"bench": "blind", "only": None, "after": 100_000}, "stranger"),
     ],
 )
-def test_options_that_leave_no_case_gave_a_summary_of_none(options, name, workspace):
+def test_options_that_leave_no_case_gave_a_summary_of_none(options, name, workspace, monkeypatch):
+    monkeypatch.chdir(ROOT)
     asked = {"only": "no_such_name", **options}
     with pytest.raises(
         InputError, match=rf"^no case of `aesi bench {options['bench']}` is left by .*{name}"
@@ -132,6 +137,31 @@ def test_options_that_leave_no_case_gave_a_summary_of_none(options, name, worksp
         next(benchmarks.run(asked.pop("bench"), **asked))
     assert str(said.value).count("\n") == 0
     assert not list(workspace.iterdir())  # nothing was tracked, either
+
+
+@pytest.mark.parametrize(
+    ("name", "option", "place"),
+    [
+        ("start", "cells", "experiments/cells"),  # it printed rows of errors, and ended with 0
+        ("resistance", "cells", "experiments/cells"),  # it printed "No such file or directory" alone
+        ("design", "cell", "experiments/cells/nmc_30ah.bpx.json"),
+        ("splits", "experiments", "experiments"),
+        ("scale", "experiment", "experiments/smoke.yaml"),
+    ],
+)
+def test_outside_a_clone_a_benchmark_printed_rows_of_errors_or_a_bare_no_such_file(
+    name, option, place, call, workspace
+):
+    code, out, err = call("bench", name)
+    assert (code, out) == (2, "")
+    assert (
+        f"`aesi bench {name}` reads {place} of a clone of the project, and {workspace} has none; run it in"
+        in err
+    )
+    assert f"--set {option}=PATH" in err
+    code, out, err = call("bench", name, "--set", f"{option}=elsewhere")
+    assert (code, out) == (2, "")
+    assert f"--set {option}=elsewhere: there is no such file or folder" in err
 
 
 def test_the_options_of_every_benchmark_are_checked_and_each_has_a_name():
@@ -296,6 +326,7 @@ def judged(spec, cells, limit_s):
 
 
 def test_blind_cases_are_tracked_with_their_confusion(tracked, monkeypatch, tmp_path):
+    monkeypatch.chdir(ROOT)
     monkeypatch.setattr("flows.benchmarks.blind.judged", judged)
     page = tmp_path / "page.md"
     page.write_text("before\n<!-- table of aesi bench blind -->\nold\n<!-- end of blind -->\nafter\n")

@@ -759,6 +759,20 @@ def test_how_the_current_runs_was_said_to_be_of_a_saved_model_where_rows_tell_it
     assert "more than 5 s apart" in told
 
 
+@pytest.mark.parametrize("name", ["out.bdf", "out.bdf.csv", "OUT.BDF.gz"])
+def test_columns_of_the_project_were_written_under_the_name_of_another_format(call, tmp_path, name):
+    """A file `.bdf`, where current is positive on charge, held one that is positive on discharge."""
+    path, out = tmp_path / "in.csv", tmp_path / name
+    path.write_text(
+        "time_s,current_a,voltage_v\n" + "".join(f"{k},{k % 3},{4 - 0.02 * (k % 3)}\n" for k in range(60))
+    )
+    code, _, err = call("data", "convert", path, "--out", out)
+    assert code == 2
+    assert "give a name without .bdf, or --to bdf" in err
+    assert not out.exists()
+    assert call("data", "convert", path, "--to", "bdf", "--out", out)[0] == 0
+
+
 def test_a_short_record_in_milliseconds_was_converted_without_a_word(call, tmp_path):
     cell = aesi.Cell.from_bpx(LG_M50)
     time_s = np.arange(0.0, 1200.0)

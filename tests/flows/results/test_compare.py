@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from dataclasses import replace
 
 import pytest
@@ -9,7 +10,8 @@ import pytest
 from aesi.errors import InputError
 from aesi.pipeline.report.compare import ComparedRun, differing_settings, write_comparison
 from flows.jobs.experiment import _uri_option
-from flows.results.compare import _judged_on, compare
+from flows.results.compare import PROGRAM, _judged_on, compare
+from flows.tracking.experiment_log import CODE
 from flows.tracking.store import JOB, KIND, Store
 from flows.tracking.tracker import _texts
 from flows.tracking.whole_run import insert_run
@@ -251,6 +253,22 @@ def test_tracked_runs_are_found_by_the_beginning_of_their_id(finished, tmp_path)
     low, high = content["intervals"][run.data.params["chosen_model"]]["test_rmse_mv"]
     assert low < run.data.metrics["free_run/test_rmse_mv"] < high
     assert content["intervals"]["ESPM"]["test_mser_pct"] == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
+def test_runs_of_two_versions_of_the_program_differed_by_their_seed_alone(finished, tmp_path):
+    """`aesi tables` leaves out what another version ran; the page said that all other settings are the same."""
+    database = tmp_path / "mlflow.db"
+    for path in finished.glob("mlflow.db*"):
+        shutil.copy(path, tmp_path / path.name)
+    store = Store(f"sqlite:///{database}")
+    (run,) = store.runs(store.find_experiment("smoke"), f"tags.`{KIND}` = 'run'")
+    again = store.client.create_run(run.info.experiment_id, tags=run.data.tags | {CODE: "0123456789abcdef"})
+    for key, value in run.data.params.items():
+        store.client.log_param(again.info.run_id, key, value)
+    store.client.set_terminated(again.info.run_id)
+    runs = compare(["smoke"], tmp_path / "page.html", f"sqlite:///{database}")
+    assert differing_settings(runs) == [PROGRAM]
+    assert {each.settings[PROGRAM] for each in runs} == {run.data.tags[CODE][:8], "01234567"}
 
 
 def test_runs_of_files_that_were_edited_under_their_names_had_no_setting_that_differs(finished):

@@ -60,7 +60,8 @@ def _load(source: str | PathLike[str] | Mapping[str, Any]) -> tuple[dict[str, An
         return copy.deepcopy(dict(source)), "BPX data"
     if not isinstance(source, str | PathLike):
         raise CellError(
-            f"a {type(source).__name__} is no cell; give the path of a BPX file, or its content as a dict."
+            f"an object of type {type(source).__name__} is no cell; give the path of a BPX file, or its content "
+            "as a dict."
         )
     path = Path(source)
     raw = _parsed(path, _text_of(path))
