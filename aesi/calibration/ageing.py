@@ -10,9 +10,9 @@ have the same state. The working coordinate z of a loss is a normal deviate of t
 |e| = P^-1((1 + P(z))/2) with P the normal distribution. For a record without a date ln share is s z, relative to the
 file. The file has the state of the last day on which a dated record has a load, or of another day that is given.
 
-Slow records determine the loss of silicon (`aesi.physics.cell.silicon`), each by a coordinate of its own relative to
-the file, valid on its day. Between two such days, the file's included, the logarithm of the share is interpolated
-linearly over time; before the first and after the last it is constant. Records with a load take this share.
+Slow records determine the loss of silicon (`aesi.calibration.silicon`), each by a coordinate of its own relative to the
+file, valid on its day. Between two such days, the file's included, the logarithm of the share is interpolated linearly
+over time; before the first and after the last it is constant. Records with a load take this share.
 
 Left out: ageing by use and not by days, recovery at rest, and growing resistance.
 """
@@ -52,9 +52,6 @@ With steps of either sign the HG2 had gained 5 % in a 1C discharge at -8 degC, s
 compensated an effect of the cold. The file as simulated missed the discharge by 264 mV, and by 9.3 with losses alone. A
 fit without that discharge, whose two C/20 at other temperatures then bend the energies less, misses it by 92 mV instead
 of 1.6 V."""
-SILICON_SD = 0.3
-"""Standard deviation of the logarithm of the share that is left. A convention, of the size of the shares that
-`aesi.physics.cell.silicon` was seen on, 0.81 and 0.63."""
 MOST_DEVIATIONS = 4.0
 """Bound of the working coordinate of a loss, standard deviations."""
 

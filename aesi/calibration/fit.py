@@ -39,7 +39,7 @@ from aesi.calibration.result import (
     undetermined,
 )
 from aesi.calibration.start import size_assumed, with_area_factor
-from aesi.calibration.written_cell import capacities, fit_states, silicon_shares, start_soc, written_cell
+from aesi.calibration.written_cell import capacities, fit_states, start_soc, written_cell
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import FitError
 from aesi.numerics.metrics import rms
@@ -97,7 +97,7 @@ def calibrate(
     begun = {record.name: start_soc(model, x, i) for i, record in enumerate(model.records)}
     parameters = [intervals(model, end.x, covariance) for end in ends]
     return Calibration(
-        cell=_with_provenance(found, cell, model, shares, silicon_shares(model, x), conditions.dates),
+        cell=_with_provenance(found, cell, model, shares, conditions.dates),
         declared=cell,
         parameters=parameters[0],
         undetermined=undetermined(model, scaled),
@@ -224,24 +224,17 @@ def _fitted_twice(
 
 
 def _with_provenance(
-    found: Cell,
-    declared: Cell,
-    model: Model,
-    shares: Mapping[str, float],
-    silicon: Mapping[str, float],
-    days: Mapping[str, date],
+    found: Cell, declared: Cell, model: Model, shares: Mapping[str, float], days: Mapping[str, date]
 ) -> Cell:
     """The fitted cell as it is written, with the name of the model and the records of the fit.
 
     declared : start cell; records without a temperature have its initial one.  shares : record -> its capacity over the
-    written one.  silicon : record -> the same of its silicon, empty where no record could tell.  days : record -> day
-    of its test, where known.
+    written one.  days : record -> day of its test, where known.
     """
     return replace(
         found,
         fitted_with=model.model_name,
         capacity_shares=tuple(shares.items()),
-        silicon_shares=tuple(silicon.items()),
         tested_on=tuple((name, day_of(days[name])) for name in shares if name in days),
         fitted_at_k=tuple((r.name, round(kelvin_taken(declared, r), 2)) for r in model.records),
     )

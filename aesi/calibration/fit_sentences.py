@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from aesi.calibration.model import FitState, Model
+from aesi.calibration.silicon import SILICON_V
 from aesi.constants import MILLI
 from aesi.numerics.typing import Array
-from aesi.physics.cell.silicon import SILICON_V
 from aesi.physics.depletion import ran_out
 
 NOTED_ZERO = 0.02

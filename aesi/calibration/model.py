@@ -8,15 +8,15 @@ from typing import Literal
 
 import numpy as np
 
-from aesi.calibration.ageing import LOADED_SD, SILICON_SD, SLOW_SD, Ageing
+from aesi.calibration.ageing import LOADED_SD, SLOW_SD, Ageing
 from aesi.calibration.parameters import FitParameter, with_parameters
 from aesi.calibration.records.prepared import Prepared
 from aesi.calibration.records.spectra import FittedSpectra
 from aesi.calibration.records.zero import Zero
 from aesi.calibration.shapes import Shapes
+from aesi.calibration.silicon import SILICON_SD, may_have_silicon, silicon_edge, stretched, with_silicon
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
-from aesi.physics.cell.silicon import may_have_silicon, silicon_edge, stretched, with_silicon_left
 from aesi.physics.effect import Record
 from aesi.physics.model import EspmModel, SolvedRows
 from aesi.physics.simulation import ModelName, solved, solver
@@ -123,11 +123,9 @@ class Model:
         self.spectra = FittedSpectra(tuple(spectra), model_name)
         self.cell, self.records, self.free, self.shapes, self.zero = cell, records, free, shapes, zero
         self.ageing = ageing
-        silicon = sum(r.slow for r in records) >= TELL_SILICON and may_have_silicon(
-            cell.negative.ocp, (cell.negative.theta_min, cell.negative.theta_max)
-        )
+        silicon = sum(r.slow for r in records) >= TELL_SILICON and may_have_silicon(cell.negative)
         self.layout = WorkingVector(len(free), shapes.size, len(records), silicon)
-        self.edge = silicon_edge(cell.negative.ocp)
+        self.edge = silicon_edge(cell.negative)
         self.weights = [r.trusted.astype(float) / (ERROR_V * REPEATS**0.5) for r in records]
         bounds = [f.bounds for f in free] + [(-4.0, 4.0)] * (self.layout.size - len(free))
         self.low, self.high = np.array(bounds).T
@@ -167,8 +165,7 @@ class Model:
 
     def aged(self, cell: Cell, material: float, silicon: float) -> Cell:
         """The cell with these shares of its active material and of its silicon."""
-        ocp = with_silicon_left(cell.negative.ocp, self.edge, silicon)
-        return cell.with_negative(ocp=ocp).with_material(material)
+        return replace(cell, negative=with_silicon(cell.negative, self.edge, silicon)).with_material(material)
 
     def run(self, index: int, cell: Cell, x: Array, more: float = 1.0) -> SolvedRows:
         """A record's simulation.

@@ -1,8 +1,8 @@
 """The cell that a calibration writes: in one state of health, with full and empty as the records show them.
 
 A file is mostly simulated without a state of health. The fit is therefore of a cell in one state, from which each
-record may differ in active material and silicon within a prior. `capacities` and `silicon_shares` have what the cell
-has in each record, relative to the file's.
+record may differ in active material and silicon within a prior. `capacities` has the capacity of the cell in each
+record, relative to the file's.
 """
 
 from __future__ import annotations
@@ -14,9 +14,12 @@ import numpy as np
 from aesi.calibration.model import FitState, Model
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
-from aesi.physics.balance import same_rest
+from aesi.physics.balance import aged_range, same_rest
 from aesi.physics.cell import Cell
 from aesi.physics.initial_state import initial_state
+
+GRID = 20001
+"""States of charge between which the empty cell is interpolated, over all that both electrodes can have."""
 
 
 def written_cell(model: Model, x: Array) -> Cell:
@@ -31,14 +34,6 @@ def capacities(model: Model, x: Array) -> dict[str, float]:
     """Name of a record -> capacity of the cell in it, over that of the written cell."""
     written_ah = written_cell(model, x).capacity_ah
     return {r.name: cell_in_record(model, x, i).capacity_ah / written_ah for i, r in enumerate(model.records)}
-
-
-def silicon_shares(model: Model, x: Array) -> dict[str, float]:
-    """Name of a record -> capacity of the cell's silicon in it, over that of the written cell; empty where no record
-    could tell."""
-    if not model.layout.silicon:
-        return {}
-    return {r.name: model.silicon(i, x) for i, r in enumerate(model.records)}
 
 
 def cell_in_record(model: Model, x: Array, index: int) -> Cell:
@@ -94,5 +89,10 @@ def _as_aged(model: Model, x: Array, material: float, silicon: float) -> Cell:
     """The written cell with these shares of active material and silicon left."""
     cell = model.aged(model.cell_at(x), 1.0, silicon)
     # The windows of a fit are as wide as the start file's capacity, and its cell may be much larger than that.
-    cell = cell.emptied_at(cell.lower_voltage_v)
+    soc = np.linspace(*aged_range(cell, beyond=np.inf), GRID)
+    ocv = np.maximum.accumulate(cell.rest_voltage_v(soc))
+    empty = float(np.interp(cell.lower_voltage_v, ocv, soc))
+    n_1, p_1 = cell.stoichiometries(1.0)
+    n_0, p_0 = cell.stoichiometries(empty)
+    cell = cell.with_negative(theta_min=n_0, theta_max=n_1).with_positive(theta_min=p_1, theta_max=p_0)
     return replace(model.aged(cell, material, 1.0), nominal_capacity_ah=model.cell.nominal_capacity_ah)

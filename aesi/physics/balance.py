@@ -18,9 +18,11 @@ from scipy.optimize import brentq
 from aesi.errors import SimulationError
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
-from aesi.physics.cell.parts import EDGE, Balance, Soc
+from aesi.physics.cell.parts import Balance, Soc
 from aesi.physics.cell.relations import value_at
 
+EDGE = 1e-6
+"""Least distance of a stoichiometry from 0 and 1, where potentials have poles."""
 SOC_BEYOND = 0.05
 """Range of state of charge beyond full and empty in which roots are searched. GRID : points over that range, between
 which a root is bracketed."""
@@ -86,7 +88,7 @@ def _soc_at_same_rest(before: Balance, after: Balance, soc: float) -> float:
     def excess(z: float) -> float:
         return after.rest_voltage_at(z) - voltage
 
-    low, high = aged_range(after)
+    low, high = _aged_range(after)
     grid = np.linspace(low, high, GRID)
     above = after.rest_voltage_v(grid) >= voltage
     crossed = np.flatnonzero(above[1:] & ~above[:-1])  # a rest voltage rises with the charge
@@ -96,10 +98,18 @@ def _soc_at_same_rest(before: Balance, after: Balance, soc: float) -> float:
     return float(brentq(excess, grid[k], grid[k + 1], xtol=1e-13))
 
 
-def aged_range(balance: Balance) -> tuple[float, float]:
-    """States of charge at which both electrodes are within (0, 1), at most `SOC_BEYOND` outside the windows."""
-    low, high = balance.possible_soc()
-    return max(low, -SOC_BEYOND), min(high, 1.0 + SOC_BEYOND)
+def aged_range(cell: Cell, beyond: float = SOC_BEYOND) -> tuple[float, float]:
+    """States of charge at which both electrodes are within (0, 1), at most `beyond` outside the windows."""
+    return _aged_range(cell.balance, beyond)
+
+
+def _aged_range(balance: Balance, beyond: float = SOC_BEYOND) -> tuple[float, float]:
+    low, high = -beyond, 1.0 + beyond
+    (empty_n, full_n), (empty_p, full_p) = balance.window_n, balance.window_p
+    span_n, span_p = full_n - empty_n, empty_p - full_p
+    low = max(low, (EDGE - empty_n) / span_n, (empty_p - 1.0 + EDGE) / span_p)
+    high = min(high, (1.0 - EDGE - empty_n) / span_n, (empty_p - EDGE) / span_p)
+    return low, high
 
 
 def _sizes_ah(cell: Cell) -> tuple[float, float]:

@@ -166,11 +166,9 @@ def soh_sentences(given: HybridModel, soh: Soh | None) -> tuple[str, ...]:
             f"the saved model's cell has {given.soh:.3f} of its file's capacity, at which it was made{further}."
         )
     if isinstance(soh, date):
-        silicon = given.cell.silicon_on(soh)
-        of_silicon = "" if math.isclose(silicon, 1.0) else f" and {silicon:.3f} of its silicon's"
         said.append(
-            f"the cell as of {soh}: {given.cell.soh_on(soh):.3f} of its file's capacity{of_silicon}, by the records "
-            "that it was fitted to."
+            f"the cell as of {soh}: {given.cell.soh_on(soh):.3f} of its file's capacity, by the records that it was "
+            "fitted to."
         )
     return tuple(said)
 
@@ -184,12 +182,10 @@ def fitted_record_sentences(
     if share is None:
         return ()
     of_then = soh is None and round(share, 3) != 1.0
-    day = dict(cell.tested_on).get(record.name)
-    asked = f"{share:.3f}" if day is None else f"{day}"
     said = [
         f"{record.name}: the cell's file was fitted to a record of this name"
         + (
-            f", in which the cell had {share:.3f} of its capacity (--soh {asked} takes it)."
+            f", in which the cell had {share:.3f} of its capacity (--soh {share:.3f} takes it)."
             if of_then
             else "."
         )

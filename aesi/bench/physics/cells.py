@@ -34,7 +34,7 @@ import numpy as np
 
 from aesi.bench import some_chosen
 from aesi.bench.physics.archive import ARCHIVE
-from aesi.bench.physics.tested import day_of_test
+from aesi.bench.physics.tested import soh_on_its_day
 from aesi.constants import MV_PER_V
 from aesi.data.catalogue import HG2, LFP, M50T, NMC, PANASONIC, locate
 from aesi.data.read import read_measurement
@@ -202,10 +202,10 @@ def _figures(cells: Path, record: MeasuredRecord, porous: bool) -> dict[str, Any
             runs["with_temperature"] = free_run(cell, data)
             if porous:
                 runs["porous"] = free_run(cell, data, "dfn")
-        day = day_of_test(cell, record.data, record.name)
-        if day is not None:
-            out["soh"] = round(cell.soh_on(day), 3)
-            runs["aged"] = free_run(cell.with_soh(day), data)
+        soh = soh_on_its_day(cell, record.data, record.name)
+        if soh is not None:
+            out["soh"] = round(soh, 3)
+            runs["aged"] = free_run(cell.with_soh(soh), data)
         if record in ARCHIVED and (cells / f"{calibrated}{COLD}.bpx.json").is_file():
             cold = cell_of(cells, record.data, calibrated + COLD)
             runs["cold"] = free_run(cold, data)

@@ -1,6 +1,7 @@
-"""The day on which each measured record was tested.
+"""The day on which each measured record was tested, and the state of health of the cell on that day.
 
-The dates of the Panasonic NCR18650PF are in the names of its published files. Those of
+The state of health is that of `Cell.soh_on`. A day before the first or after the last one that the cell file knows is
+taken as the first or the last. The dates of the Panasonic NCR18650PF are in the names of its published files. Those of
 the LG 18650HG2 are the first time stamps of its published files; for 25degC_la92, mixed1 to mixed3, 40degC_la92 and
 0degC_mixed1 they are the day of the neighbouring tests of the same series. The dates are part of the data, as
 temperatures are; no fit chose them.
@@ -52,13 +53,11 @@ TESTED = {
 """Data set -> record -> day of the test, YYYY-MM-DD."""
 
 
-def day_of_test(cell: Cell, data: str, record: str) -> date | None:
-    """The day of a record, for `Cell.with_soh`; None if it is unknown or the cell's file knows no days.
-
-    A day before the first or after the last one that the file knows is taken as the first or the last.
-    """
+def soh_on_its_day(cell: Cell, data: str, record: str) -> float | None:
+    """State of health of the cell on the day of a record, as a share of the file's capacity; None if the day of the
+    record is unknown or the file has no dated states of health."""
     day = TESTED.get(data, {}).get(record) or ARCHIVE.get(data, {}).get(record)
     known = [one for _, one in cell.tested_on]
     if day is None or not known:
         return None
-    return min(max(date.fromisoformat(day), min(known)), max(known))
+    return cell.soh_on(min(max(date.fromisoformat(day), min(known)), max(known)))

@@ -6,9 +6,7 @@ interpolated linearly,
 
     soh(t) = soh_k + (soh_{k+1} - soh_k) (t - t_k)/(t_{k+1} - t_k)                                             (1)
 
-with the mean of the records of one day. Before the first day and after the last it is unknown. Where the calibration
-could tell how much silicon the cell had (`aesi.physics.cell.silicon`), the logarithm of its share is interpolated in
-the same way, as in the fit; what else the capacity then lacks was lost as active material.
+with the mean of the records of one day. Before the first day and after the last it is unknown.
 
 Left out: ageing by use and not by days, information of a record itself on its cell's capacity, and the day of the
 file's own state where no record has that day.

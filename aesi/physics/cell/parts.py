@@ -17,14 +17,8 @@ from aesi.errors import CellError
 from aesi.numerics.typing import Array
 from aesi.physics.cell.health import Soh, checked_soh, day_of, shares_by_day
 from aesi.physics.cell.relations import Constant, Relation, hashed_once, value_at
-from aesi.physics.cell.silicon import silicon_edge, with_silicon_left
 
 Soc = TypeVar("Soc", float, Array)
-
-EDGE = 1e-6
-"""Least distance of a stoichiometry from 0 and 1, where potentials have poles."""
-EMPTY_GRID = 20001
-"""States of charge between which an empty end is interpolated, over all that both electrodes can have."""
 
 NO_ENTROPY = Constant(0.0)
 NO_FILM = Constant(0.0)
@@ -38,10 +32,8 @@ HEAT_TRANSFER = "Heat transfer coefficient [W.m-2.K-1]"
 FITTED_WITH = {model: f"Fitted with {model}" for model in ("espm", "dfn")}
 """Fields of `fitted_with`, one of them 1: the standard takes numbers there, and reads words as formulas."""
 CAPACITY_SHARES = "Capacity share by record"
-SILICON_SHARES = "Silicon share by record"
 TESTED_ON = "Day of test by record [YYYYMMDD]"
-"""The fields of `capacity_shares`, `silicon_shares` and `tested_on` in the user-defined section; days as numbers, see
-`FITTED_WITH`."""
+"""The fields of `capacity_shares` and `tested_on` in the user-defined section; days as numbers, see `FITTED_WITH`."""
 FITTED_AT = "Mean temperature by record [K]"
 """The field of `fitted_at_k` in the user-defined section."""
 FILM_RESISTANCES = {side: f"{side} electrode film resistance [Ohm.m2]" for side in ("Negative", "Positive")}
@@ -132,15 +124,6 @@ class Balance:
         (empty_n, full_n), (empty_p, full_p) = self.window_n, self.window_p
         return empty_n + soc * (full_n - empty_n), empty_p - soc * (empty_p - full_p)
 
-    def possible_soc(self) -> tuple[float, float]:
-        """Least and most state of charge at which both electrodes are within (0, 1)."""
-        (empty_n, full_n), (empty_p, full_p) = self.window_n, self.window_p
-        span_n, span_p = full_n - empty_n, empty_p - full_p
-        return (
-            max((EDGE - empty_n) / span_n, (empty_p - 1.0 + EDGE) / span_p),
-            min((1.0 - EDGE - empty_n) / span_n, (empty_p - EDGE) / span_p),
-        )
-
     def rest_voltage_v(self, soc: float | Array) -> Array:
         """(n,) V at the reference temperature."""
         theta_n, theta_p = self.stoichiometries(np.atleast_1d(np.asarray(soc, dtype=float)))
@@ -163,7 +146,6 @@ class CellParameters:
     contact_resistance_ohm : in series with the whole cell, of metal, independent of temperature.
     fitted_with : "espm" or "dfn", the model that the parameters were fitted with; '' where they were not fitted.
     capacity_shares : (record, capacity of the cell then over the capacity in the file), for the records of that fit.
-    silicon_shares : (record, capacity of the cell's silicon then over that in the file), where the fit could tell it.
     tested_on : (record, day of its test), where known.  fitted_at_k : (record, its mean temperature, K).
     unread : sentences on declarations of the file that no simulation uses (a hysteresis, a state of ageing).
     """
@@ -190,7 +172,6 @@ class CellParameters:
     contact_resistance_ohm: float = 0.0
     fitted_with: str = ""
     capacity_shares: tuple[tuple[str, float], ...] = ()
-    silicon_shares: tuple[tuple[str, float], ...] = ()
     tested_on: tuple[tuple[str, date], ...] = ()
     fitted_at_k: tuple[tuple[str, float], ...] = ()
     name: str = "cell"
@@ -289,18 +270,13 @@ class CellParameters:
         return replace(self, electrolyte=replace(self.electrolyte, **changes))
 
     def with_soh(self, soh: Soh) -> Self:
-        """The cell at a state of health.
+        """The cell at a state of health, see `with_material`.
 
-        soh : remaining share of the file's capacity, lost as active material alone, see `with_material`; or a day, with
-        the capacity and the silicon of that day.
+        soh : remaining share of the file's capacity, or a day, for the share of that day.
         Raises CellError as `checked_soh` and `soh_on` do.
         """
         checked = checked_soh(soh)
-        if not isinstance(checked, date):
-            return self.with_material(checked)
-        then_ah = self.soh_on(checked) * self.capacity_ah
-        aged = self.with_silicon(self.silicon_on(checked))
-        return aged.with_material(then_ah / aged.capacity_ah)
+        return self.with_material(self.soh_on(checked) if isinstance(checked, date) else checked)
 
     def soh_on(self, day: date) -> float:
         """Capacity of the cell on a day over the capacity in its file, from the records that it was fitted to
@@ -323,14 +299,6 @@ class CellParameters:
             )
         return float(np.interp(at.toordinal(), [known.toordinal() for known in days], shares))
 
-    def silicon_on(self, day: date) -> float:
-        """Capacity of the cell's silicon on a day over that in its file (`health`); 1 where no fit could tell it."""
-        days, shares = shares_by_day(self.silicon_shares, dict(self.tested_on))
-        if not days:
-            return 1.0
-        at = day_of(day).toordinal()
-        return float(np.exp(np.interp(at, [known.toordinal() for known in days], np.log(shares))))
-
     def with_material(self, share: float) -> Self:
         """The cell with this share of its active material and of the lithium in it, the same in both electrodes, so
         that the stoichiometry limits stay. Its `capacity_shares` become relative to the new capacity."""
@@ -341,30 +309,6 @@ class CellParameters:
         return replace(
             changed, capacity_shares=tuple((name, then / share) for name, then in self.capacity_shares)
         )
-
-    def with_silicon(self, share: float) -> Self:
-        """The cell with this share of its silicon's capacity (`aesi.physics.cell.silicon`): full as before, and empty
-        at the same rest voltage. Its `capacity_shares` and `silicon_shares` become relative to what it has then."""
-        if share == 1.0:
-            return self
-        ocp = self.negative.ocp
-        aged = self.with_negative(ocp=with_silicon_left(ocp, silicon_edge(ocp), share))
-        aged = aged.emptied_at(self.balance.rest_voltage_at(0.0))
-        left = aged.capacity_ah / self.capacity_ah
-        return replace(
-            aged,
-            capacity_shares=tuple((name, then / left) for name, then in self.capacity_shares),
-            silicon_shares=tuple((name, then / share) for name, then in self.silicon_shares),
-        )
-
-    def emptied_at(self, voltage_v: float) -> Self:
-        """The cell whose state of charge 0 is where it rests at a voltage, V; full stays. Where it does not rest that
-        low, an electrode that is used up is its empty end."""
-        balance = self.balance
-        soc = np.linspace(*balance.possible_soc(), EMPTY_GRID)
-        empty = float(np.interp(voltage_v, np.maximum.accumulate(balance.rest_voltage_v(soc)), soc))
-        (n_0, p_0), (n_1, p_1) = balance.stoichiometries(empty), balance.stoichiometries(1.0)
-        return self.with_negative(theta_min=n_0, theta_max=n_1).with_positive(theta_min=p_1, theta_max=p_0)
 
 
 def require_positive(what: str, values: Mapping[str, float]) -> None:

@@ -59,7 +59,7 @@ class OpenCircuit:
     ) -> None:
         self.cell, self.name, self.potentials_v = cell, name, potentials_v
         self.kelvin = cell.initial_temperature_k if kelvin is None else kelvin
-        self.soc = np.linspace(*aged_range(cell.balance), GRID)
+        self.soc = np.linspace(*aged_range(cell), GRID)
         self.ocv = np.maximum.accumulate(_ocv(cell, self.soc, self.kelvin))
 
     @classmethod

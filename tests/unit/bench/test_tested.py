@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from aesi.bench.physics.cells import RECORDS
-from aesi.bench.physics.tested import TESTED, day_of_test
+from aesi.bench.physics.tested import TESTED, soh_on_its_day
 from aesi.data.catalogue import HG2, PANASONIC
 from aesi.physics import Cell
 
@@ -22,19 +22,23 @@ def cell() -> Cell:
     return replace(bare, capacity_shares=shares, tested_on=days)
 
 
-def test_a_record_has_its_day(cell):
-    assert day_of_test(cell, PANASONIC, "0degC_hppc") == date(2017, 5, 20)
-    assert day_of_test(cell, PANASONIC, "0degC_cycle_1") == date(2017, 5, 30)
+def test_a_record_of_the_calibration_has_its_own_share(cell):
+    assert soh_on_its_day(cell, PANASONIC, "0degC_hppc") == pytest.approx(0.97)
 
 
-def test_before_the_first_and_after_the_last_it_is_that_of_these(cell):
-    assert day_of_test(cell, PANASONIC, "25degC_1c_start") == date(2017, 3, 11)
-    assert day_of_test(cell, PANASONIC, "n10degC_cycle_1") == date(2017, 6, 7)
+def test_between_two_records_capacity_falls_evenly_with_the_days(cell):
+    # 30 May is 10 of the 18 days from 20 May to 7 June.
+    assert soh_on_its_day(cell, PANASONIC, "0degC_cycle_1") == pytest.approx(0.97 - 0.018 * 10 / 18)
 
 
-def test_where_no_day_is_known_there_is_none(cell):
-    assert day_of_test(cell, PANASONIC, "unknown") is None
-    assert day_of_test(replace(cell, tested_on=()), PANASONIC, "0degC_hppc") is None
+def test_before_the_first_and_after_the_last_it_stays(cell):
+    assert soh_on_its_day(cell, PANASONIC, "25degC_1c_start") == pytest.approx(1.0)
+    assert soh_on_its_day(cell, PANASONIC, "n10degC_cycle_1") == pytest.approx(0.952)
+
+
+def test_where_no_day_or_no_share_is_known_there_is_none(cell):
+    assert soh_on_its_day(cell, PANASONIC, "unknown") is None
+    assert soh_on_its_day(replace(cell, tested_on=()), PANASONIC, "0degC_hppc") is None
 
 
 def test_every_record_of_a_dated_set_has_its_day():

@@ -457,11 +457,6 @@ def test_a_temperature_of_0_in_a_file_was_taken_for_25_degc(content, name):
         ({"Contact resistance [Ohm]": -0.03}, "-0.03 has to be a number from 0 on"),
         ({"Contact resistance [Ohm]": 5}, "takes 25 V at 5 A, more than the 1.7 V .* 5 mOhm is 0.005"),
         ({"Capacity share by record": {"a": 95}}, "a = 95 is no share of the file's capacity; 95 % is 0.95"),
-        (
-            {"Capacity share by record": {"a": 0.9}, "Silicon share by record": {"a": 95}},
-            "Silicon share by record: a = 95 is no share of the file's silicon; 95 % is 0.95",
-        ),
-        ({"Silicon share by record": {"a": 0.9}}, "Silicon share by record: a has no share of the capacity"),
         ({"Fitted with espm": 7}, "Fitted with espm = 7 has to be 1 or 0"),
         ({"Fitted with espm": 1, "Fitted with dfn": 1}, "are both 1; leave the one"),
         (
@@ -634,46 +629,6 @@ def test_a_cell_at_a_state_of_health_had_that_of_a_day_taken_off_twice(dated, lg
     assert aged.with_soh(date(2017, 3, 11)).capacity_ah == pytest.approx(1.01 * lg_m50.capacity_ah)
 
 
-@pytest.fixture
-def silicon(dated):
-    return replace(dated, silicon_shares=(("begin", 1.0), ("cold", 0.6), ("end", 0.6)))
-
-
-def test_a_day_takes_off_the_silicon_that_was_lost_by_then_and_the_rest_as_material(silicon):
-    aged = silicon.with_soh(date(2017, 3, 20))
-    assert aged.capacity_ah == pytest.approx(0.97 * silicon.capacity_ah)
-    # graphite is held until the same charge from full, whatever the material; empty rests at the same voltage
-    assert aged.rest_voltage_v(np.array([0.0, 1.0])) == pytest.approx(
-        silicon.rest_voltage_v(np.array([0.0, 1.0])), abs=1e-3
-    )
-    lost = silicon.with_silicon(0.6)
-    material = 0.97 * silicon.capacity_ah / lost.capacity_ah
-    assert lost.capacity_ah < silicon.capacity_ah
-    discharged_ah = np.linspace(0.0, 0.6 * silicon.capacity_ah, 7)
-    soc_new = 1.0 - discharged_ah / silicon.capacity_ah
-    soc_then = 1.0 - material * discharged_ah / aged.capacity_ah
-    assert aged.rest_voltage_v(soc_then) == pytest.approx(silicon.rest_voltage_v(soc_new), abs=2e-4)
-    assert aged.negative.c_max_mol_m3 == pytest.approx(material * silicon.negative.c_max_mol_m3)
-
-
-def test_between_two_days_the_logarithm_of_the_silicons_share_runs_evenly(silicon, dated):
-    assert silicon.silicon_on(date(2017, 3, 20)) == pytest.approx(0.6)
-    assert silicon.silicon_on(date(2017, 3, 14)) == pytest.approx(0.6 ** (3 / 9))
-    assert dated.silicon_on(date(2017, 3, 14)) == 1.0
-
-
-def test_silicon_was_not_lost_twice_by_a_cell_at_a_state_of_health(silicon):
-    aged = Cell.from_bpx(silicon.with_soh(date(2017, 3, 20)).to_bpx())
-    again = aged.with_soh(date(2017, 3, 30))
-    assert aged.silicon_on(date(2017, 3, 30)) == pytest.approx(1.0)
-    assert again.capacity_ah == pytest.approx(0.952 * silicon.capacity_ah, rel=1e-6)
-    assert dict(aged.capacity_shares)["begin"] == pytest.approx(1.02 / 0.97)
-
-
-def test_a_share_is_lost_as_material_alone(silicon, lg_m50):
-    assert silicon.with_soh(0.9).negative == lg_m50.with_soh(0.9).negative
-
-
 @pytest.mark.parametrize("day", [date(2017, 3, 10), date(2017, 3, 31)])
 def test_what_the_file_does_not_know_of_a_day_is_not_made_up(dated, day):
     with pytest.raises(CellError, match=r"knows its cell from 2017-03-11 to 2017-03-30; give the share"):
@@ -712,10 +667,7 @@ def test_what_is_neither_a_share_nor_a_day_is_refused(text):
     [
         ({"july": 170731}, "july = 170731 is no day; 13 November 2018 is 20181113"),
         ({"july": 20171331}, "july = 20171331 is no day"),
-        (
-            {"august": 20170831},
-            "august has no share of the capacity; give it one in 'Capacity share by record'",
-        ),
+        ({"august": 20170831}, "august has no share of the capacity; give it one in"),
         (20170731, "has to hold a number for each record"),
     ],
 )

@@ -1,7 +1,6 @@
 """What several records have in common is said once."""
 
 from dataclasses import replace
-from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -152,10 +151,6 @@ def test_what_a_fit_took_out_of_the_current_of_a_slow_cycle_was_told_by_its_repo
     )
     first, zero = fitted_record_sentences(cell, cycle, None)
     assert first.endswith("in which the cell had 0.974 of its capacity (--soh 0.974 takes it).")
-    dated = replace(cell, tested_on=(("c20", date(2018, 11, 27)),))
-    assert fitted_record_sentences(dated, cycle, None)[0].endswith(
-        "of its capacity (--soh 2018-11-27 takes it)."
-    )
     assert zero.startswith("c20: nearly full at both ends")
     assert float(zero.rpartition("offset_a=")[2].removesuffix(" does.")) == pytest.approx(offset, rel=0.1)
     taken = CATALOGUE["current_sensor_offset"].activate(offset_a=offset)

@@ -20,7 +20,6 @@ from aesi.physics.cell.parts import (
     FITTED_AT,
     HEAT_TRANSFER,
     RATE_FACTORS,
-    SILICON_SHARES,
     TESTED_ON,
     THERMAL_CONDUCTIVITY,
     CellParameters,
@@ -109,7 +108,7 @@ def check_values(cell: CellParameters, where: str) -> None:
 
 
 def _check_own_fields(cell: CellParameters, what: str) -> None:
-    """Check contacts, films, double layers and rate factors, and the capacities, silicon and days of records."""
+    """Check contacts, films, double layers and rate factors, and the capacities and days of records."""
     # A cell whose contacts drop the whole voltage window at 1C would be useless at any size. Those of the shipped files
     # drop 0.001 to 0.02 of the window; with milliohms read as ohms it would be 1.5 to 20 times the window.
     drop_v = cell.contact_resistance_ohm * cell.nominal_capacity_ah
@@ -127,23 +126,17 @@ def _check_own_fields(cell: CellParameters, what: str) -> None:
             electrode.film_ohm_m2, stoichiometry, f"{what}: {FILM_RESISTANCES[side]}", "", none=True
         )
         _check_surface(cell, electrode, side, window_v, what)
-    for field, shares, whole in (
-        (CAPACITY_SHARES, cell.capacity_shares, "capacity"),
-        (SILICON_SHARES, cell.silicon_shares, "silicon"),
-    ):
-        for name, share in shares:
-            if not 1.0 / OTHER_UNIT <= share <= OTHER_UNIT:
-                raise CellError(
-                    f"{what}: {field}: {name} = {share:g} is no share of the file's {whole}; 95 % is 0.95."
-                )
-    known = dict(cell.capacity_shares)
-    for field, names in ((TESTED_ON, dict(cell.tested_on)), (SILICON_SHARES, dict(cell.silicon_shares))):
-        without = [name for name in names if name not in known]
-        if without:
+    for name, share in cell.capacity_shares:
+        if not 1.0 / OTHER_UNIT <= share <= OTHER_UNIT:
             raise CellError(
-                f"{what}: {field}: {without[0]} has no share of the capacity; give it one in {CAPACITY_SHARES!r}, or "
-                "take it out."
+                f"{what}: {CAPACITY_SHARES}: {name} = {share:g} is no share of the file's capacity; 95 % is 0.95."
             )
+    without = [name for name, _ in cell.tested_on if name not in dict(cell.capacity_shares)]
+    if without:
+        raise CellError(
+            f"{what}: {TESTED_ON}: {without[0]} has no share of the capacity; give it one in {CAPACITY_SHARES!r}, or "
+            "take its day out."
+        )
 
 
 def _check_surface(cell: CellParameters, electrode: Electrode, side: str, window_v: float, what: str) -> None:

@@ -16,7 +16,6 @@ from aesi.physics.cell.parts import (
     INITIAL_SOC,
     NO_FILM,
     RATE_FACTORS,
-    SILICON_SHARES,
     TESTED_ON,
     THERMAL_CONDUCTIVITY,
     UNITY,
@@ -90,7 +89,6 @@ def _own_fields(cell: CellParameters) -> dict[str, Any]:
         THERMAL_CONDUCTIVITY: cell.thermal_conductivity_w_m_k,
         **{field: float(model == cell.fitted_with) for model, field in FITTED_WITH.items()},
         CAPACITY_SHARES: dict(cell.capacity_shares),
-        SILICON_SHARES: dict(cell.silicon_shares),
         TESTED_ON: {name: int(f"{day:%Y%m%d}") for name, day in cell.tested_on},
         FITTED_AT: dict(cell.fitted_at_k),
     }
