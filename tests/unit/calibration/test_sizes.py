@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +15,7 @@ from aesi.pipeline.calibrate import start_at_size
 from aesi.pipeline.discovery.discover import Case
 from aesi.pipeline.experiment.config import parse_experiment
 from aesi.pipeline.experiment.load import _on_grid
+from aesi.pipeline.experiment.sources import Sources
 from aesi.pipeline.product.declared import declared_model
 from aesi.records import Measurement
 
@@ -106,9 +106,7 @@ def test_an_experiment_took_a_record_of_another_cell_without_a_word(m50):
         {"name": "x", "data": {"kind": "virtual", "dt_s": 180.0}, "cell": {"bpx": str(FILE), "soc0": 1.0}}
     )
     small = discharge(m50, "small", 2.75, 0.05, n=401)
-    sources = SimpleNamespace(
-        records={"small": (small, None)}, roles={"train": ["small"], "valid": [], "test": []}
-    )
+    sources = Sources({"small": small}, {"train": ("small",), "valid": (), "test": ()})
     _, _, notes = _on_grid(config, declared_model(FILE), sources)
     assert [
         note for note in notes if note.startswith("small: a full discharge takes 2.75 Ah, and the file of")
