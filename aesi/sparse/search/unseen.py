@@ -16,6 +16,7 @@ from aesi.errors import DataError
 from aesi.numerics.blocks import Span
 from aesi.numerics.typing import Array
 from aesi.records import HeldOutDrive
+from aesi.records.checked import row_words
 from aesi.sparse.terms.scaling import Scaling
 
 
@@ -50,9 +51,20 @@ def refits_physics_per_fold(drives: bool, feedback: bool, parts: int, folds: int
 def unseen_errors(
     left_out: Sequence[HeldOutDrive], scaling: Scaling, error: Array, target: Array, folds: Sequence[Span]
 ) -> UnseenErrors:
-    """Errors of the physics fitted without each fold; where `left_out` is empty, `error` and `target` as they are."""
+    """Errors of the physics fitted without each fold; where `left_out` is empty, `error` and `target` as they are.
+
+    Raises DataError for the first of these errors that is not finite.
+    """
     if not left_out:
         return UnseenErrors(np.empty((0, len(target))), error, target)
+    for number, each in enumerate(left_out, start=1):
+        for place, error_v in enumerate(each.errors_v, start=1):
+            if not np.isfinite(error_v).all():
+                row = int(np.flatnonzero(~np.isfinite(error_v))[0])
+                raise DataError(
+                    f"under the physics fitted without part {number} of the training records the error of training "
+                    f"record {place} is not a number in {row_words(row)}."
+                )
     before, after = (
         np.stack(
             [

@@ -95,3 +95,14 @@ def test_one_fold_that_drifts_away_does_not_set_the_memory():
     noise[1] += np.linspace(0.0, 10.0, len(noise[1]))
     given = [honest.unseen_target[a:b] - left for (a, b), left in zip(honest.folds, noise, strict=True)]
     assert memory_of(honest, given) == pytest.approx(0.0, abs=0.1)
+
+
+def test_an_error_that_is_none_under_physics_fitted_without_a_part_is_told():
+    left = left_out()
+    lacking = left[1].errors_v[2].copy()
+    lacking[17] = np.nan
+    left[1] = replace(left[1], errors_v=(*left[1].errors_v[:2], lacking))
+    with pytest.raises(
+        DataError, match=r"without part 2 .* the error of training record 3 is not a number in row 18"
+    ):
+        problem(left)
