@@ -50,8 +50,6 @@ def fetch(remote: Remote, folder: Path) -> Path:
                 record = read(raw, Reading(remote.columns, sign=remote.sign), max_rows=None)
                 write_csv(ready, record.to_frame())
             os.replace(ready, target)
-    except DataError:
-        raise
     except OSError as error:
         raise DataError(not_written(target, error)) from None
     return target
