@@ -59,7 +59,7 @@ class RefittedForest:
     ) -> RefittedIntervals:
         """The method with the end of the calibration residuals, one (n_i,) array per record, V. No current is used.
 
-        Raises InputError as `Method.fit`, FitError where no record holds two windows without a gap.
+        Raises InputError and FitError as `Method.fit`, and FitError where no record holds two windows without a gap.
         """
         self.check(alpha, window)
         records = checked_records(residuals)

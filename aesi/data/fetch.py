@@ -50,17 +50,21 @@ def fetch(remote: Remote, folder: Path) -> Path:
                 record = read(raw, Reading(remote.columns, sign=remote.sign), max_rows=None)
                 write_csv(ready, record.to_frame())
             os.replace(ready, target)
-    except DataError:
-        raise
     except OSError as error:
         raise DataError(not_written(target, error)) from None
     return target
 
 
 def _download(remote: Remote, folder: Path) -> Path:
+    """Path of the file as it is at its address, below the folder.
+
+    Raises DataError for another content, DataAway where the address cannot be reached or answers with an error, OSError
+    where the folder cannot take the file.
+    """
     import logging
 
     import pooch
+    from requests import RequestException
 
     pooch.get_logger().setLevel(logging.WARNING)
     try:
@@ -78,8 +82,7 @@ def _download(remote: Remote, folder: Path) -> Path:
             f"{remote.url} holds another file than expected (its SHA-256 is not {remote.sha256[:12]}...); "
             "it was not kept."
         ) from None
-    except OSError as error:
-        # requests' errors are OSErrors
+    except (RequestException, ConnectionError, TimeoutError) as error:
         raise DataAway(
             f"{remote.name} cannot be fetched from {remote.url} ({type(error).__name__}): connect to the network "
             "and try again, or set AESI_DATA to a folder that holds the data set.",

@@ -52,10 +52,10 @@ class ExperimentJob:
         loaded = self._load()
         config = loaded.config  # that of the fallback where it fell back to one
         folder = environment.run_folder(config.name, self.tracker.run_id)
-        problem = self._begin(loaded, config, folder)
-        found = self._search(loaded, config, problem)
+        problem = self._begin(loaded, folder)
+        found = self._search(loaded, problem)
         models = self._fit(found, config, problem)
-        fitted = self._band(models, found, config, problem, loaded)
+        fitted = self._band(models, found, problem, loaded)
         evaluation = self._evaluate(fitted, found, problem, loaded)
         result = self._result(loaded, problem, found, models, fitted, evaluation)
         summary = self._report(folder, result, found)
@@ -68,15 +68,15 @@ class ExperimentJob:
             self.console.say(f"  {note}")
         return loaded
 
-    def _begin(self, loaded: Loaded, config: ExperimentConfig, folder: Path) -> Problem:
-        track_start(self.tracker, config, loaded, folder)
-        problem = self.run("library and resamples", lambda: build_problem(loaded, config))
+    def _begin(self, loaded: Loaded, folder: Path) -> Problem:
+        track_start(self.tracker, loaded, folder)
+        problem = self.run("library and resamples", lambda: build_problem(loaded, loaded.config))
         # Bad input has been refused by now, and a run that it refuses is taken back.
         self.console.say(f"run {self.tracker.run_id} {'resumed' if self.tracker.resumed else 'started'}")
         return problem
 
-    def _search(self, loaded: Loaded, config: ExperimentConfig, problem: Problem) -> StudyResult:
-        follow = CandidateTracker(self.tracker, config, loaded, problem)
+    def _search(self, loaded: Loaded, problem: Problem) -> StudyResult:
+        config, follow = loaded.config, CandidateTracker(self.tracker, loaded, problem)
         name = f"{config.name}, seed {config.seed} ({self.tracker.run_id[:8]})"
         found = self.run(
             "search",
@@ -113,15 +113,11 @@ class ExperimentJob:
         return models
 
     def _band(
-        self,
-        models: FinalModels,
-        found: StudyResult,
-        config: ExperimentConfig,
-        problem: Problem,
-        loaded: Loaded,
+        self, models: FinalModels, found: StudyResult, problem: Problem, loaded: Loaded
     ) -> tuple[Fitted, ...]:
+        config, left_out = loaded.config, loaded.left_out
         return self.run(
-            "intervals", lambda: conformalise(models.fitted, problem, found.chosen, config, loaded.left_out)
+            "intervals", lambda: conformalise(models.fitted, problem, found.chosen, config, left_out)
         )
 
     def _evaluate(

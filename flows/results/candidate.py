@@ -14,7 +14,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -132,20 +132,13 @@ def save(rebuilt: Rebuilt, out: Path) -> Path:
         only,
         rebuilt.left_out,
     )
-    model = HybridModel(
-        cell=rebuilt.declared.cell,
-        effects=rebuilt.declared.effects,
+    model = replace(
+        rebuilt.declared,
         correction=fitted.model,  # with the leverage that its fade and its bands ask for
         intervals=fitted.intervals,
         bands=fitted.bands,
         dt_s=rebuilt.config.data.dt_s,
         hold=rebuilt.config.data.hold,
-        soc0=rebuilt.declared.soc0,
-        model=rebuilt.declared.model,
-        held=rebuilt.declared.held,
-        beside=rebuilt.declared.beside,
-        soh=rebuilt.declared.soh,
-        fitted_to=rebuilt.declared.fitted_to,
     )
     model.save(out / MODEL)
     content = {

@@ -14,7 +14,6 @@ from aesi.logins import without_login
 from aesi.numerics.files.source_digest import source_digest
 from aesi.numerics.files.whole import write_whole
 from aesi.pipeline.experiment.candidate import ScoredCandidate
-from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.judging.reductions import valid_reductions, valid_shares
 from aesi.pipeline.experiment.load import Loaded
@@ -51,14 +50,16 @@ OF_A_MODEL = {"seconds": "fit_and_evaluation_s"}
 """Names for figures of the chosen model that would be taken for the run's own: a search takes longer."""
 
 
-def track_start(tracker: Tracker, config: ExperimentConfig, loaded: Loaded, folder: Path) -> None:
+def track_start(tracker: Tracker, loaded: Loaded, folder: Path) -> None:
     """Settings, versions and data of a run, as it is run: those of the fallback where it fell back to one.
 
+    folder : of the run, where what its candidates are made from is kept.
     Raises BegunOtherwise where a run that is gone on with was begun on other data or of another cell.
     """
+    config = loaded.config
     held = {"cell_digest": loaded.files, "data_digest": ", ".join(loaded.digests.values())}
     tracker.as_begun(held)
-    whole = _without_logins(loaded.config.model_dump(mode="json"))
+    whole = _without_logins(config.model_dump(mode="json"))
     content = {key: value for key, value in whole.items() if key not in NO_PARAMETERS}
     tracker.about(experiment_tags(f"{config.note}\n\n{HOW_TO_READ}".strip(), RUN_COLUMNS))
     tags = {NOTE: config.note, SETTING: loaded.setting, CODE: source_digest()}
@@ -106,15 +107,15 @@ def _without_logins(content: dict[str, Any]) -> dict[str, Any]:
 class CandidateTracker:
     """Logs a nested run a candidate."""
 
-    def __init__(self, tracker: Tracker, config: ExperimentConfig, loaded: Loaded, problem: Problem) -> None:
+    def __init__(self, tracker: Tracker, loaded: Loaded, problem: Problem) -> None:
         self._tracker = tracker
         self._problem = problem
         self._valid_shares = valid_shares(problem, loaded.left_out)
         self._shared = {
-            "seed": config.seed,
+            "seed": loaded.config.seed,
             "data_hashes": loaded.digests,
             "versions": versions(),
-            "resamples": config.search.resamples,
+            "resamples": loaded.config.search.resamples,
         }
 
     def __call__(self, number: int, genome: Genome, outcome: ScoredCandidate | Failed) -> None:

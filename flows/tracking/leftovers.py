@@ -27,4 +27,5 @@ def deliver_leftovers(store: Store, say: Callable[[str], None]) -> None:
             left = outbox.flush(FLUSH_S)
             outbox.close()
             if not left:
-                say(f"tracking: what run {folder.name[:8]} had left over is delivered.")
+                but = ", but for what the store refused" if outbox.refused else ""
+                say(f"tracking: what run {folder.name[:8]} had left over is delivered{but}.")

@@ -36,6 +36,7 @@ class Outbox:
 
     away : tells a passing failure (retried for ever) from an item the store refuses (put aside, and said).
     left : what an earlier process had put in and not delivered, in order.
+    refused : whether an item was put aside since this object was made, which the store refused.
     """
 
     def __init__(
@@ -54,6 +55,7 @@ class Outbox:
         self._failing_since: float | None = None
         self._tries = 0
         self._sending = False
+        self.refused = False
         folder.mkdir(parents=True, exist_ok=True)
         waiting = self._waiting()
         self.left: tuple[Item, ...] = tuple(json.loads(path.read_bytes()) for path in waiting)
@@ -155,6 +157,7 @@ class Outbox:
                     f"{refused}; {path} cannot be put aside ({first_line(blocked)}) and is tried again"
                 )
                 return False
+            self.refused = True
             self._say(f"tracking: {refused}; it is kept in {aside}.")
             return True
         self._tries = 0

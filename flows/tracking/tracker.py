@@ -11,6 +11,7 @@ import posixpath
 import re
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from hashlib import sha256
@@ -281,15 +282,16 @@ class Tracker:
         psutil.cpu_percent()
         while not self._stop.wait(SAMPLE_S):
             memory = psutil.virtual_memory()
-            self.metrics(
-                {
-                    "system/cpu_utilization_percentage": psutil.cpu_percent(),
-                    "system/system_memory_usage_megabytes": memory.used / 1e6,
-                    "system/system_memory_usage_percentage": memory.percent,
-                    "system/disk_usage_percentage": psutil.disk_usage("/").percent,
-                },
-                step,
-            )
+            reading = {
+                "system/cpu_utilization_percentage": psutil.cpu_percent(),
+                "system/system_memory_usage_megabytes": memory.used / 1e6,
+                "system/system_memory_usage_percentage": memory.percent,
+                "system/disk_usage_percentage": psutil.disk_usage("/").percent,
+            }
+            with suppress(
+                OSError
+            ):  # a full disk is told by the run itself, and may have room for the next reading
+                self.metrics(reading, step)
             step += 1
 
 

@@ -33,17 +33,15 @@ class ParquetTable:
         """The columns at the given positions; null becomes NaN."""
         import pyarrow as pa
 
-        names = [self.header[position] for position in positions]
-        for name in names:
-            kind = self._file.schema_arrow.field(name).type
+        for position in positions:
+            kind = self._file.schema_arrow.field(position).type
             if not (pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind)):
                 raise DataError(
-                    f"{self.path.name}: column {name!r} holds {kind}, not numbers, from row 1 on; "
-                    "store it as float64."
+                    f"{self.path.name}: column {self.header[position]!r} holds {kind}, not numbers, from row 1 on; "
+                    "store it as float64; times that are no numbers are declared: --unit time_s=h:m:s or =date."
                 )
-        table = self._columns(names)
         try:
-            return [_floats(table.column(name)) for name in names]
+            return [_floats(column) for column in self._columns(positions)]
         except pa.ArrowException as error:
             raise DataError(
                 f"{self.path.name} holds numbers that are no float64: {first_line(error)}"
@@ -51,17 +49,26 @@ class ParquetTable:
 
     def read_text(self, positions: tuple[int, ...]) -> list[list[str]]:
         """The columns at the given positions as words; null becomes ''."""
-        names = [self.header[position] for position in positions]
-        table = self._columns(names)
-        return [["" if v is None else str(v) for v in table.column(name).to_pylist()] for name in names]
+        return [
+            ["" if v is None else str(v).strip() for v in column.to_pylist()]
+            for column in self._columns(positions)
+        ]
 
-    def _columns(self, names: list[str]) -> Any:
+    def _columns(self, positions: tuple[int, ...]) -> list[Any]:
+        """The columns at the given positions, as pyarrow has them."""
         import pyarrow as pa
 
         try:
-            return self._file.read(columns=names)
+            table = self._file.read(columns=[self.header[position] for position in positions])
         except (pa.ArrowException, OSError, ValueError) as error:
             raise DataError(f"{self.path.name} is damaged: {first_line(error)}") from None
+        return [table.column(self._place_in(table, position)) for position in positions]
+
+    def _place_in(self, table: Any, position: int) -> int:
+        """The place in a table that was read by names, which has all columns of one, of that at a position."""
+        name = self.header[position]
+        alike: list[int] = table.schema.get_all_field_indices(name)
+        return alike[self.header[:position].count(name)]
 
     def where(self, row: int) -> str:
         """Parquet has rows, no lines."""

@@ -268,7 +268,7 @@ def _neighbours(path: Path) -> str:
 def _override(content: dict[str, Any], override: str) -> None:
     """Set a key of the mapping in place, from a text `a.b=value` with the value in YAML.  Raises ConfigError if the
     text cannot be read, or if a part of the key is a value without keys."""
-    import yaml
+    from aesi.pipeline.yaml_text import parse_yaml
 
     key, equals, text = override.partition("=")
     told = f"--set {without_logins(override)}"
@@ -276,9 +276,9 @@ def _override(content: dict[str, Any], override: str) -> None:
     if not equals or not all(parts):
         raise ConfigError(f"{told}: has to read key=value, for instance search.candidates=50.")
     try:
-        value = yaml.safe_load(text)
-    except yaml.YAMLError:
-        raise ConfigError(f"{told}: {without_logins(text)!r} is not a YAML value.") from None
+        value = parse_yaml(text)
+    except ValueError as error:
+        raise ConfigError(f"{told}: {without_logins(text)!r} {without_logins(str(error))}") from None
     for depth, part in enumerate(parts[:-1]):
         child = content.setdefault(part, {})
         if isinstance(child, str) and part in SHORT_FOR:

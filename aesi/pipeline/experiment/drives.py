@@ -4,6 +4,7 @@ the training drives are left out in turn."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -39,34 +40,50 @@ def training_part(
 def cut_repeats(series: ErrorSeries, repeats: RepeatsConfig) -> Split:
     """The repeats of a record, by role. The last `valid_share` of each training repeat validates.
 
-    Raises DataError if the record does not contain a named repeat, or if a repeat has fewer than two rows.
+    Raises DataError as `rows_of_repeat`.
     """
     train, valid = [], []
     for number in repeats.train:
-        piece = _repeat(series, repeats.period_s, number)
-        cut = round(len(piece) * (1 - repeats.valid_share))
+        piece = _repeat(series, repeats, number)
+        cut = _trained(len(piece), repeats)
         train.append(piece.take(slice(0, cut)))
         if cut < len(piece):
             valid.append(piece.take(slice(cut, len(piece)), f"{piece.name}, end"))
-    test = [_repeat(series, repeats.period_s, number) for number in repeats.test]
+    test = [_repeat(series, repeats, number) for number in repeats.test]
     return Split(tuple(train), tuple(valid), tuple(test))
 
 
-def _repeat(series: ErrorSeries, period_s: float, number: int) -> ErrorSeries:
+def _repeat(series: ErrorSeries, repeats: RepeatsConfig, number: int) -> ErrorSeries:
     """The repeat with a number, counted from 1, of a record."""
-    start = series.time_s[0] + (number - 1) * period_s
-    low, high = np.searchsorted(series.time_s, [start, start + period_s])
-    if high - low < 2 and period_s < 2 * series.dt_s:
+    rows = rows_of_repeat(series.name, series.time_s, series.dt_s, repeats, number)
+    return series.take(rows, f"repeat {number}")
+
+
+def rows_of_repeat(name: str, time_s: Array, dt_s: float, repeats: RepeatsConfig, number: int) -> slice:
+    """The rows of the repeat with a number, counted from 1, of a record.
+
+    name : of the record, for the sentence.  time_s : (n,) s, every dt_s (s).
+    Raises DataError if the record does not contain that repeat, or if it has fewer than two rows.
+    """
+    period_s = repeats.period_s
+    start = time_s[0] + (number - 1) * period_s
+    low, high = np.searchsorted(time_s, [start, start + period_s])
+    if high - low < 2 and period_s < 2 * dt_s:
         raise DataError(
-            f"{series.name}: a repeat of {period_s:g} s holds no two rows {series.dt_s:g} s apart; give the period of "
-            "the schedule in seconds (repeats.period_s), or shorter steps (data.dt_s)."
+            f"{name}: a repeat of {period_s:g} s holds no two rows {dt_s:g} s apart; give the period of the schedule "
+            "in seconds (repeats.period_s), or shorter steps (data.dt_s)."
         )
     if high - low < 2:
         raise DataError(
-            f"{series.name} lasts {series.time_s[-1] - series.time_s[0]:.0f} s and has no repeat {number} of "
-            f"{period_s:g} s; take it out of `repeats`."
+            f"{name} lasts {time_s[-1] - time_s[0]:.0f} s and has no repeat {number} of {period_s:g} s; take it out of "
+            "`repeats`."
         )
-    return series.take(slice(int(low), int(high)), f"repeat {number}")
+    return slice(int(low), int(high))
+
+
+def _trained(rows: int, repeats: RepeatsConfig) -> int:
+    """Number of the first rows of a training repeat that train; the others validate."""
+    return round(rows * (1 - repeats.valid_share))
 
 
 WHOLE_REPEAT_SHARE = 0.99
@@ -92,17 +109,21 @@ def cut_short(time_s: Array, repeats: RepeatsConfig) -> list[str]:
 def training_drives(
     data: DataConfig, records: Mapping[str, FitRecord], roles: Mapping[Role, Sequence[str]]
 ) -> list[tuple[str, slice]]:
-    """(record, its rows) of each training drive, in the order of `Split.train`. Rows that validate are excluded."""
+    """(record, its rows) of each training drive, in the order of `Split.train`. Rows that validate are excluded.
+
+    Raises DataError as `rows_of_repeat`, of a repeat that tests too: what is fitted next takes minutes.
+    """
     if data.repeats is None:
         return [(name, slice(0, len(records[name].rows))) for name in roles["train"]]
-    (name, record), repeats = next(iter(records.items())), data.repeats
-    time = record.measurement.time_s
-    drives = []
-    for number in repeats.train:
-        begin = time[0] + (number - 1) * repeats.period_s
-        low, high = np.searchsorted(time, [begin, begin + repeats.period_s])
-        drives.append((name, slice(int(low), int(low + round((high - low) * (1 - repeats.valid_share))))))
-    return drives
+    ((name, record),) = records.items()
+    measured, repeats = record.measurement, data.repeats
+    rows_of = partial(rows_of_repeat, measured.name, measured.time_s, data.dt_s, repeats)
+    for number in repeats.test:
+        rows_of(number)
+    return [
+        (name, slice(rows.start, rows.start + _trained(rows.stop - rows.start, repeats)))
+        for rows in map(rows_of, repeats.train)
+    ]
 
 
 HALVES = 2

@@ -215,6 +215,20 @@ def test_what_waits_for_a_run_that_was_deleted_was_refused_item_by_item(store, w
     assert said == [f"tracking: what run {run_id[:8]} had left over is delivered."]
 
 
+def test_an_item_that_was_left_over_and_refused_was_called_delivered(store, workspace, said, monkeypatch):
+    monkeypatch.setattr("flows.tracking.outbox.RETRY_S", (0.01,))
+    run_id = store.create_run(store.experiment("small"), "small, seed 0", {})
+    box = workspace / ".aesi" / "outbox" / run_id
+    box.mkdir(parents=True)
+    (box / "00000001.json").write_text(json.dumps({"kind": "of a later version"}))
+    deliver_leftovers(store, said.append)
+    refused, delivered = said
+    assert "the store refused an item" in refused
+    assert delivered == (
+        f"tracking: what run {run_id[:8]} had left over is delivered, but for what the store refused."
+    )
+
+
 def _away(store, item, again):
     raise ConnectionError("away")
 

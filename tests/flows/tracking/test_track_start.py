@@ -39,7 +39,7 @@ def kept(tmp_path):
     config = parse_experiment(content)
     loaded = Loaded(Cell.from_bpx(NMC), "nmc", (), Split((), (), ()), LeftOutDrives(), {}, {}, (), config)
     tracker = Kept()
-    track_start(tracker, config, loaded, tmp_path)
+    track_start(tracker, loaded, tmp_path)
     return tracker
 
 

@@ -1,5 +1,6 @@
 """Public data sets: found on disk, fetched from a server on this machine, refused in one sentence."""
 
+import errno
 import functools
 import hashlib
 import http.server
@@ -12,7 +13,7 @@ import pytest
 
 from aesi.data import catalogue, read_measurement
 from aesi.data.fetch import Remote
-from aesi.errors import DataError
+from aesi.errors import DataAway, DataError
 
 RAW = "Time [s],I[A],U[V]\n" + "".join(
     f"{k},{i},{3.7 + 0.01 * i}\n" for k, i in enumerate([0.0, -5.0, 2.0, -4.0, 1.0, -5.0, 0.0])
@@ -93,6 +94,16 @@ def test_no_network_is_one_sentence(monkeypatch):
     with pytest.raises(DataError, match="connect to the network") as caught:
         catalogue.get("about_energy_nmc")
     assert "AESI_DATA" in str(caught.value)
+
+
+def test_a_disk_that_is_full_was_taken_for_no_network(server, tmp_path, monkeypatch):
+    def full(downloader, url, output_file, *more, **options):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(output_file))
+
+    monkeypatch.setattr("pooch.HTTPDownloader.__call__", full)
+    with pytest.raises(DataError, match=r"drive\.csv cannot be written: No space left on device\.") as caught:
+        catalogue.get("about_energy_nmc")
+    assert not isinstance(caught.value, DataAway)
 
 
 @pytest.mark.parametrize("name", ["about_energy_nmc", "lg_m50t_w8"])

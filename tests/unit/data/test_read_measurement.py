@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from aesi.data import read_measurement
@@ -83,6 +85,36 @@ def test_parquet_is_read_like_csv(tmp_path):
     frame = pd.DataFrame({"time_s": TIME, "current_a": CURRENT, "voltage_v": VOLTAGE})
     frame.to_parquet(tmp_path / "drive.parquet")
     assert_same(read_measurement(tmp_path / "drive.parquet"))
+
+
+def parquet(folder: Path, **columns) -> Path:
+    """The good record as Parquet, some of its columns replaced or added."""
+    path = folder / "drive.parquet"
+    pd.DataFrame({"time_s": TIME, "current_a": CURRENT, "voltage_v": VOLTAGE, **columns}).to_parquet(path)
+    return path
+
+
+def test_stamps_in_parquet_were_refused_without_the_unit_that_reads_them(tmp_path):
+    path = parquet(tmp_path, time_s=pd.date_range("2024-05-31", periods=N, freq="s"))
+    with pytest.raises(DataError, match=r"holds timestamp.*times that are no numbers are declared: .*=date"):
+        read(path, Reading())
+    assert_same(read(path, Reading(units={"time_s": "date"})))
+
+
+def test_a_blank_clock_time_in_parquet_was_a_time_of_another_form(tmp_path):
+    clock = [f"0:{k // 60:02d}:{k % 60:02d}" for k in range(N)]
+    clock[3] = " "
+    with pytest.raises(DataError, match="row 4, column time_s is empty"):
+        read(parquet(tmp_path, time_s=clock), Reading(units={"time_s": "h:m:s"}))
+
+
+def test_a_name_that_two_columns_of_a_parquet_file_share_was_an_unexpected_error(tmp_path):
+    words = np.where(CURRENT > 0, "discharge", "charge")
+    columns = {"time_s": TIME, "current_a": np.abs(CURRENT), "voltage_v": VOLTAGE, "state": words}
+    arrays = [*map(pa.array, columns.values()), pa.array(["-"] * N)]
+    pq.write_table(pa.Table.from_arrays(arrays, [*columns, "state"]), tmp_path / "drive.parquet")
+    with pytest.raises(DataError, match="column 'state' has the cell charged and discharged"):
+        read(tmp_path / "drive.parquet", Reading())
 
 
 def test_bdf_is_turned_to_discharge_positive(tmp_path):

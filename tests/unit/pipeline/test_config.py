@@ -1,6 +1,7 @@
 """Experiments: what passes, and the one sentence that what does not pass gets."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -252,6 +253,21 @@ def test_a_bad_override_is_one_sentence(tmp_path, override):
     with pytest.raises(ConfigError) as caught:
         read_experiment(path, [override])
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("note=2001-99-99", "--set note=2001-99-99: '2001-99-99' is not YAML: month must be in 1..12."),
+        ("note=!!int x", "--set note=!!int x: '!!int x' is not YAML: invalid literal for int() "),
+        ("cell={soc0: 0.1, soc0: 0.9}", "line 1, column 13: the key 'soc0' is there twice; keep one."),
+    ],
+)
+def test_an_override_that_is_not_yaml_was_a_bug_or_lost_a_key(tmp_path, override, words):
+    path = tmp_path / "x.yaml"
+    path.write_text("name: x\nseed: 1\ndata: {kind: files, train: [a.csv], test: [b.csv]}\n")
+    with pytest.raises(ConfigError, match=re.escape(words)):
+        read_experiment(path, [override])
 
 
 def test_a_missing_file_names_its_neighbour(tmp_path):
