@@ -38,16 +38,18 @@ def run(
     hybrid: bool = False,
     experiments: str = "experiments",
     archive: bool = False,
+    development: bool | None = None,
     porous: bool = False,
     write: str | None = None,
 ) -> Iterator[dict[str, Any]]:
     """One dict a record, and a last one with `summary`: true.
 
-    cells, only, archive, porous : see `aesi.bench.physics.cells.run`.  hybrid : add `hybrid_mv`, some minutes.
-    experiments : folder of the experiment files.  write : a page whose part between the two marks becomes the table.
+    cells, only, archive, development, porous : see `aesi.bench.physics.cells.run`.  hybrid : add `hybrid_mv`, some
+    minutes.  experiments : folder of the experiment files.  write : a page whose part between the two marks becomes the
+    table.
     """
     rows = []
-    for row in physics.run(cells, only, archive, porous):
+    for row in physics.run(cells, only, archive, development, porous):
         if hybrid and not row.get("summary") and row["cell"] in EXPERIMENTS and "error" not in row:
             row |= hybrid_figures(Path(experiments), row["cell"]).get(row["record"], {})
         rows.append(row)

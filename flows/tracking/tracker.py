@@ -288,9 +288,8 @@ class Tracker:
                 "system/system_memory_usage_percentage": memory.percent,
                 "system/disk_usage_percentage": psutil.disk_usage("/").percent,
             }
-            with suppress(
-                OSError
-            ):  # a full disk is told by the run itself, and may have room for the next reading
+            # A full disk is told by the run itself, and may have room for the next reading.
+            with suppress(OSError):
                 self.metrics(reading, step)
             step += 1
 

@@ -2,7 +2,8 @@
 
 The archive of a cell, as its authors publish it, has more records than the data set of the catalogue: other drives and
 other chamber temperatures of the same cell. No record below was looked at when the shipped cell files, the rules of a
-calibration and their constants were made; the file fitted in the cold (`cells.COLD`) is the one exception.
+calibration and their constants were made, but for the development half of `aesi bench cells`; the file fitted in the
+cold was fitted to two of that half.
 `aesi.data.catalogue.locate` finds the records in an unpacked archive by the names below. The day of a record is the
 first time stamp of its published file.
 """

@@ -18,9 +18,11 @@ records `held_from_s` gives the time, and `until_held_mv` the errors over the ro
 calibration of its file is marked `fitted`: its figure is no test. Published figures of others stand beside ours with
 their protocol; they were not computed here.
 
-With `archive` the records are those of the published archives (`aesi.bench.physics.archive`). A further figure (`cold`)
-is then that of the file that was also fitted to records of the archive in the cold, where there is one. Its figures on
-these records are marked and are left out of the medians.
+With `archive` the records are those of the published archives (`aesi.bench.physics.archive`). Further figures are then
+those of other files of the cell at the measured temperature, where there are such: of the file that was fitted at 25
+degC alone (`alone`), and of the file that was also fitted to records of the archive in the cold (`cold`). Figures of a
+file on records that it was fitted to are marked and are left out of the medians. Rules may be chosen on every second
+record of an archive, beginning with the first (`development`).
 """
 
 from __future__ import annotations
@@ -38,7 +40,7 @@ from aesi.bench.physics.tested import soh_on_its_day
 from aesi.constants import MV_PER_V
 from aesi.data.catalogue import HG2, LFP, M50T, NMC, PANASONIC, locate
 from aesi.data.read import read_measurement
-from aesi.errors import AesiError
+from aesi.errors import AesiError, InputError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, BoolArray
 from aesi.physics import Cell, ModelName, initial_state, simulate
@@ -89,8 +91,11 @@ with the data, None as the calibrated file that there is none."""
 NOMINAL_AH = {PANASONIC: 2.9, HG2: 3.0}
 """Nominal capacity as the maker states it, Ah, to which the start file of another cell is scaled."""
 
-COLD = "_cold"
-"""Suffix of the name of a calibrated file that was also fitted to records of the archive in the cold."""
+BESIDE = {"alone": "_25degc", "cold": "_cold"}
+"""Figure -> suffix of the calibrated file that it is of: fitted at 25 degC alone, and also fitted to records of the
+archive in the cold."""
+MODELS = ("declared", "calibrated", "with_temperature", "porous", "aged", *BESIDE)
+"""The figures of a record, each an entry `..._mv` of its row."""
 
 RECORDS = (
     *(MeasuredRecord(NMC, name, others_mv=mv, protocol=PUBLISHED) for name, mv in (
@@ -121,24 +126,28 @@ RECORDS = (
 )  # fmt: skip
 
 
-ARCHIVED = tuple(MeasuredRecord(data, name) for data, days in ARCHIVE.items() for name in days)
-
-
 def run(
     cells: str = "experiments/cells",
     only: Sequence[str] | str = (),
     archive: bool = False,
+    development: bool | None = None,
     porous: bool = False,
 ) -> Iterator[dict[str, Any]]:
     """One row per record, and a last row with `summary`: true.
 
     cells : folder of the cell files.  only : names of data sets or records; empty takes all.  archive : take the
-    records of the published archives in place of those of the data sets.  porous : add `porous_mv`, the error of the
-    porous-electrode model with the calibrated file at the measured temperature, which takes some seconds per record.
-    Raises InputError if a name in `only` is no data set and no record.
+    records of the published archives in place of those of the data sets.  development : of these, True takes those on
+    which rules may be chosen, False the others.  porous : add `porous_mv`, the error of the porous-electrode model with
+    the calibrated file at the measured temperature, which takes some seconds per record.
+    Raises InputError if a name in `only` is no data set and no record, and for `development` without `archive`.
     """
+    if development is not None and not archive:
+        raise InputError(
+            "cells: development chooses among the records of the archives; add --set archive=true."
+        )
     rows = []
-    for record in _chosen([only] if isinstance(only, str) else only, ARCHIVED if archive else RECORDS):
+    records = _of_archive(development) if archive else RECORDS
+    for record in _chosen([only] if isinstance(only, str) else only, records):
         row = judged(Path(cells), record, porous)
         rows.append(row)
         yield row
@@ -151,9 +160,29 @@ def run(
         "ran_out": sum(bool(r.get("ran_out")) for r in rows),
         "test_records": len(tests),
         "median_rmse_mv": float(np.median([best(r) for r in tests])) if tests else None,
+        "geometric_mean_mv": _geometric_means(tests),
         "others_printed": len(beaten),
         "below_others": sum(best(r) < r["others_mv"] for r in beaten),
     }
+
+
+def _of_archive(development: bool | None) -> list[MeasuredRecord]:
+    """The records of the archives: of each cell every second one, beginning with the first, for development, or the
+    others; None takes all."""
+    places = (
+        (place, MeasuredRecord(data, name)) for data in ARCHIVE for place, name in enumerate(ARCHIVE[data])
+    )
+    return [one for place, one in places if development is None or (place % 2 == 0) == development]
+
+
+def _geometric_means(rows: Sequence[dict[str, Any]]) -> dict[str, float]:
+    """Model -> the geometric mean of its RMS errors, mV, over the records that it was not fitted to."""
+    out = {}
+    for name in (f"{model}_mv" for model in MODELS):
+        figures = [row[name] for row in rows if row.get(name) and name not in row.get("fitted_mv", ())]
+        if figures:
+            out[name] = round(float(np.exp(np.mean(np.log(figures)))), 2)
+    return out
 
 
 def _chosen(only: Sequence[str], records: Sequence[MeasuredRecord]) -> list[MeasuredRecord]:
@@ -206,10 +235,11 @@ def _figures(cells: Path, record: MeasuredRecord, porous: bool) -> dict[str, Any
         if soh is not None:
             out["soh"] = round(soh, 3)
             runs["aged"] = free_run(cell.with_soh(soh), data)
-        if record in ARCHIVED and (cells / f"{calibrated}{COLD}.bpx.json").is_file():
-            cold = cell_of(cells, record.data, calibrated + COLD)
-            runs["cold"] = free_run(cold, data)
-            out["fitted_mv"] = ["cold_mv"] if record.name in dict(cold.fitted_at_k) else []
+        if measured is not None and record.name in ARCHIVE.get(record.data, {}):
+            others = _beside(cells, record.data, calibrated)
+            runs |= {name: free_run(other, data) for name, other in others.items()}
+            fitted = [name for name, other in others.items() if record.name in dict(other.fitted_at_k)]
+            out["fitted_mv"] = [f"{name}_mv" for name in fitted]
     if "windows" in record.protocol:
         out["windows_mv"] = windows_mv(cell, data)
     out |= {f"{name}_mv": run.rmse_mv for name, run in runs.items()}
@@ -237,6 +267,16 @@ def cell_of(cells: Path, data: str, name: str | None) -> Cell:
     return replace(
         cell, electrode_area_m2=cell.electrode_area_m2 * factor, nominal_capacity_ah=NOMINAL_AH[data]
     )
+
+
+def _beside(cells: Path, data: str, calibrated: str) -> dict[str, Cell]:
+    """Figure -> the cell file that it is of, for the further files of a data set (`BESIDE`) that are in the folder."""
+    paths = {name: cells / f"{calibrated}{suffix}.bpx.json" for name, suffix in BESIDE.items()}
+    return {
+        name: cell_of(cells, data, calibrated + BESIDE[name])
+        for name, path in paths.items()
+        if path.is_file()
+    }
 
 
 @dataclass(frozen=True, eq=False)

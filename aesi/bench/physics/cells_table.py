@@ -37,10 +37,15 @@ def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     return [*lines, "", *(f"[{k}] {text}.  " for k, text in enumerate(protocols, start=1))]
 
 
-HEADINGS = COLUMNS | {"porous_mv": "porous electrode", "cold_mv": "fitted in the cold"}
-JUDGED = ("declared_mv", "with_temperature_mv", "porous_mv", "aged_mv", "cold_mv")
-"""Keys of the columns for the records of the archives: start file, calibrated file with the single-particle and with
-the porous-electrode model, calibrated file at the state of health of the day, file fitted in the cold as well."""
+HEADINGS = COLUMNS | {
+    "porous_mv": "porous electrode",
+    "alone_mv": "fitted at 25 °C alone",
+    "cold_mv": "fitted in the cold",
+}
+JUDGED = ("declared_mv", "alone_mv", "with_temperature_mv", "porous_mv", "aged_mv", "cold_mv")
+"""Keys of the columns for the records of the archives: start file, file fitted at 25 degC alone, calibrated file with
+the single-particle and with the porous-electrode model, calibrated file at the state of health of the day, file fitted
+in the cold as well."""
 
 
 def archive_table(rows: Sequence[Mapping[str, Any]]) -> list[str]:

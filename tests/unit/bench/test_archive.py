@@ -4,12 +4,13 @@ from pathlib import PurePath
 
 import pytest
 
+from aesi.bench.physics import cells
 from aesi.bench.physics.archive import ARCHIVE, chamber, chamber_degc
-from aesi.bench.physics.cells import ARCHIVED, RECORDS
+from aesi.bench.physics.cells import RECORDS
 from aesi.bench.physics.cells_table import archive_table
 from aesi.bench.physics.tested import TESTED
 from aesi.data import catalogue
-from aesi.errors import DataError
+from aesi.errors import DataError, InputError
 
 PUBLISHED = {
     ("panasonic_ncr18650pf", "-20degC Trise/06-30-17_19.27 n20degC_trise_Cycle_1_Pan18650PF.mat"): (
@@ -51,8 +52,43 @@ def test_a_record_is_found_in_an_unpacked_archive(tmp_path, monkeypatch):
 
 def test_no_record_of_an_archive_is_one_of_the_sets_or_entered_a_calibration():
     known = {(record.data, record.name) for record in RECORDS}
-    assert not known & {(record.data, record.name) for record in ARCHIVED}
+    assert not known & {(data, name) for data, days in ARCHIVE.items() for name in days}
     assert all(not set(days) & set(TESTED[data]) for data, days in ARCHIVE.items())
+
+
+def test_rules_are_chosen_on_one_half_of_an_archive_and_judged_on_the_other(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("AESI_DATA", str(tmp_path))  # no record is here, and each gets its row all the same
+
+    def names(development):
+        return [
+            (row["cell"], row["record"])
+            for row in cells.run(archive=True, development=development)
+            if not row.get("summary")
+        ]
+
+    half, other = names(True), names(False)
+    assert not set(half) & set(other)
+    assert set(half) | set(other) == set(names(None))
+    assert ("lg_18650hg2", "40degC_556_us06") in half
+    assert ("panasonic_ncr18650pf", "25degC_hwftb") in other
+    with pytest.raises(InputError, match="add --set archive=true"):
+        next(cells.run(development=True))
+
+
+def test_files_fitted_to_other_records_of_a_cell_stand_beside_its_own(tmp_path, monkeypatch):
+    row = {"cell": "c", "record": "0degC_us06", "mean_degc": 1.0, "ran_out": {}, "with_temperature_mv": 20.0}
+    lines = archive_table([{**row, "declared_mv": 90.0, "aged_mv": 10.0, "alone_mv": 40.0}])
+    shown = "declared | fitted at 25 °C alone | with temperature | aged"
+    assert lines[0] == f"| cell | chamber | records | {shown} | ran out |"
+    assert lines[2] == "| c | 0 degC | 1 | 90.0 / 90.0 | 40.0 / 40.0 | 20.0 / 20.0 | 10.0 / 10.0 |  |"
+    monkeypatch.setattr(cells, "judged", lambda *_: judged.pop(0))
+    judged = [
+        {"with_temperature_mv": 10.0, "cold_mv": 3.0, "fitted": False, "fitted_mv": ["cold_mv"]},
+        {"with_temperature_mv": 40.0, "cold_mv": 8.0, "fitted": False},
+    ]
+    *_, summary = cells.run(only=["10degC_hppc", "0degC_hppc"])
+    assert summary["geometric_mean_mv"] == {"with_temperature_mv": 20.0, "cold_mv": 8.0}
 
 
 def test_the_table_holds_median_and_worst_of_each_chamber_coldest_first():
