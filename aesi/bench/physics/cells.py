@@ -36,6 +36,7 @@ import numpy as np
 
 from aesi.bench import some_chosen
 from aesi.bench.physics.archive import ARCHIVE
+from aesi.bench.physics.cells_table import tested_mv
 from aesi.bench.physics.tested import soh_on_its_day
 from aesi.constants import MV_PER_V
 from aesi.data.catalogue import HG2, LFP, M50T, NMC, PANASONIC, locate
@@ -177,12 +178,8 @@ def _of_archive(development: bool | None) -> list[MeasuredRecord]:
 
 def _geometric_means(rows: Sequence[dict[str, Any]]) -> dict[str, float]:
     """Model -> the geometric mean of its RMS errors, mV, over the records that it was not fitted to."""
-    out = {}
-    for name in (f"{model}_mv" for model in MODELS):
-        figures = [row[name] for row in rows if row.get(name) and name not in row.get("fitted_mv", ())]
-        if figures:
-            out[name] = round(float(np.exp(np.mean(np.log(figures)))), 2)
-    return out
+    columns = {key: tested_mv(rows, key) for key in (f"{model}_mv" for model in MODELS)}
+    return {key: round(float(np.exp(np.mean(np.log(mv)))), 2) for key, mv in columns.items() if mv}
 
 
 def _chosen(only: Sequence[str], records: Sequence[MeasuredRecord]) -> list[MeasuredRecord]:

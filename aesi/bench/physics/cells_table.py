@@ -60,6 +60,12 @@ def archive_table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     return [*_by_chamber(there, keys), "", '??? note "Each record of the archives"', "", *records]
 
 
+def tested_mv(rows: Sequence[Mapping[str, Any]], key: str) -> list[float]:
+    """The RMS errors, mV, in a column of the rows that have it, without those of records that its file was fitted
+    to."""
+    return [row[key] for row in rows if row.get(key) is not None and key not in row.get("fitted_mv", ())]
+
+
 def _by_chamber(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Iterator[str]:
     """Lines of the table by cell and chamber temperature: `median / largest` RMS error, mV. Records that a file was
     fitted to are left out of its column."""
@@ -67,10 +73,7 @@ def _by_chamber(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> Itera
     yield "|---|---|---:|" + "---:|" * (len(keys) + 1)
     for cell, place in dict.fromkeys((row["cell"], chamber(row["record"])) for row in rows):
         ours = [row for row in rows if (row["cell"], chamber(row["record"])) == (cell, place)]
-        figures = [
-            [row[key] for row in ours if row.get(key) is not None and key not in row.get("fitted_mv", ())]
-            for key in keys
-        ]
+        figures = [tested_mv(ours, key) for key in keys]
         shown = " | ".join(f"{np.median(each):.1f} / {max(each):.1f}" if each else "" for each in figures)
         out = sum("with_temperature" in row["ran_out"] for row in ours)
         yield f"| {cell} | {place} | {len(ours)} | {shown} | {out or ''} |"
