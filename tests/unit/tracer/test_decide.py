@@ -462,6 +462,18 @@ def test_a_model_that_runs_out_of_salt_where_the_declared_one_does_not_is_refuse
     assert "before it reaches its voltage limit" in told
 
 
+def test_the_first_fit_after_an_interrupted_search_was_joined_to_the_half_line_that_it_left(tmp_path):
+    file = tmp_path / "fits.jsonl"
+    Archive(file, "case").put("one", np.array([1.0]))
+    with file.open("a", encoding="utf-8") as half:
+        half.write('{"context": "case", "fit": "cut')
+    resumed = Archive(file, "case")
+    resumed.put("two", np.array([2.0]))
+    resumed.put("three", np.array([3.0]))
+    again = Archive(file, "case")
+    assert [float(again.get(name, 1)[0]) for name in ("one", "two", "three")] == [1.0, 2.0, 3.0]
+
+
 @pytest.mark.parametrize("rate_c", [1.0, -0.5])
 def test_a_full_course_goes_through_the_whole_charge_of_the_cell(rate_c):
     cell = Cell.from_bpx(CELLS / "nmc_30ah.bpx.json")  # which holds 6 % more than its nominal capacity
