@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from aesi.calibration.ageing import LOADED_SD, SLOW_SD, Ageing
-from aesi.calibration.parameters import FitParameter, with_parameters
+from aesi.calibration.parameters import LIMIT_SD, FitParameter, with_parameters
 from aesi.calibration.records.prepared import Prepared
 from aesi.calibration.records.spectra import FittedSpectra
 from aesi.calibration.records.zero import Zero
@@ -68,7 +68,7 @@ class WorkingVector:
 
     @property
     def zero(self) -> int:
-        """Place of the cycler's zero, after the global parameters."""
+        """Place of the zero offset of the cycler's current, after the global parameters."""
         return self.globals
 
     @property
@@ -116,8 +116,8 @@ class Model:
         shapes: Shapes,
         zero: Zero,
         ageing: Ageing,
-        model_name: ModelName = "espm",
-        spectra: Sequence[Spectrum] = (),
+        model_name: ModelName,
+        spectra: Sequence[Spectrum],
     ) -> None:
         self.model_name = model_name
         self.spectra = FittedSpectra(tuple(spectra), model_name)
@@ -127,7 +127,7 @@ class Model:
         self.layout = WorkingVector(len(free), shapes.size, len(records), silicon)
         self.edge = silicon_edge(cell.negative)
         self.weights = [r.trusted.astype(float) / (ERROR_V * REPEATS**0.5) for r in records]
-        bounds = [f.bounds for f in free] + [(-4.0, 4.0)] * (self.layout.size - len(free))
+        bounds = [f.bounds for f in free] + [(-LIMIT_SD, LIMIT_SD)] * (self.layout.size - len(free))
         self.low, self.high = np.array(bounds).T
         self.high[self.layout.ages] = ageing.bounds
         self.low[self.layout.ages] = -self.high[self.layout.ages]

@@ -262,8 +262,9 @@ def information_weights(model: Model, x: Array) -> Array:
         seen = error[record.trusted]
         scale = max(rms(seen), 1e-6)
         centred = seen - seen.mean()
-        rho = float(np.dot(centred[1:], centred[:-1]) / max(float(np.dot(centred, centred)), 1e-30))
-        share = (1.0 - np.clip(rho, 0.0, 0.999)) / (1.0 + np.clip(rho, 0.0, 0.999))
+        correlation = float(np.dot(centred[1:], centred[:-1]) / max(float(np.dot(centred, centred)), 1e-30))
+        rho = min(max(correlation, 0.0), 0.999)
+        share = (1.0 - rho) / (1.0 + rho)
         own = np.sqrt(share) / scale / np.where(weight > 0.0, weight, 1.0)
         out.append(np.minimum(own, 1.0))
     return np.concatenate([*out, model.spectra.information_weights(cell), np.ones(model.layout.size)])
