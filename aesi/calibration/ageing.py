@@ -64,12 +64,13 @@ class Ageing:
 
     chain : (records, records) identity for records without a date; else chain[i, j] is 1 where loss j lies between
     record i and a later day of the file, -1 where it lies between the file's day and a later record i.
-    sd : (records,) s of (1).  silicon : (records, records) weights of the records' own silicon logarithms in the one of
-    each record.  losses : (records,) True for a loss (1).  day : of the file's state; None where no record has a date.
+    sd : (records,) s of (1).  silicon_weights : (records, records) weights of the records' own silicon logarithms in
+    the one of each record.  losses : (records,) True for a loss (1).  day : of the file's state; None where no record
+    has a date.
     """
 
     chain: Array
-    silicon: Array
+    silicon_weights: Array
     sd: Array
     losses: BoolArray
     day: date | None
@@ -91,7 +92,7 @@ class Ageing:
         losses = np.array([d is not None for d in days], dtype=bool)
         chain, loss_sd = _chain_and_sd(since, losses)
         sd = np.where(losses, loss_sd, [SLOW_SD if r.slow else LOADED_SD for r in records])
-        return cls(chain, _silicon(records, since, losses), sd, losses, day)
+        return cls(chain, _silicon_weights(records, since, losses), sd, losses, day)
 
     @property
     def dated(self) -> bool:
@@ -160,8 +161,8 @@ def _chain_and_sd(since: Array, dated: BoolArray) -> tuple[Array, Array]:
     return chain, sd
 
 
-def _silicon(records: Sequence[Prepared], since: Array, dated: BoolArray) -> Array:
-    """`Ageing.silicon`.  since : (records,) days from the file's state."""
+def _silicon_weights(records: Sequence[Prepared], since: Array, dated: BoolArray) -> Array:
+    """`Ageing.silicon_weights`.  since : (records,) days from the file's state."""
     slow = np.array([r.slow for r in records], dtype=bool)
     own = np.diag((slow & ~(dated & (since == 0))).astype(float))
     tell = slow & dated & (since != 0)

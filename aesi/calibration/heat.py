@@ -25,8 +25,8 @@ from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
 from aesi.physics.effects.self_heating import PARAMETERS
 
-LEAST_RISE_K = 2.0
-"""Least warming of a record that is used, K."""
+LEAST_CHANGE_K = 2.0
+"""Least range of the temperatures of a record that is used, K."""
 LOSSES_LEAVE = 0.5**0.5
 """Largest ratio of the RMS error with losses to that with the surroundings alone: the losses then explain half of the
 variance. A convention. The Panasonic's and the HG2's records with their files: 0.49 to 0.67 of five and 0.15 to 0.29 of
@@ -97,12 +97,12 @@ def with_fitted_heat(
 ) -> tuple[Cell, HeatFit | None, tuple[str, ...]]:
     """(cell with its thermal data fitted, the fit, sentences on what was not used). The same cell object and no fit are
     returned where no record determines the heat, or where the file lacks thermal data; a sentence then says so."""
-    warming = [r for r in records if float(np.ptp(r.kelvin)) > LEAST_RISE_K]
+    warming = [r for r in records if float(np.ptp(r.kelvin)) > LEAST_CHANGE_K]
     declared, lacks = cell.heat_capacity_j_k, _lacking(cell)
     if not warming:
         stays = f"the start file has no {lacks}" if lacks else "they stay as in the start file"
         sentence = (
-            f"heat: no record has a measured temperature that changes by more than {LEAST_RISE_K:g} K, so that heat "
+            f"heat: no record has a measured temperature that changes by more than {LEAST_CHANGE_K:g} K, so that heat "
             f"capacity and cooling are not fitted; {stays}."
         )
         return cell, None, (sentence,)
@@ -149,11 +149,13 @@ def _losses_explain(cell: Cell, records: Sequence[CaseRecord]) -> bool:
     fit, by_surroundings = (fit_heat(cell, records, declared, losses=losses) for losses in (True, False))
     if not fit.rmse_k <= LOSSES_LEAVE * by_surroundings.rmse_k:
         return False
-    found = {
-        "heat_transfer_w_k": fit.conductance_w_k,
-        "heat_capacity_factor": fit.heat_capacity_j_k / declared,
-    }
-    return all(low <= found[name] <= high for name, (low, high) in ((n, PARAMETERS[n].bounds) for n in found))
+    (least_w_k, most_w_k), (least_factor, most_factor) = (
+        PARAMETERS[name].bounds for name in ("heat_transfer_w_k", "heat_capacity_factor")
+    )
+    return (
+        least_w_k <= fit.conductance_w_k <= most_w_k
+        and least_factor <= fit.heat_capacity_j_k / declared <= most_factor
+    )
 
 
 def fit_heat(

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from aesi.calibration.ageing import LOADED_SD, SLOW_SD, Ageing
-from aesi.calibration.parameters import FitParameter, with_parameters
+from aesi.calibration.parameters import LIMIT_SD, FitParameter, with_parameters
 from aesi.calibration.records.prepared import Prepared
 from aesi.calibration.records.spectra import FittedSpectra
 from aesi.calibration.records.zero import Zero
@@ -59,16 +59,16 @@ that moves a voltage by 0.05 mV moved its file by 5 mV at 0 degC."""
 
 @dataclass(frozen=True)
 class WorkingVector:
-    """Indices of the parts of a working vector.  silicon : whether each record has a silicon coordinate."""
+    """Indices of the parts of a working vector.  has_silicon : whether each record has a silicon coordinate."""
 
     globals: int
     knots: int
     records: int
-    silicon: bool
+    has_silicon: bool
 
     @property
     def zero(self) -> int:
-        """Place of the cycler's zero, after the global parameters."""
+        """Place of the zero offset of the cycler's current, after the global parameters."""
         return self.globals
 
     @property
@@ -83,7 +83,7 @@ class WorkingVector:
 
     def own(self, record: int) -> range:
         """Indices of all coordinates of one record."""
-        each = 3 if self.silicon else 2
+        each = 3 if self.has_silicon else 2
         return range(self.shapes.stop + each * record, self.shapes.stop + each * (record + 1))
 
     def soc(self, record: int) -> int:
@@ -97,7 +97,7 @@ class WorkingVector:
     @property
     def silicons(self) -> list[int]:
         """Places of the records' silicon."""
-        return [self.own(i)[2] for i in range(self.records)] if self.silicon else []
+        return [self.own(i)[2] for i in range(self.records)] if self.has_silicon else []
 
     @property
     def ages(self) -> list[int]:
@@ -116,18 +116,18 @@ class Model:
         shapes: Shapes,
         zero: Zero,
         ageing: Ageing,
-        model_name: ModelName = "espm",
-        spectra: Sequence[Spectrum] = (),
+        model_name: ModelName,
+        spectra: Sequence[Spectrum],
     ) -> None:
         self.model_name = model_name
         self.spectra = FittedSpectra(tuple(spectra), model_name)
         self.cell, self.records, self.free, self.shapes, self.zero = cell, records, free, shapes, zero
         self.ageing = ageing
-        silicon = sum(r.slow for r in records) >= TELL_SILICON and may_have_silicon(cell.negative)
-        self.layout = WorkingVector(len(free), shapes.size, len(records), silicon)
+        has_silicon = sum(r.slow for r in records) >= TELL_SILICON and may_have_silicon(cell.negative)
+        self.layout = WorkingVector(len(free), shapes.size, len(records), has_silicon)
         self.edge = silicon_edge(cell.negative)
         self.weights = [r.trusted.astype(float) / (ERROR_V * REPEATS**0.5) for r in records]
-        bounds = [f.bounds for f in free] + [(-4.0, 4.0)] * (self.layout.size - len(free))
+        bounds = [f.bounds for f in free] + [(-LIMIT_SD, LIMIT_SD)] * (self.layout.size - len(free))
         self.low, self.high = np.array(bounds).T
         self.high[self.layout.ages] = ageing.bounds
         self.low[self.layout.ages] = -self.high[self.layout.ages]
@@ -153,9 +153,9 @@ class Model:
 
     def silicon(self, index: int, x: Array) -> float:
         """Silicon of the cell in a record, as a share of the file's; slow records determine it, see `Ageing`."""
-        if not self.layout.silicon:
+        if not self.layout.has_silicon:
             return 1.0
-        return float(np.exp(SILICON_SD * (self.ageing.silicon[index] @ x[self.layout.silicons])))
+        return float(np.exp(SILICON_SD * (self.ageing.silicon_weights[index] @ x[self.layout.silicons])))
 
     def current_a(self, index: int, x: Array) -> Array:
         """(rows,) A of a record; of a slow one without the zero offset of its cycler."""
@@ -274,7 +274,7 @@ class Model:
 
         voltage_v : (rows,) at x.  block : (rows, n).
         """
-        layout, weights = self.layout, self.ageing.silicon[index]
+        layout, weights = self.layout, self.ageing.silicon_weights[index]
 
         def slope(there: Array, more: float = 1.0, step: float = STEP) -> Array:
             return (self.run(index, cell, there, more).voltage_v - voltage_v) / step
@@ -282,7 +282,7 @@ class Model:
         there = x.copy()
         there[layout.soc(index)] += STEP
         block[:, layout.soc(index)] = slope(there)
-        if layout.silicon and weights.any():
+        if layout.has_silicon and weights.any():
             there = x.copy()
             there[layout.silicons] += STEP * weights / (weights @ weights)
             block[:, layout.silicons] = slope(there)[:, None] * weights

@@ -22,7 +22,8 @@ from aesi.physics.cell.parts import NO_FILM
 from aesi.physics.cell.relations import Constant, LookupTable, Product, Relation, scaled
 
 LIMIT_SD = 4.0
-"""Bound of every parameter, in standard deviations of its prior."""
+"""Bound of every parameter and of every other working coordinate without a bound of its own, in standard deviations of
+its prior."""
 OF_LOGARITHM = " of its natural logarithm"
 PLACES = tuple(0.5 - 0.5 * np.cos(np.pi * np.linspace(0.0, 1.0, 7)))
 """Knots of a course (a diffusivity or a rate over stoichiometry), as shares of an electrode's window: dense at both

@@ -94,6 +94,7 @@ def ends_sentences(
 class RecordError:
     """RMSE of one record's rows, V.
 
+    temperature_degc : mean of the record, degC; None where it has no temperature.
     before_v : with the start file.  after_v : with the fit, including the record's own parameters.  simulated_v : with
     the written file, without these parameters, on the currents as measured, from the start that this file reads.
     ran_out_s : s, when the written file runs out of lithium or salt there, and until_v : with it, of the rows before;
@@ -152,8 +153,9 @@ class Calibration:
     that the data do not determine.  at_bounds : names of parameters that ended on a bound.  errors : of each record.
     capacities : record -> its capacity over that of the cell.  starts : record -> state of charge at its first row, in
     the windows of `cell` as old as in that record, as fitted.
-    size_assumed : a sentence where no record determined the size of the cell, else ''.  x, covariance : working vector
-    and its covariance, for the posterior.
+    size_assumed : a sentence where no record determined the size of the cell, else ''.  notes : sentences on how the
+    fit was set up and where it ended.  seconds : that it took.
+    model, x, covariance : the fitted model, its working vector and the covariance of that, for the posterior.
     against_temperature : a sentence for each record whose voltage contradicts the temperature that it was fitted at.
     """
 
@@ -262,15 +264,16 @@ def information_weights(model: Model, x: Array) -> Array:
         seen = error[record.trusted]
         scale = max(rms(seen), 1e-6)
         centred = seen - seen.mean()
-        rho = float(np.dot(centred[1:], centred[:-1]) / max(float(np.dot(centred, centred)), 1e-30))
-        share = (1.0 - np.clip(rho, 0.0, 0.999)) / (1.0 + np.clip(rho, 0.0, 0.999))
+        correlation = float(np.dot(centred[1:], centred[:-1]) / max(float(np.dot(centred, centred)), 1e-30))
+        rho = min(max(correlation, 0.0), 0.999)
+        share = (1.0 - rho) / (1.0 + rho)
         own = np.sqrt(share) / scale / np.where(weight > 0.0, weight, 1.0)
         out.append(np.minimum(own, 1.0))
     return np.concatenate([*out, model.spectra.information_weights(cell), np.ones(model.layout.size)])
 
 
 def intervals(model: Model, x: Array, covariance: Array) -> dict[str, Interval]:
-    """Value and 95 % interval of every global parameter."""
+    """Name -> value and 95 % interval of every global parameter.  x : (n,) working vector.  covariance : (n, n)."""
     out = {}
     for j, free in enumerate(model.free):
         reach = NINETY_FIVE * float(np.sqrt(covariance[j, j]))
@@ -286,6 +289,8 @@ def undetermined(model: Model, jacobian: Array) -> tuple[Undetermined, ...]:
 
     They are eigenvectors of the records' information matrix for the global parameters, with all others marginalised, in
     units of the priors. An eigenvalue below one is less than the information of the prior.
+
+    jacobian : (rows + 2 frequencies + n, n) slopes of `Model.residual`, times `information_weights`.
     """
     n = len(model.free)
     information = jacobian.T @ jacobian

@@ -10,6 +10,7 @@ import numpy as np
 from aesi.bench import CaseRow
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.pipeline.report import style
+from aesi.tracer.report.outcome import State
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -20,7 +21,11 @@ LINE_PX = 17
 """Height of a line of text beside the confusion matrix, px."""
 RATIO = (-1.0, 3.0)
 """Range of the drawn ratio of estimated to true size; values beyond are drawn at its ends."""
-STATES = {"before": "declared model", "recalibrated": "recalibrated model", "after": "written model"}
+LEGENDS: Mapping[State, str] = {
+    "before": "declared model",
+    "recalibrated": "recalibrated model",
+    "after": "written model",
+}
 """State of the model -> its name in the figures."""
 
 
@@ -118,7 +123,7 @@ def case_figure(row: CaseRow) -> Figure:
     model. The last part of the record is held out."""
     said = " + ".join(row["effects"]) or "no name"
     answer = " or ".join(row["answer"]) or "no name"
-    known = {words: row[f"{state}_test_mv"] for state, words in STATES.items()}
+    known = {words: row[f"{state}_test_mv"] for state, words in LEGENDS.items()}
     errors = ", ".join(f"{error:.1f} mV {words}" for words, error in known.items() if error is not None)
     fig = style.figure(
         str(row["case"]),
@@ -127,7 +132,7 @@ def case_figure(row: CaseRow) -> Figure:
     )
     kept = row["residual"]
     hours = np.array(kept["time_s"]) / SECONDS_PER_HOUR
-    for state, words in STATES.items():
+    for state, words in LEGENDS.items():
         fig.add_scatter(
             x=hours.tolist(),
             y=kept[f"{state}_mv"],

@@ -42,6 +42,8 @@ ALIKE: dict[str, tuple[str, ...]] = {
 of a cell are added to the same drive, in sizes for development and in sizes for the test."""
 BEYOND_SDS = 2.58
 """Number of standard deviations that hold 99 % of a normal distribution."""
+CELL_FILES = "experiments/cells"
+"""Folder of the cell files, from where the command is run."""
 
 
 def pairs() -> Iterator[tuple[str, str, str]]:
@@ -51,15 +53,16 @@ def pairs() -> Iterator[tuple[str, str, str]]:
             yield cell, good, other
 
 
-def pair_row(cell: str, good: str, other: str, cells: str = "experiments/cells") -> dict[str, Any]:
+def pair_row(cell: str, good: str, other: str) -> dict[str, Any]:
     """The row of one pair of records.
 
-    cells : folder of the cell files.  `sds` is the fitted size of each effect over its standard deviation,
-    `model_error_mv` the size of the model error, and `soc0_off` the fitted minus the given initial state of charge of
-    each record.  `failed` stands in their place if the model cannot be fitted.
+    cell : data set.  good, other : names of its known-good record and of the other one.
+    `sds` is the fitted size of each effect over its standard deviation, `model_error_mv` the size of the model error,
+    and `soc0_off` the fitted minus the given initial state of charge of each record.  `failed` stands in their place if
+    the model cannot be fitted.
     """
     problem = inverse_problem(
-        declared_cell(CELLS[cell], cells),
+        declared_cell(CELLS[cell], CELL_FILES),
         [taken(Take(cell, other, WINDOW_S))],
         1.0,
         0.0,

@@ -110,7 +110,7 @@ def check_spectra(cell: Cell, spectra: Sequence[Spectrum]) -> None:
 def fitted_spectra(cell: Cell, spectra: Sequence[Spectrum]) -> tuple[tuple[Spectrum, ...], tuple[str, ...]]:
     """(spectra that a fit from this cell uses, sentences as from `comparable_spectra` and on those outside the band).
 
-    Raises DataError where spectra were given and none can be fitted.
+    Raises DataError where spectra were given and none can be fitted, and for one at a state that the cell lacks.
     """
     check_spectra(cell, spectra)
     kept, sentences = comparable_spectra(cell, spectra)
@@ -120,12 +120,24 @@ def fitted_spectra(cell: Cell, spectra: Sequence[Spectrum]) -> tuple[tuple[Spect
             f"{spectra[0].name}: no spectrum that was given to be fitted can be; none within {BAND_HZ[0]:g} to "
             f"{BAND_HZ[1]:g} Hz is between empty and full."
         )
+    for spectrum in seen:
+        soc = state_of(cell, spectrum)
+        if not _has_state(cell, soc):
+            raise DataError(
+                f"{spectrum.name}: {cell.name} has no state of charge of {soc:g}, where a stoichiometry leaves (0, 1); "
+                "correct the stoichiometry limits of its file, or leave the spectrum out."
+            )
     outside = (
         f"{spectrum.name}: not fitted, since it has no frequency from {BAND_HZ[0]:g} to {BAND_HZ[1]:g} Hz."
         for spectrum in kept
         if not in_band(spectrum).any()
     )
     return seen, (*sentences, *outside)
+
+
+def _has_state(cell: Cell, soc: float) -> bool:
+    """Whether both stoichiometries of a state of charge are those of an electrode, as `impedance` needs them."""
+    return all(0.0 < theta < 1.0 for theta in cell.stoichiometries(soc))
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +152,8 @@ class FittedSpectra:
     model: ModelName
 
     def misfits(self, cell: Cell) -> Array:
-        """Misfits of this cell, (2 x frequencies in the band,), all spectra one after another."""
+        """Misfits of this cell, (2 x frequencies in the band,), all spectra one after another; NaN for a spectrum at a
+        state of charge that the cell does not have, so that a descent steps back from there."""
         return _joined([self._misfit(cell, spectrum) for spectrum in self.spectra])
 
     def information_weights(self, cell: Cell) -> Array:
@@ -156,6 +169,8 @@ class FittedSpectra:
         seen = in_band(spectrum)
         measured = spectrum.z_ohm[seen]
         soc = min(max(state_of(cell, spectrum), 0.0), 1.0)  # a change of the capacity may move it out
+        if not _has_state(cell, soc):
+            return np.full(2 * len(measured), np.nan)
         z = impedance(cell, spectrum.frequency_hz[seen], soc, degc_of(spectrum), model=self.model)
         off = (z - measured) / np.abs(measured)
         return np.concatenate([off.real, off.imag]) / (SPECTRUM_SHARE * _by_decade(spectrum) ** 0.5)

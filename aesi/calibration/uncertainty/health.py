@@ -51,7 +51,8 @@ def health_of(cell: Cell) -> Health:
 
 
 def health_intervals(found: Calibration) -> Mapping[str, tuple[float, float]]:
-    """Quantity -> its 95 % interval, by linear propagation of the fit's covariance."""
+    """Field of `Health` -> its 95 % interval, in the field's unit, by linear propagation of the fit's covariance; it
+    begins at 0 where that would reach below, since none of the quantities can be negative."""
     reach = NINETY_FIVE * np.sqrt(propagated_variance(found, lambda cell: np.array(astuple(health_of(cell)))))
     middle = np.array(astuple(health_of(found.cell)))
     return {

@@ -51,11 +51,16 @@ class Electrode:
     """A porous electrode of one active material.
 
     Relations are of the stoichiometry x, at the reference temperature.
+    theta_min, theta_max : limits of x; those of the empty and of the full cell for the negative electrode, of the full
+    and of the empty cell for the positive one.
     ocp : V against Li/Li+.  entropic : V/K.  diffusivity : m2/s.  conductivity_s_m : effective, of the solid.
     rate_constant K, rate_factor f : mol/(m2 s) and 1; the exchange current density is
     F K f(x) sqrt(c_e / c_e0 x (1 - x)).
     film_ohm_m2 : ohm m2 of reactive surface, between reaction and electrolyte.
     double_layer_f_m2 : F per m2 of reactive surface.
+    *_ea_j_mol : activation energies, J/mol.
+    ocp_lithiation, ocp_delithiation (V against Li/Li+), hysteresis_decay : as declared, for other programs; None where
+    they are not. No simulation uses them.
     """
 
     thickness_m: float
@@ -189,11 +194,18 @@ class CellParameters:
         volume = self.total_area_m2 * electrode.thickness_m
         return FARADAY_C_MOL * electrode.active_fraction * volume * electrode.c_max_mol_m3 / SECONDS_PER_HOUR
 
+    def window_capacity_ah(self, electrode: Electrode) -> float:
+        """Charge between the stoichiometry limits of an electrode, Ah."""
+        return (electrode.theta_max - electrode.theta_min) * self.electrode_capacity_ah(electrode)
+
+    def reactive_area_m2(self, electrode: Electrode) -> float:
+        """Surface of all particles of an electrode, m2."""
+        return electrode.area_per_volume_1_m * electrode.thickness_m * self.total_area_m2
+
     @property
     def capacity_ah(self) -> float:
         """Charge between the stoichiometry limits of the negative electrode, Ah."""
-        window = self.negative.theta_max - self.negative.theta_min
-        return window * self.electrode_capacity_ah(self.negative)
+        return self.window_capacity_ah(self.negative)
 
     @property
     def contacts_and_films_ohm(self) -> float:
@@ -202,8 +214,7 @@ class CellParameters:
         half = self.stoichiometries(0.5)
         ohm = self.contact_resistance_ohm
         for electrode, theta in zip((self.negative, self.positive), half, strict=True):
-            surface_m2 = electrode.area_per_volume_1_m * electrode.thickness_m * self.total_area_m2
-            ohm += float(electrode.film_ohm_m2(np.array([theta]))[0]) / surface_m2
+            ohm += float(electrode.film_ohm_m2(np.array([theta]))[0]) / self.reactive_area_m2(electrode)
         return ohm
 
     @property

@@ -117,7 +117,7 @@ def _left_out_residuals(
 
 
 def range_fault(state: ModelState, rates_c: Sequence[float]) -> str | None:
-    """Why the model fails on a full discharge or charge that the declared model can run, a sentence; None where it runs
+    """Why the model fails on a full discharge or charge that the declared model can run, a clause; None where it runs
     them all: at these C-rates, at the temperatures of the records.
 
     A particle surface may run out of lithium at the very end of a discharge, with the voltage close to its limit. The
@@ -143,8 +143,8 @@ def temperatures_degc(problem: InverseProblem) -> tuple[float | None, ...]:
 
 
 def _course_end(state: ModelState, rate_c: float, degc: float | None) -> tuple[float, str | None]:
-    """(time at which a full discharge or charge ends, s; a sentence where it fails: it cannot be simulated, or the
-    model runs empty before its voltage limit; else None)."""
+    """(time at which a full discharge or charge ends, s; a clause where it fails: it cannot be simulated, or the model
+    runs empty before its voltage limit; else None)."""
     cell = state.problem.cell
     profile, soc0 = full_course(cell, rate_c, degc)
     time = profile.time_s
@@ -152,7 +152,7 @@ def _course_end(state: ModelState, rate_c: float, degc: float | None) -> tuple[f
     try:
         run = state.problem.run(profile, soc0, state.effects(), "linear")
     except AesiError as error:
-        return 0.0, f"{what} cannot be simulated: {error}"
+        return 0.0, f"{what} cannot be simulated ({str(error).rstrip('.')})"
     over = np.append(np.flatnonzero(_beyond_limit(cell, rate_c, run.voltage_v)), len(time) - 1)[0]
     empty = np.append(np.flatnonzero(run.series["depleted"] > 0), len(time))[0]
     if over <= empty:

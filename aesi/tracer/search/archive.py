@@ -44,7 +44,10 @@ class Archive:
     def __init__(self, path: Path | None, context: str, other_model: Archive | None = None) -> None:
         self.path, self.context, self.other_model = path, context, other_model
         self._lock = threading.Lock()
-        self._kept: dict[str, Array] = {} if path is None or not path.exists() else _stored(path, context)
+        text = "" if path is None or not path.exists() else path.read_text(encoding="utf-8", errors="replace")
+        self._kept = _stored(text, context)
+        # An interrupted search may have left half a line, which the next entry must not be joined to.
+        self._line_end = "\n" if text and not text.endswith("\n") else ""
         self.fits: dict[str, FittedHypothesis] = {}
 
     def get(self, name: str, size: int) -> Array | None:
@@ -66,13 +69,14 @@ class Archive:
                 self.path.parent.mkdir(parents=True, exist_ok=True)
                 with self.path.open("a", encoding="utf-8") as file:
                     entry = {"context": self.context, "fit": name, "x": [float(v) for v in x]}
-                    file.write(json.dumps(entry) + "\n")
+                    file.write(self._line_end + json.dumps(entry) + "\n")
+                self._line_end = ""
 
 
-def _stored(path: Path, context: str) -> dict[str, Array]:
-    """Name of a fit -> its coordinates, from the lines of a file that belong to a context."""
+def _stored(text: str, context: str) -> dict[str, Array]:
+    """Name of a fit -> its coordinates, from the lines of a file's text that belong to a context."""
     kept = {}
-    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+    for line in text.splitlines():
         try:
             entry = json.loads(line)
             if entry["context"] == context:

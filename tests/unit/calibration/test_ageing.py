@@ -89,15 +89,15 @@ def test_what_a_slow_record_tells_of_silicon_is_of_its_day_and_of_those_between(
     days = {"first": 1, "file": 5, "between": 9, "slow": 13, "last": 20}
     dates = {name: date(2018, 11, day) for name, day in days.items()}
     names = ["last", "slow", "file", "first", "between", "undated"]
-    weights = of(names, dates, slow=["first", "slow"], as_of=dates["file"]).silicon
+    weights = of(names, dates, slow=["first", "slow"], as_of=dates["file"]).silicon_weights
     lost = dict(zip(names, weights @ np.array([9.0, -0.4, 9.0, 0.1, 9.0, 9.0]), strict=True))
     expected = {"first": 0.1, "file": 0.0, "between": -0.2, "slow": -0.4, "last": -0.4, "undated": 0.0}
     assert lost == pytest.approx(expected, abs=1e-12)
     same = {**dates, "undated": dates["slow"]}  # two slow records of one day, and one of the file's
-    alike = of(names, same, slow=["undated", "file", "slow"], as_of=dates["file"]).silicon
+    alike = of(names, same, slow=["undated", "file", "slow"], as_of=dates["file"]).silicon_weights
     assert alike[names.index("last")] == pytest.approx([0.0, 0.5, 0.0, 0.0, 0.0, 0.5])
     assert not alike[names.index("file")].any()
-    without = of(names, {}, slow=["first", "slow"]).silicon
+    without = of(names, {}, slow=["first", "slow"]).silicon_weights
     assert without == pytest.approx(np.diag([0.0, 1.0, 0.0, 1.0, 0.0, 0.0]))
 
 

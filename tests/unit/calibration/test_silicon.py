@@ -59,7 +59,7 @@ def test_of_two_slow_discharges_the_silicon_that_one_has_lost_is_found(start, re
 
 
 def test_one_slow_discharge_does_not_tell_silicon(start, records):
-    assert not prepared_model(start, records[:1], Conditions())[0].layout.silicon
+    assert not prepared_model(start, records[:1], Conditions())[0].layout.has_silicon
 
 
 def test_silicon_was_told_of_a_cell_whose_file_has_graphite_alone():
@@ -68,7 +68,7 @@ def test_silicon_was_told_of_a_cell_whose_file_has_graphite_alone():
     old = lose_lithium(EspmModel(cell), loss=0.08).cell
     records = discharge(cell, "new"), discharge(old, "old")
     model = prepared_model(cell, records, Conditions(same_cell=True))[0]
-    assert not model.layout.silicon
+    assert not model.layout.has_silicon
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from aesi.calibration import Conditions, calibrate
+from aesi.calibration.parameters import with_parameters
 from aesi.calibration.prepared_model import prepared_model
+from aesi.calibration.records.spectra import FittedSpectra, fitted_spectra
 from aesi.errors import DataError
 from aesi.numerics.metrics import rms
 from aesi.physics import impedance
@@ -67,6 +69,22 @@ def test_of_spectra_in_percent_that_of_1_percent_was_taken_for_a_full_cell(start
     half = Spectrum("half", FREQUENCY_HZ, np.ones(13), soc=50.0)
     with pytest.raises(DataError, match=r"half: its state of charge of 50 .* so are the others of its file"):
         prepared_model(start, records[:1], Conditions(spectra=(good, half)))
+
+
+def test_a_drawn_start_without_the_state_of_a_spectrum_ended_the_whole_fit(start, truth):
+    fitted = FittedSpectra((spectrum_of(truth, 0.02, 25.0),), "espm")
+    smaller = with_parameters(start, {"negative.capacity": 0.9})
+    assert smaller.stoichiometries(0.02)[0] < 0.0
+    assert np.isnan(fitted.misfits(smaller)).all()
+    assert np.isfinite(fitted.misfits(start)).all()
+
+
+def test_a_spectrum_at_a_state_that_the_start_file_lacks_is_refused(start, truth):
+    empty = Spectrum("empty", FREQUENCY_HZ, spectrum_of(truth, 0.5, 25.0).z_ohm, soc=0.0)
+    with pytest.raises(
+        DataError, match=r"empty: .* has no state of charge of 0, where a stoichiometry leaves"
+    ):
+        fitted_spectra(start.with_negative(theta_min=0.0), (empty,))
 
 
 def test_a_spectrum_that_cannot_be_fitted_is_told(start, truth, records):

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from aesi.errors import SimulationError
 from aesi.physics import Cell, simulate
 from aesi.physics.cell.relations import scaled
 from aesi.physics.effect import Contribution
@@ -460,6 +461,34 @@ def test_a_model_that_runs_out_of_salt_where_the_declared_one_does_not_is_refuse
     told = fault(0.2, 4.0)
     assert "a full discharge at 4C runs out of lithium or of salt" in told
     assert "before it reaches its voltage limit" in told
+
+
+def test_the_reason_why_a_discharge_cannot_be_simulated_brought_a_second_full_stop_into_a_sentence():
+    def run(course, soc0, effects, hold):
+        if effects:
+            raise SimulationError("the electrolyte ran out of salt.")
+        return SimpleNamespace(
+            voltage_v=np.full(len(course), 3.5), series={"depleted": np.zeros(len(course))}
+        )
+
+    cell = Cell.from_bpx(CELLS / "nmc_30ah.bpx.json")
+    problem = SimpleNamespace(
+        cell=cell, records=(), fixed=(), run=run, active=lambda values, good: ("resistance",)
+    )
+    fault = range_fault(ModelState(problem, {}), (1.0,))
+    assert fault == "a full discharge at 1C cannot be simulated (the electrolyte ran out of salt)"
+
+
+def test_the_first_fit_after_an_interrupted_search_was_joined_to_the_half_line_that_it_left(tmp_path):
+    file = tmp_path / "fits.jsonl"
+    Archive(file, "case").put("one", np.array([1.0]))
+    with file.open("a", encoding="utf-8") as half:
+        half.write('{"context": "case", "fit": "cut')
+    resumed = Archive(file, "case")
+    resumed.put("two", np.array([2.0]))
+    resumed.put("three", np.array([3.0]))
+    again = Archive(file, "case")
+    assert [float(again.get(name, 1)[0]) for name in ("one", "two", "three")] == [1.0, 2.0, 3.0]
 
 
 @pytest.mark.parametrize("rate_c", [1.0, -0.5])

@@ -48,7 +48,7 @@ DEFAULT_TEMPERATURE_K = 298.15
 Fields = Mapping[str, Any]
 
 
-def read_bpx(source: str | PathLike[str] | Mapping[str, Any], fitted: bool = False) -> CellParameters:
+def read_bpx(source: str | PathLike[str] | Mapping[str, Any], fitted: bool) -> CellParameters:
     """See `Cell.from_bpx`."""
     v1, where, left_behind = load_bpx(source)
     try:

@@ -80,7 +80,7 @@ def check_transport(cell: CellParameters, where: str) -> None:
 def _check_solid(cell: CellParameters, electrode: Electrode, what: str) -> None:
     """Raises CellError for a drop above LARGEST_SOLID_DROP_V: the mean one, which the cell's voltage has, of a current
     that decreases linearly to zero across the electrode is a third of the solid's resistance times the current."""
-    current_a_m2 = cell.nominal_capacity_ah / (cell.electrode_area_m2 * cell.electrode_pairs)
+    current_a_m2 = cell.nominal_capacity_ah / cell.total_area_m2
     drop_v = current_a_m2 * electrode.thickness_m / (3.0 * electrode.conductivity_s_m)
     if drop_v > LARGEST_SOLID_DROP_V:
         raise CellError(
@@ -91,10 +91,8 @@ def _check_solid(cell: CellParameters, electrode: Electrode, what: str) -> None:
 
 def check_kinetics(cell: CellParameters, where: str) -> None:
     """Raises CellError, naming `where`, for rate constants not in mol/(m2 s)."""
-    area_m2 = cell.electrode_area_m2 * cell.electrode_pairs
     for side, electrode in (("Negative", cell.negative), ("Positive", cell.positive)):
-        surface_m2 = electrode.area_per_volume_1_m * electrode.thickness_m * area_m2
-        exchange_a = FARADAY_C_MOL * electrode.rate_constant * HALF_FULL * surface_m2
+        exchange_a = FARADAY_C_MOL * electrode.rate_constant * HALF_FULL * cell.reactive_area_m2(electrode)
         if exchange_a < LEAST_EXCHANGE_1_H * cell.nominal_capacity_ah:
             raise CellError(
                 f"{where}: {side} electrode: reaction rate constant = {electrode.rate_constant:g} makes an exchange "

@@ -105,12 +105,12 @@ def version_0_sentences(names: Sequence[str]) -> tuple[str, ...]:
 def capacity_sentences(cell: CellParameters) -> tuple[str, ...]:
     """A sentence where the nominal capacity is far from that of an electrode between its stoichiometry limits."""
     for side, electrode in (("negative", cell.negative), ("positive", cell.positive)):
-        held = (electrode.theta_max - electrode.theta_min) * cell.electrode_capacity_ah(electrode)
-        ratio = cell.nominal_capacity_ah / held
+        held_ah = cell.window_capacity_ah(electrode)
+        ratio = cell.nominal_capacity_ah / held_ah
         if not 1.0 / OTHER_CAPACITY <= ratio <= OTHER_CAPACITY:
             return (
                 f"the cell's file declares {cell.nominal_capacity_ah:.4g} Ah, and its {side} electrode holds "
-                f"{held:.4g} Ah between its stoichiometry limits, which is what is simulated: correct 'Nominal cell "
+                f"{held_ah:.4g} Ah between its stoichiometry limits, which is what is simulated: correct 'Nominal cell "
                 "capacity [A.h]', or the area, the thickness, the number of electrode pairs or the limits.",
             )
     return ()

@@ -145,7 +145,7 @@ def _check_surface(cell: CellParameters, electrode: Electrode, side: str, window
 
     In the shipped files films drop 0.0006 to 0.008 of the window, double layers store 0.0004 to 0.009 of the charge.
     """
-    reactive_m2 = cell.total_area_m2 * electrode.thickness_m * electrode.area_per_volume_1_m
+    reactive_m2 = cell.reactive_area_m2(electrode)
     film = float(np.median(electrode.film_ohm_m2(inside_window(electrode))))
     drop_v = film * cell.nominal_capacity_ah / reactive_m2
     if drop_v > window_v:
@@ -165,12 +165,12 @@ def _check_surface(cell: CellParameters, electrode: Electrode, side: str, window
 def _check_capacity(cell: CellParameters, where: str) -> None:
     """Check that each electrode holds about the nominal capacity."""
     for label, electrode in (("negative", cell.negative), ("positive", cell.positive)):
-        window = (electrode.theta_max - electrode.theta_min) * cell.electrode_capacity_ah(electrode)
-        if not 1.0 / OTHER_UNIT <= cell.nominal_capacity_ah / window <= OTHER_UNIT:
+        window_ah = cell.window_capacity_ah(electrode)
+        if not 1.0 / OTHER_UNIT <= cell.nominal_capacity_ah / window_ah <= OTHER_UNIT:
             raise CellError(
                 f"{where}: the nominal capacity is {cell.nominal_capacity_ah:g} A.h, but the {label} electrode holds "
-                f"{window:.4g} A.h between its stoichiometry limits; one of them is in another unit, or the number of "
-                "electrode pairs is another."
+                f"{window_ah:.4g} A.h between its stoichiometry limits; one of them is in another unit, or the number "
+                "of electrode pairs is another."
             )
 
 
