@@ -27,6 +27,7 @@ from aesi.calibration.start import (
     full_discharge_numbers,
     scaled_to_discharge,
     with_activation,
+    with_unmoved_energies,
 )
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError
@@ -77,6 +78,8 @@ def prepared_model(
     span = _span_k(start, prepared_records, spectra)
     on_case = any(r.kelvin is not None and measured_on_case(r.kelvin) for r in prepared_records)
     start = with_interfaces(start, on_case)
+    if span <= SPAN_K:
+        start = with_unmoved_energies(declared, start, conditions.same_cell)
     free = with_priors(free_parameters(start, span, conditions.same_cell, on_case), conditions.priors)
     energies = {f.name: (f.start, f.sd) for f in free if f.name.endswith("_energy")}
     ageing = Ageing.of(prepared_records, conditions.dates, conditions.as_of)

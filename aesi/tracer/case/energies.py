@@ -1,7 +1,7 @@
 """Activation energies of a measured cell whose file was fitted at one temperature only, so that they are unknown.
 
-A calibration on records of one temperature keeps the activation energies of its start file. At another temperature T
-the logarithm of each rate is then off by
+A calibration on records of one temperature keeps the activation energies of its start file, or takes typical ones. At
+another temperature T the logarithm of each rate is then off by
 
     dE/R (1/T_file - 1/T)        T_file mean temperature of the records that the file was fitted to
 

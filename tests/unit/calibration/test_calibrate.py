@@ -58,21 +58,29 @@ def test_every_parameter_has_an_interval_and_a_source(found):
 
 def test_the_energies_that_a_fit_starts_from_were_told_as_others(start, records):
     """Typical ones of 35 kJ/mol were told of kinetics where the fit began at 55, and nothing where these took the place
-    of those that the file declares."""
+    of those that the file declares. A record at one temperature is fitted with others."""
     bare = start.with_negative(rate_ea_j_mol=0.0, diffusivity_ea_j_mol=0.0)
-    cases = {"both": records, "one": records[:1], "given": records}
-    given = Conditions(priors={"negative.rate_energy": Prior(40e3, 5e3)})
+    cases = {
+        "both": (records, Conditions()),
+        "one": (records[:1], Conditions()),
+        "own": (records[:1], Conditions(same_cell=True)),
+        "given": (records, Conditions(priors={"negative.rate_energy": Prior(40e3, 5e3)})),
+    }
     told = {}
-    for name, some in cases.items():
-        model, notes = prepared_model(bare, some, given if name == "given" else Conditions())
+    for name, (some, conditions) in cases.items():
+        model, notes = prepared_model(bare, some, conditions)
         told[name] = " ".join(note for note in notes if "activation energ" in note and "declared" in note)
         begins = model.cell_at(np.zeros(model.layout.size))
         rate = begins.negative.rate_ea_j_mol / 1e3
         assert (f"negative rate {rate:g}" in told[name]) == (name != "given")
+        moved = name in ("both", "given")
+        assert begins.negative.film_ea_j_mol == (50e3 if moved else 40e3)
+        assert begins.negative.diffusivity_ea_j_mol == (30e3 if moved else 45e3)
     assert "negative rate 55 +/- 12 kJ/mol" in told["both"]
     assert "positive rate 55 +/- 12 kJ/mol (declared: 17.8)" in told["both"]
-    assert "negative rate 35 kJ/mol" in told["one"]
-    assert "positive rate" not in told["one"]
+    assert "negative rate 45 kJ/mol" in told["one"]
+    assert "positive rate 45 kJ/mol (declared: 17.8)" in told["one"]
+    assert "positive rate" not in told["own"]
     assert "negative rate" not in told["given"]
 
 
