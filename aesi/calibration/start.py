@@ -155,7 +155,7 @@ def with_unmoved_energies(declared: Cell, cell: Cell, same_cell: bool) -> Cell:
 
 
 def activation_sentences(
-    declared: Cell, taken: Cell, fitted: Mapping[str, tuple[float, float]], given: Collection[str] = ()
+    declared: Cell, taken: Cell, fitted: Mapping[str, tuple[float, float]], given: Collection[str]
 ) -> tuple[str, ...]:
     """Sentences on the activation energies that a fit has, or starts from, and that the cell's file does not declare.
 

@@ -474,6 +474,7 @@ def test_a_temperature_of_0_in_a_file_was_taken_for_25_degc(content, name):
         ({"Positive electrode double-layer capacity [F.m-2]": 2e-5}, "= 2e-05 is no double layer's"),
         ({"Thermal conductivity [W.m-1.K-1]": 200.0}, "= 200 is no winding's; .* 200 mW/.m K. is 0.2"),
         ({"Thermal conductivity [W.m-1.K-1]": 0.002}, "= 0.002 is no winding's"),
+        ({"Thermal conductivity [W.m-1.K-1]": 0.0}, "Thermal conductivity .* = 0 has to be"),
         (
             {"Positive electrode reaction rate factor": 0.0},
             "reaction rate factor is 0 at a stoichiometry of 0; it has to be a positive number",

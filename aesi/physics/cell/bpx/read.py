@@ -103,7 +103,7 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
         specific_heat_j_kg_k=_optional(fields, "Specific heat capacity [J.K-1.kg-1]"),
         volume_m3=_optional(fields, "Volume [m3]"),
         surface_area_m2=_optional(fields, "External surface area [m2]"),
-        thermal_conductivity_w_m_k=_own_number(user, THERMAL_CONDUCTIVITY, where) or None,
+        thermal_conductivity_w_m_k=_thermal_conductivity(user, where),
         heat_transfer_w_m2_k=_optional(thermal, HEAT_TRANSFER),
         contact_resistance_ohm=_own_number(user, CONTACT_RESISTANCE, where),
         capacity_shares=_numbers_by_record(user, CAPACITY_SHARES, where),
@@ -150,6 +150,13 @@ def _own_number(user: Fields, name: str, where: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < math.inf:
         raise CellError(f"{where}: User-defined: {name} = {value!r} has to be a number from 0 on.")
     return float(value)
+
+
+def _thermal_conductivity(user: Fields, where: str) -> float | None:
+    """The thermal conductivity across the winding, W/(m K); None where the file states none. 0 is refused with all
+    others that no winding has."""
+    declared = user.get(THERMAL_CONDUCTIVITY) is not None
+    return _own_number(user, THERMAL_CONDUCTIVITY, where) if declared else None
 
 
 def _fitted_with(user: Fields, where: str) -> str:
