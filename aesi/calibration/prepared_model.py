@@ -158,7 +158,7 @@ def _small_span_sentences(span_k: float, n_records: int) -> tuple[str, ...]:
         if n_records > 1
         else "a single record does not tell how the cell answers to temperature"
     )
-    return (f"{apart}: activation energies and entropy stay as they are.",)
+    return (f"{apart}: activation energies and entropy are not fitted.",)
 
 
 def _span_k(cell: Cell, records: Sequence[Prepared], spectra: Sequence[Spectrum]) -> float:
