@@ -128,7 +128,8 @@ def free_parameters(
 ) -> tuple[FitParameter, ...]:
     """The parameters that a fit moves, for records whose temperatures span `span_k` (K).
 
-    Activation energies are free where the records tell them; records at one temperature do not, and they stay.
+    Activation energies are free where the records tell them. Records at one temperature do not, see
+    `aesi.calibration.start.with_unmoved_energies`.
     same_cell : the records are of the cell of the file, which may have lost lithium.  on_case : see `with_interfaces`.
     """
     ohm = CONTACT_V / cell.nominal_capacity_ah

@@ -138,18 +138,14 @@ def with_unmoved_energies(declared: Cell, cell: Cell, same_cell: bool) -> Cell:
     declared : the cell as its file declares it; a diffusivity's energy that it has is kept.
     same_cell : the records are of the file's own cell, of whose kinetics a declared energy is kept, too.
     """
-    n, p = cell.negative, cell.positive
-    for with_side, electrode, own in (
-        (Cell.with_negative, n, declared.negative),
-        (Cell.with_positive, p, declared.positive),
-    ):
+    for with_side, own in ((Cell.with_negative, declared.negative), (Cell.with_positive, declared.positive)):
         film_added = own.film_ohm_m2 == NO_FILM
         rate_j_mol = 0.0 if film_added and not same_cell else own.rate_ea_j_mol
         cell = with_side(
             cell,
             diffusivity_ea_j_mol=own.diffusivity_ea_j_mol or UNMOVED_SOLID_EA_J_MOL,
             rate_ea_j_mol=rate_j_mol or UNMOVED_RATE_EA_J_MOL,
-            film_ea_j_mol=UNMOVED_FILM_EA_J_MOL if film_added else electrode.film_ea_j_mol,
+            film_ea_j_mol=UNMOVED_FILM_EA_J_MOL if film_added else own.film_ea_j_mol,
         )
     return cell
 
