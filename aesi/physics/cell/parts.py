@@ -200,7 +200,7 @@ class CellParameters:
 
     def reactive_area_m2(self, electrode: Electrode) -> float:
         """Surface of all particles of an electrode, m2."""
-        return electrode.area_per_volume_1_m * electrode.thickness_m * self.total_area_m2
+        return self.total_area_m2 * electrode.thickness_m * electrode.area_per_volume_1_m
 
     @property
     def capacity_ah(self) -> float:

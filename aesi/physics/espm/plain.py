@@ -66,7 +66,7 @@ def shifted_ocp(electrode: Electrode, rise_k: float) -> Relation:
 
 def stoichiometry_per_coulomb(cell: Cell, electrode: Electrode) -> float:
     """Change of stoichiometry per charge at a surface gain of one, 1/C: 1 / (F R c_max x reactive area)."""
-    area = cell.total_area_m2 * electrode.thickness_m * electrode.area_per_volume_1_m
+    area = cell.reactive_area_m2(electrode)
     return 1.0 / (area * FARADAY_C_MOL * electrode.particle_radius_m * electrode.c_max_mol_m3)
 
 
