@@ -187,12 +187,14 @@ class Store:
             return False
 
     def artifact(self, run: Any, name: str) -> Path | None:
-        """A file among the artifacts of a run, or None where there is none."""
-        try:
-            path = self.read(run, name)
-        except InputError:
+        """A file at the top of a run's artifacts, or None where the store lists none of that name.
+
+        Raises InputError for one that is listed and cannot be read.
+        """
+        listed = self.client.list_artifacts(run.info.run_id)
+        if not any(one.path == name and not one.is_dir for one in listed):
             return None
-        return path if path.is_file() else None
+        return self.read(run, name)
 
     def read(self, run: Any, name: str) -> Path:
         """An artifact of a run, a file or a folder, as it lies on disk or is fetched from a server.

@@ -334,3 +334,17 @@ def test_the_time_of_a_fit_is_called_so_of_an_earlier_version_s_runs_too(tracked
     assert [list(run.metrics) for run in runs if run.job == "experiment"] == [["fit_and_evaluation_s"]] * 2
     html = (tmp_path / "page.html").read_text()
     assert [html.count(f">{words}</th>") for words in ("fit and evaluation, s", "time, s")] == [1, 1]
+
+
+def test_an_artifact_that_the_server_lists_and_does_not_give_was_taken_for_none(finished, monkeypatch):
+    store = Store(f"sqlite:///{finished / 'mlflow.db'}")
+    (run,) = store.runs(store.find_experiment("smoke"), f"tags.`{KIND}` = 'run'")
+    assert store.artifact(run, "no such.json") is None
+    monkeypatch.setattr(run.info, "_artifact_uri", "mlflow-artifacts:/of/a/server")
+
+    def refused(run_id, name):
+        raise OSError("403 Forbidden")
+
+    monkeypatch.setattr(store.client, "download_artifacts", refused)
+    with pytest.raises(InputError, match=r"carries no readable comparison\.json \(403 Forbidden\)"):
+        store.artifact(run, "comparison.json")
