@@ -40,12 +40,12 @@ def training_part(
 def cut_repeats(series: ErrorSeries, repeats: RepeatsConfig) -> Split:
     """The repeats of a record, by role. The last `valid_share` of each training repeat validates.
 
-    Raises DataError as `rows_of_repeat`.
+    Raises DataError as `rows_of_repeat`, and where a training repeat is left fewer than two rows to train on.
     """
     train, valid = [], []
     for number in repeats.train:
         piece = _repeat(series, repeats, number)
-        cut = _trained(len(piece), repeats)
+        cut = _trained(len(piece), repeats, number)
         train.append(piece.take(slice(0, cut)))
         if cut < len(piece):
             valid.append(piece.take(slice(cut, len(piece)), f"{piece.name}, end"))
@@ -81,9 +81,18 @@ def rows_of_repeat(name: str, time_s: Array, dt_s: float, repeats: RepeatsConfig
     return slice(int(low), int(high))
 
 
-def _trained(rows: int, repeats: RepeatsConfig) -> int:
-    """Number of the first rows of a training repeat that train; the others validate."""
-    return round(rows * (1 - repeats.valid_share))
+def _trained(rows: int, repeats: RepeatsConfig, number: int) -> int:
+    """Number of the first rows of the training repeat with a number that train; the others validate.
+
+    Raises DataError where fewer than two are left to train on.
+    """
+    trained = round(rows * (1 - repeats.valid_share))
+    if trained < 2:
+        raise DataError(
+            f"repeat {number}: with repeats.valid_share {repeats.valid_share:g} it trains on {trained} of its {rows} "
+            "rows, and needs two at least; give a smaller share."
+        )
+    return trained
 
 
 WHOLE_REPEAT_SHARE = 0.99
@@ -121,8 +130,8 @@ def training_drives(
     for number in repeats.test:
         rows_of(number)
     return [
-        (name, slice(rows.start, rows.start + _trained(rows.stop - rows.start, repeats)))
-        for rows in map(rows_of, repeats.train)
+        (name, slice(rows.start, rows.start + _trained(rows.stop - rows.start, repeats, number)))
+        for number, rows in zip(repeats.train, map(rows_of, repeats.train), strict=True)
     ]
 
 

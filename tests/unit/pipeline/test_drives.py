@@ -34,3 +34,9 @@ def test_a_repeat_the_record_does_not_have_was_named_after_all_physics_was_fitte
 def test_a_period_of_a_row_is_told_at_once_too():
     with pytest.raises(DataError, match="a repeat of 1 s holds no two rows 1 s apart"):
         training_drives(data(train=[1], period_s=1.0), RECORDS, ROLES)
+
+
+def test_a_share_that_leaves_no_rows_to_train_on_is_told():
+    expected = r"repeat 3: with repeats.valid_share 0\.999 it trains on 1 of its 600 rows"
+    with pytest.raises(DataError, match=expected):
+        training_drives(data(train=[3], valid_share=0.999), RECORDS, ROLES)
