@@ -358,5 +358,5 @@ def _series(cell: Cell, rows: Array) -> dict[str, Array]:
         "c_sn": solved_rows.surface_n * n.c_max_mol_m3,
         "c_e0": solved_rows.c_e0,
         "c_eL": solved_rows.c_el,
-        "soc": (solved_rows.mean_n - n.theta_min) / (n.theta_max - n.theta_min),
+        "soc": cell.soc_of(solved_rows.mean_n),
     }

@@ -733,3 +733,9 @@ def test_cut_offs_of_another_cell_are_taken_or_refused(content):
         cell.with_cut_offs(4.1, 2.8)
     with pytest.raises(CellError, match="the upper cut-off is 4200 V; one of them is in another unit"):
         cell.with_cut_offs(2800.0, 4200.0)
+
+
+def test_the_state_of_charge_of_a_mean_stoichiometry_is_that_which_has_it(lg_m50):
+    soc = np.array([-0.1, 0.0, 0.37, 1.0, 1.2])
+    mean_n, _ = lg_m50.stoichiometries(soc)
+    assert lg_m50.soc_of(mean_n) == pytest.approx(soc, abs=1e-15)
