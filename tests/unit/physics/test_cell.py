@@ -101,6 +101,15 @@ def test_what_bpx_has_no_field_for_travels_in_the_user_section(content):
     assert Cell.from_bpx(cell.to_bpx()) == cell
 
 
+@pytest.mark.parametrize("film", [{}, {"Negative electrode film resistance [Ohm.m2]": 0.0}])
+def test_an_activation_energy_of_a_film_is_kept_where_the_file_declares_no_film(content, film):
+    energy = "Negative electrode film resistance activation energy [J.mol-1]"
+    content["Parameterisation"]["User-defined"] = {energy: 4e4, **film}
+    cell = Cell.from_bpx(content)
+    assert cell.to_bpx()["Parameterisation"]["User-defined"] == {energy: 4e4}
+    assert Cell.from_bpx(cell.to_bpx()) == cell
+
+
 def test_a_record_at_celsius_is_told_that_it_is_in_kelvin(content):
     content["Parameterisation"]["User-defined"] = {"Mean temperature by record [K]": {"july": 10.0}}
     with pytest.raises(
