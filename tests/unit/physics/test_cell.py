@@ -135,6 +135,51 @@ def fault(content: dict) -> str:
     return message
 
 
+BEYOND_FLOATS = 10**400
+
+
+@pytest.mark.parametrize(
+    ("section", "field", "value", "below"),
+    [
+        ("Cell", "Electrode area [m2]", BEYOND_FLOATS, ""),
+        ("Cell", "Number of electrode pairs connected in parallel to make a cell", BEYOND_FLOATS, ""),
+        ("Electrolyte", "Conductivity [S.m-1]", -BEYOND_FLOATS, ""),
+        ("Positive electrode", "OCP [V]", {"x": [0.0, 1.0], "y": [BEYOND_FLOATS, 3.0]}, ": y"),
+        ("User-defined", "Contact resistance [Ohm]", BEYOND_FLOATS, ""),
+    ],
+    ids=["number", "count", "negative", "table", "own"],
+)
+def test_a_whole_number_that_no_float_holds_is_told_with_its_field(content, section, field, value, below):
+    content["Parameterisation"].setdefault(section, {})[field] = value
+    assert fault(content) == (
+        f"BPX data: Parameterisation: {section}: {field}{below} holds a whole number of more than 308 digits, which no "
+        "value of a cell has; correct it."
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ('{"Header": ' + 5000 * "1" + "}", "holds a whole number of thousands of digits"),
+        (100_000 * "[", "nests its sections more deeply than any BPX file does"),
+    ],
+    ids=["digits", "depth"],
+)
+def test_what_json_cannot_hold_in_python_is_one_sentence(tmp_path, text, told):
+    path = tmp_path / "cell.json"
+    path.write_text(text)
+    with pytest.raises(CellError, match=rf"cell\.json {told}"):
+        Cell.from_bpx(path)
+
+
+@pytest.mark.parametrize("value", [np.inf, -np.inf, np.nan])
+def test_no_number_of_a_file_is_taken_that_is_not_finite(content, value):
+    """JSON readers take 1e999, Infinity and NaN."""
+    parts = content["Parameterisation"]
+    parts["Electrolyte"]["Cation transference number"] = value
+    assert f"Electrolyte: transference = {value:g} has to be a share below 1" in fault(content)
+
+
 def test_a_missing_field_is_named(content):
     del content["Parameterisation"]["Positive electrode"]["Thickness [m]"]
     assert "Thickness [m]" in fault(content)
