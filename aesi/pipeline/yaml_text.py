@@ -34,3 +34,5 @@ def parse_yaml(text: str) -> Any:
         raise ValueError(f"is not YAML: character {error.position + 1}: {error.reason}.") from None
     except (ValueError, AttributeError) as error:  # a date or a number that is none
         raise ValueError(f"is not YAML: {error}.") from None
+    except RecursionError:
+        raise ValueError("is not YAML of an experiment: its lists or keys are nested too deeply.") from None
