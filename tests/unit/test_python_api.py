@@ -295,6 +295,7 @@ def test_columns_that_are_no_measurement_are_refused(columns, sentence):
         ({"data": pd.DataFrame({"time_s": [0.0]})}, "an object of type DataFrame is no record"),
         ({"data": [TIME, TIME]}, "an object of type ndarray is no record"),
         ({"data": aesi.Measurement([], [], [])}, r"too few rows \(0\)"),
+        ({"soh": 10**400}, r"a state of health of 1000+\.\.\.0+: it is the share"),
         (
             {"data": aesi.Measurement([0.0, 1.0], [1.0, 1.0], [3.9, np.nan])},
             r"voltage_v is nan at 1 s \(row 2, counted from 1\)",
@@ -335,6 +336,8 @@ def test_a_prior_of_no_parameter_was_told_by_python_once_the_records_were_read(c
     with pytest.raises(InputError, match="no_such_factor"):
         aesi.calibrate(cell, tmp_path / "missing.csv", priors={"no_such_factor": (1.0, 0.1)})
 
+        ({"mass_g": 10**400, "body_mm": (21, 70)}, r"a mass of 1000+\.\.\.0+ g is no number"),
+        ({"cut_offs_v": (2.5, 10**400)}, r"1000+\.\.\.0+ V as the upper cut-off is no number"),
 
 @pytest.mark.parametrize(("source", "type_"), [([], "list"), (3, "int"), (None, "NoneType")])
 def test_what_is_no_file_of_a_cell_is_told(source, type_):
@@ -528,6 +531,8 @@ def test_a_type_checker_lets_through_what_the_functions_take():
         (aesi.simulate, ("time_s", "current_a")),
         (aesi.HybridModel.predict, ("time_s", "current_a")),
         (aesi.impedance, ("frequency_hz",)),
+    with pytest.raises(InputError, match="resistance_ohm is a whole number of more than 308 digits"):
+        CATALOGUE["series_resistance"].activate(resistance_ohm=10**400)
         (aesi.cross_check, ("time_s", "current_a")),
     ):
         assert {get_type_hints(function)[name] for name in names} == {Numbers}, function
