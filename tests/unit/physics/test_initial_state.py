@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aesi.constants import SECONDS_PER_HOUR
-from aesi.errors import DataError, InputError
+from aesi.errors import CellError, DataError, InputError
 from aesi.physics import Cell, initial_state, simulate
-from aesi.physics.cell.relations import LookupTable
+from aesi.physics.cell.relations import Expression, LookupTable
 from aesi.physics.effect import Effect, Record, as_cell_saw
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.record_checks import SOC_MARGIN
@@ -614,6 +614,16 @@ def test_a_voltage_beyond_full_was_known_to_the_least_of_all_deviations():
 def test_a_voltage_of_another_cell_is_refused():
     with pytest.raises(DataError, match=r"2\.5"):
         initial_state(LG_M50, resting(1.9))
+
+
+def test_a_potential_that_ends_within_the_range_was_told_as_a_voltage_between_two_that_are_no_number():
+    potential = LG_M50.negative.ocp.text + " + 0.0 * sqrt(x - 0.02)"
+    cell = LG_M50.with_negative(ocp=Expression(potential))
+    assert cell.negative.theta_min > 0.02
+    with pytest.raises(
+        CellError, match="by its potentials the open-circuit voltage is not finite at a state of"
+    ):
+        simulate(cell, [0.0, 1.0], [0.0, 0.0], rest_voltage_v=3.7)
 
 
 def test_no_voltage_and_nothing_given_is_refused():
