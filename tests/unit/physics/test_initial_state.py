@@ -641,6 +641,20 @@ def test_a_voltage_that_is_not_known_further_on_made_a_start_that_is_no_number(c
     assert (found.soc, found.sd, found.basis) == (whole.soc, whole.sd, whole.basis)
 
 
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"hold": "zoh"}, "hold = 'zoh' is not known; give 'linear' or 'backward'"),
+        ({"model": "spm"}, "model = 'spm' is not known; give 'espm' or 'dfn'"),
+        ({"effects": "clock_skew"}, "effects is the text 'clock_skew'; give a list of them"),
+        ({"effects": [CATALOGUE["clock_skew"]]}, "which has no values yet"),
+    ],
+)
+def test_an_unknown_hold_was_taken_for_straight_lines_and_an_effect_without_values_for_one(changes, sentence):
+    with pytest.raises(InputError, match=sentence):
+        initial_state(LG_M50, resting(3.7), **changes)
+
+
 @pytest.mark.parametrize("soc0", [np.nan, 50.0])
 def test_a_start_that_is_no_state_of_charge_was_taken_as_given(soc0):
     with pytest.raises(InputError, match="is not a state of charge"):
