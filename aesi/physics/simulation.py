@@ -13,6 +13,7 @@ import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
+from sys import float_info
 from typing import Literal
 
 import numpy as np
@@ -21,7 +22,14 @@ from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError, NoNumberError, SimulationError
 from aesi.numerics.typing import Array, Numbers
 from aesi.over_time import stamp
-from aesi.physics.arguments import check_cell, check_choice, check_temperature, checked_effects, checked_soc
+from aesi.physics.arguments import (
+    FARTHEST_SOC,
+    check_cell,
+    check_choice,
+    check_temperature,
+    checked_effects,
+    checked_soc,
+)
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
 from aesi.physics.depletion import depletion_sentence
@@ -102,8 +110,8 @@ def simulate(
     check_cell(cell)
     check_choice("hold", hold, Hold)
     check_choice("on_depletion", on_depletion, OnDepletion)
-    if on_depletion == "raise":  # a search may try states that no cell has
-        soc0 = checked_soc(soc0)
+    # A search may try states that no cell has.
+    soc0 = checked_soc(soc0, farthest=FARTHEST_SOC if on_depletion == "raise" else float_info.max)
     time, current = _checked_record(time_s, current_a)
     active = instruments_first(checked_effects(effects))
     profile_arrays: dict[str, Array] | None = {} if profiles else None

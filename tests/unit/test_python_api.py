@@ -229,6 +229,11 @@ def test_a_discovery_takes_files(cell, record, tmp_path, monkeypatch):
         ({"soc0": float("nan")}, "soc0 = nan is not a state of charge"),
         ({"soc0": "full"}, "soc0 = 'full' is not a state of charge"),
         ({"soc0": np.array([0.8])}, r"soc0 = array\(\[0.8\]\) is not a state of charge"),
+        ({"soc0": "full", "on_depletion": "clip"}, "soc0 = 'full' is not a state of charge"),
+        ({"soc0": [0.8], "on_depletion": "clip"}, r"soc0 = \[0.8\] is not a state of charge"),
+        ({"soc0": True, "on_depletion": "clip"}, "soc0 = True is not a state of charge"),
+        ({"soc0": float("nan"), "on_depletion": "clip"}, "soc0 = nan is not a state of charge"),
+        ({"soc0": float("inf"), "on_depletion": "clip"}, "soc0 = inf is not a state of charge"),
         (
             {"time_s": pd.date_range("2024", periods=len(TIME), freq="s")},
             "time_s holds dates or durations; give",
