@@ -341,10 +341,13 @@ def _checked_record(time_s: object, current_a: object) -> tuple[Array, Array]:
 def _kelvin(temperature_degc: Numbers | None, time: Array) -> Array | None:
     if temperature_degc is None:
         return None
-    kelvin = numbers(temperature_degc, "temperature_degc") + ZERO_CELSIUS_K
-    if kelvin.shape not in ((), time.shape) or not np.isfinite(kelvin).all():
-        raise DataError(f"temperature_degc has to be one value or {len(time)} finite ones.")
-    check_temperature(temperature_degc)
+    degc = numbers(temperature_degc, "temperature_degc")
+    if degc.shape not in ((), time.shape):
+        raise DataError(f"temperature_degc has the shape {degc.shape}; give one value or {len(time)}.")
+    if degc.ndim:
+        check_row(degc, "temperature_degc")
+    check_temperature(degc)
+    kelvin = degc + ZERO_CELSIUS_K
     return np.ascontiguousarray(np.broadcast_to(kelvin, time.shape))
 
 
