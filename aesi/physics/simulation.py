@@ -104,8 +104,8 @@ def simulate(
     Raises SimulationError with time and electrode where the cell runs out, or where a clipped simulation has no
     solution; DataError for arrays that cannot be simulated, and for a rest voltage that no state of the cell has;
     InputError for an unknown model, hold or on_depletion, for a wrong type of cell, effect, state of charge or
-    temperature, and for an effect that the model already contains; CellError for an effect that needs a value which
-    the cell's file does not declare.
+    temperature, and for an effect that the model already contains; CellError for a potential, a rate or a film that the
+    models cannot tabulate, and for an effect that needs a value which the cell's file does not declare.
     """
     check_cell(cell)
     check_choice("hold", hold, Hold)

@@ -145,6 +145,8 @@ class OpenCircuit:
     def reading(self, voltage_v: float, spread_v: float) -> tuple[float, float]:
         """(state of charge at an open-circuit voltage, half the range that voltage +/- `spread_v` covers). Beyond full
         and empty the range is that at the limit, with `spread_v` enlarged by the distance from it.
+
+        voltage_v : V.  spread_v : its standard deviation, V.  Raises DataError where `admits` does not hold.
         """
         if not self.admits(voltage_v, spread_v):
             low, high = np.interp([0.0, 1.0], self.soc, self.ocv)
