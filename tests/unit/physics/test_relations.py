@@ -134,7 +134,16 @@ def test_a_mixture_that_is_not_finite_inside_is_refused_in_one_sentence():
         ({"x": [0, 1], "y": [None, 1]}, "y of a table holds None, which is not a number"),
         ({"x": 0, "y": 1}, "x of a table is 0, and has to be a list of numbers"),
         ({"x": "01", "y": [0, 1]}, "x of a table is '01', and has to be a list of numbers"),
-        ({"x": [0, float("inf")], "y": [0, 1]}, "strictly increasing, finite x"),
+        ({"x": [0, float("inf")], "y": [0, 1]}, "x of a table is inf in row 2, counted from 1; give finite"),
+        ({"x": [0, 1], "y": [float("nan"), 1]}, "y of a table is nan in row 1, counted from 1; give finite"),
+        (
+            {"x": [0, 0.5, 0.5, 1], "y": [4, 3, 2, 1]},
+            "x of a table does not rise to 0.5 in row 3, counted from 1",
+        ),
+        (
+            {"x": [1, 0], "y": [4, 3]},
+            "x of a table does not rise to 0 in row 2, counted from 1; sort its rows",
+        ),
     ],
 )
 def test_a_table_of_what_is_no_number_was_an_error_of_python(table, told):
