@@ -11,6 +11,7 @@ import pytest
 from lead_effect import OWN
 
 import aesi
+from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import ConfigError, InputError, NoNumberError, OwnEffectError, ParameterError
 from aesi.parameters import Parameter
 from aesi.physics import Contribution, Effect
@@ -283,6 +284,20 @@ def test_what_an_effect_makes_of_a_record_or_a_cell_is_checked_as_what_a_user_gi
     path.write_text(acting + OWN[OWN.index("\n\nEFFECT") :].replace("on_voltage=drop", f"{place}=act"))
     with pytest.raises(error, match=sentence):
         aesi.simulate(cell, TIME, current, SOC0, [load_effect(path).activate()])
+
+
+@pytest.mark.parametrize("model", ["espm", "dfn"])
+def test_an_effect_of_ones_own_that_leaves_the_temperature_to_the_model_had_no_impedance(
+    tmp_path, cell, model
+):
+    path = tmp_path / "mine.py"
+    acting = OWN[: OWN.index("def drop")] + "from dataclasses import replace\n\n"
+    acting += "def act(record, *, lead_ohm):\n    return replace(record, temperature_k=None)\n"
+    path.write_text(acting + OWN[OWN.index("\n\nEFFECT") :].replace("on_voltage=drop", "on_record=act"))
+    declared_degc = cell.initial_temperature_k - ZERO_CELSIUS_K
+    expected = aesi.impedance(cell, [1e-2, 1.0], 0.5, declared_degc, model=model)
+    given = aesi.impedance(cell, [1e-2, 1.0], 0.5, 40.0, [load_effect(path).activate()], model=model)
+    np.testing.assert_allclose(given, expected, rtol=1e-12)
 
 
 def test_an_effect_of_ones_own_that_fails_on_the_cell_it_is_written_into_is_told_with_its_file(
