@@ -125,3 +125,7 @@ def _number(name: str, value: object) -> float:
         return float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         raise ParameterError(f"{name} = {value!r} is not a number.") from None
+    except OverflowError:
+        raise ParameterError(
+            f"{name} is a whole number of more than 308 digits, which no parameter has; correct it."
+        ) from None

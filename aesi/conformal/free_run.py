@@ -44,12 +44,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from numbers import Real
 
 import numpy as np
 from scipy.special import ndtri
 
-from aesi.conformal.horizon_band import HorizonBand, calibrated_band
+from aesi.conformal.horizon_band import WHOLE_DRIVE, HorizonBand, calibrated_band
 from aesi.conformal.intervals import Intervals
 from aesi.conformal.local_scale import covariates
 from aesi.conformal.parameter_spread import spread, thermal_spread
@@ -59,7 +58,7 @@ from aesi.numerics.quantiles import check_miss_rate
 from aesi.numerics.typing import Array, BoolArray, SavedState
 from aesi.numerics.visited import Visited
 from aesi.records import ErrorSeries, FreeRun
-from aesi.records.checked import checked_dt
+from aesi.records.checked import checked_dt, is_finite_number
 
 SCHEMA = "aesi.free_run_bands/8"
 
@@ -268,7 +267,7 @@ class FreeRunBands:
 
 def _check_horizon(horizon_s: object) -> None:
     """Raises InputError for what is no time ahead, s; WHOLE_DRIVE is one."""
-    if not (isinstance(horizon_s, Real) and float(horizon_s) > 0.0):
+    if horizon_s != WHOLE_DRIVE and not (is_finite_number(horizon_s) and horizon_s > 0.0):
         raise InputError(
             f"a horizon of {horizon_s} s is no time ahead; give a positive number of seconds, or WHOLE_DRIVE."
         )

@@ -25,8 +25,8 @@ class Intervals:
 
     @property
     def width_v(self) -> Array:
-        """(n,) V, >= 0. One step ahead it is positive (`Calibrated.floor_v`); of a free run it is 0 where nearly all
-        errors of the calibration were."""
+        """(n,) V, >= 0. One step ahead it is positive (`Calibrated.floor_v`), but for the refitted forest of the
+        tables, which has no floor; of a free run it is 0 where nearly all errors of the calibration were."""
         return self.upper_v - self.lower_v
 
     def covers(self, residuals: Array) -> BoolArray:

@@ -113,8 +113,8 @@ class _Descent:
 
     def minimum(self, x: Array, rounds: int, slopes: Array | None) -> Minimum:
         """Where a descent from x within the box ends."""
-        residual = self.model.residual(x)
-        if residual is None or not np.isfinite(residual).all():
+        residual = self._finite_residual(x)
+        if residual is None:
             return Minimum(x, np.inf, False, x)
         within, damping = self, DAMPING
         if slopes is not None:
@@ -139,17 +139,22 @@ class _Descent:
     def past_jumps(self, x: Array) -> Array:
         """x (n,), with each of the coordinates `jumps` at zero where that reduces the cost by more than the tolerance;
         x itself where none does, or where the model fails there."""
-        here = self.model.residual(x) if self.jumps else None
+        here = self._finite_residual(x) if self.jumps else None
         if here is None:
             return x
         cost = _half_square(here)
         for j in self.jumps:
             there = x.copy()
             there[j] = np.clip(0.0, self.low[j], self.high[j])
-            residual = None if there[j] == x[j] else self.model.residual(there)
+            residual = None if there[j] == x[j] else self._finite_residual(there)
             if residual is not None and not self.negligible(cost - _half_square(residual), here):
                 x, cost, here = there, _half_square(residual), residual
         return x
+
+    def _finite_residual(self, x: Array) -> Array | None:
+        """Residual (m,) at x (n,); None where the model fails or a value is not finite."""
+        residual = self.model.residual(x)
+        return residual if residual is not None and np.isfinite(residual).all() else None
 
     def _broyden_steps(self, here: _Point, damping: float, fresh: bool) -> tuple[_Point, float]:
         """(last point, damping) after steps with the slopes of a point and then with their updates, while the cost

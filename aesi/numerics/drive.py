@@ -15,6 +15,9 @@ from aesi.numerics.typing import Array
 N_RECENT = 4
 """Number of currents that one row needs: those of the sample itself and of the three before it."""
 
+N_DRIVE_FEATURES = 7
+"""Number of columns of `drive_features`."""
+
 
 def drive_features(current_a: Array) -> Array:
     """(n, 7) features of a continuous record of currents (n,) A."""

@@ -39,6 +39,8 @@ def pearson(truth: Array, prediction: Array) -> float:
     """Correlation coefficient; 0 where either series is constant or not finite, since it explains nothing."""
     if len(truth) < 2 or not np.isfinite(prediction).all():
         return 0.0
+    if np.ptp(truth) == 0.0 or np.ptp(prediction) == 0.0:  # their means have round-off, which would correlate
+        return 0.0
     a, b = truth - np.mean(truth), prediction - np.mean(prediction)
     scale = float(np.sqrt((a @ a) * (b @ b)))
     return float(a @ b) / scale if scale > 0 else 0.0

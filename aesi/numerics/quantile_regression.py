@@ -74,7 +74,7 @@ def fit_quantiles(x: Array, y: Array, levels: Array) -> Array:
     """(p, L) coefficients of the linear quantiles of y given x, one column per level.
 
     x : (n, p), scaled internally.  y : (n,).  levels : (L,) in (0, 1).
-    Raises FitError for fewer rows than columns.
+    Raises FitError unless there are more rows than columns.
     """
     n, p = x.shape
     if n <= p:

@@ -12,7 +12,7 @@ from aesi.numerics.typing import Array
 
 def check_miss_rate(alpha: object) -> None:
     """Raises InputError for an alpha that is no share of misses, in (0, 1)."""
-    if not (isinstance(alpha, Real) and 0 < float(alpha) < 1):
+    if isinstance(alpha, int) or not (isinstance(alpha, Real) and 0 < float(alpha) < 1):
         raise InputError(f"alpha = {alpha} is not a share of misses; give a value between 0 and 1.")
 
 

@@ -59,16 +59,16 @@ def check_choice(name: str, value: object, choices: Any) -> None:
         raise InputError(f"{name} = {value!r} is not known; give {allowed}.")
 
 
-def checked_soc(soc: Any, name: str = "soc0") -> float | None:
+def checked_soc(soc: Any, name: str = "soc0", *, farthest: float = FARTHEST_SOC) -> float | None:
     """A state of charge as a float; None for None.  Raises InputError where it is no share of the capacity.
 
-    name : of the argument, for the sentence.
+    name : of the argument, for the sentence.  farthest : largest distance from [0, 1] that is admissible.
     """
     if soc is None:
         return None
     given = np.asarray(soc)
     number = given.ndim == 0 and given.dtype.kind in "iuf"
-    if not (number and -FARTHEST_SOC <= given <= 1.0 + FARTHEST_SOC):  # this way round, NaN fails too
+    if not (number and -farthest <= given <= 1.0 + farthest):  # this way round, NaN fails too
         raise InputError(
             f"{name} = {soc!r} is not a state of charge; give a share of the capacity between 0 (empty) and 1 (full), "
             "as one number, so 90 % is 0.9."

@@ -52,6 +52,7 @@ def with_active_material(cell: Cell, negative: float, positive: float, lost_at_s
 
     lost_at_soc : state of charge at which the material was lost with the lithium in it; the stoichiometries at that
     state do not change.  Full and empty are at the declared rest voltages again.
+    Raises SimulationError where no window satisfies the voltages.
     """
     if negative == 1.0 and positive == 1.0:
         return cell

@@ -88,9 +88,7 @@ def _surface_clause(
     rows : (7, n), `SolvedRows`.  at : the faulty row.  what : 1 or 2, the electrode.  Others as `_salt_clause`.
     """
     cell, electrode, row = model.cell, (model.cell.negative, model.cell.positive)[what - 1], rows[:, at]
-    every = (SolvedRows(*rows).mean_n - cell.negative.theta_min) / (
-        cell.negative.theta_max - cell.negative.theta_min
-    )
+    every = cell.soc_of(SolvedRows(*rows).mean_n)
     soc = float(every[at])
     surface = (
         f"the surface of the {LAYERS[what]} left the stoichiometry range [0, 1] {where}, at a state of charge of "

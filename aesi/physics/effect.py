@@ -76,15 +76,14 @@ class Record:
         Rows between readings are left out where the current does not change.
         """
         read = self._snapped()
-        now, steps = self.current_a, np.diff(self.current_a) != 0.0
+        steps = np.diff(self.current_a) != 0.0
         turns = np.append(steps, True)
         if not backward:
             turns[1:] |= steps
         turns[0] = True
         time = np.union1d(self.time_s[turns & (self.time_s < read.max())], read)
         kelvin = None if self.temperature_k is None else np.interp(time, self.time_s, self.temperature_k)
-        now = self.current_at(time, backward)
-        return Record(time, now, kelvin), np.searchsorted(time, read)
+        return Record(time, self.current_at(time, backward), kelvin), np.searchsorted(time, read)
 
     def beside_voltage(self, backward: bool, mean: bool = False) -> Record:
         """The record with one row per reading of the voltage, and the current that flowed there.

@@ -35,6 +35,7 @@ def folded(
 
     Effects on the record, on the reading, on the voltage, or on parameters that a cell file does not declare (layers,
     particle sizes, a heat balance) are left, and so are those that `stays` selects.
+    Raises as `ActiveEffect.act` where a user's own effect fails on the cell.
     """
     held: list[ActiveEffect] = []
     left: list[ActiveEffect] = []
@@ -56,5 +57,5 @@ def _on_cell_alone(cell: Cell, active: ActiveEffect) -> Cell | None:
     if effect.on_model is None or effect.on_record or effect.on_voltage or effect.on_reading:
         return None
     before = EspmModel(cell)
-    after = effect.on_model(before, **active.parameters)
+    after = active.act(effect.on_model, before)
     return after.cell if replace(after, cell=cell) == before else None

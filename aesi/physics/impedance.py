@@ -78,9 +78,10 @@ def impedance(
         )
     frequency = _checked_frequency(frequency_hz)
     active = checked_effects(effects)
-    kelvin = _true_kelvin(active, _checked_kelvin(temperature_degc))
+    stated_k = _checked_kelvin(temperature_degc)
     check_choice("model", model, ModelName)
     changed = model_with(cell, active)
+    kelvin = _true_kelvin(changed, active, stated_k)
     rest = _rest_stoichiometries(cell, changed, share)
     if not ((rest > 0.0) & (rest < 1.0)).all():
         raise DataError(
@@ -137,7 +138,7 @@ def slowest_diffusion_hz(
     """
     active = checked_effects(effects)
     model = model_with(cell, active)
-    kelvin = _true_kelvin(active, float(temperature_degc) + ZERO_CELSIUS_K)
+    kelvin = _true_kelvin(model, active, float(temperature_degc) + ZERO_CELSIUS_K)
     rest, units = _rest_stoichiometries(cell, model, soc), particle_units(model)
     faster = [_diffusion_factor(model, side, float(rest[side]), kelvin) for side in units.place[:, 0]]
     solid = float(np.min(np.array(faster)[:, None] * units.rates))
@@ -274,10 +275,11 @@ def _slope(relation: Relation, at: float) -> float:
     return float((values[1] - values[0]) / (high - low))
 
 
-def _true_kelvin(effects: tuple[ActiveEffect, ...], kelvin: float) -> float:
-    """The true temperature of the cell, K: `kelvin` after the effects that change it."""
-    record = as_cell_saw(Record(np.zeros(1), np.zeros(1), np.array([kelvin])), effects)
-    return float(cast(Array, record.temperature_k)[0])
+def _true_kelvin(model: EspmModel, effects: tuple[ActiveEffect, ...], kelvin: float) -> float:
+    """The true temperature of the cell, K: `kelvin` after the effects that change it, and that of the model where one
+    leaves it to that."""
+    seen = as_cell_saw(Record(np.zeros(1), np.zeros(1), np.array([kelvin])), effects).temperature_k
+    return model.cell.initial_temperature_k if seen is None else float(seen[0])
 
 
 def _series_ohm(

@@ -28,7 +28,7 @@ import numpy as np
 
 from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.errors import DataError
-from aesi.physics.arguments import check_cell, check_measurement, checked_soc
+from aesi.physics.arguments import check_cell, check_choice, check_measurement, checked_effects, checked_soc
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Record, as_cell_saw, instruments_first
@@ -102,14 +102,17 @@ def initial_state(
     voltage, V; a fit that moves the potentials takes `GOOD_READING_V`.
     Where the voltage is missing from some row on, only the rows before it are used.
     Raises DataError where the voltage belongs to no state of this cell, or where there is neither voltage nor `soc0`;
-    InputError for a `soc0` that is no state of charge, and for what is no Cell or no Measurement.
+    InputError for a `soc0` that is no state of charge, for an unknown hold or model, and for what is no Cell, no
+    Measurement or no active effect.
     """
     check_cell(cell)
     check_measurement(record)
+    check_choice("hold", hold, Hold)
+    check_choice("model", model, ModelName)
     soc0 = checked_soc(soc0)
     if not len(record):
         raise DataError(f"{record.name} has no row to start from.")
-    active = instruments_first(effects)
+    active = instruments_first(checked_effects(effects))
     unknown = ~np.isfinite(record.voltage_v)
     if unknown[0]:
         if soc0 is None:

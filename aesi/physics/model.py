@@ -54,7 +54,7 @@ class Plating:
     """Lithium metal on the negative electrode: rate (m/s) and transfer coefficient of plating."""
 
     rate_m_s: float
-    transfer_coefficient: float = 0.65
+    transfer_coefficient: float
 
 
 NO_PLATING = Plating(0.0, 0.5)

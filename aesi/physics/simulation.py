@@ -13,6 +13,7 @@ import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
+from sys import float_info
 from typing import Literal
 
 import numpy as np
@@ -21,7 +22,14 @@ from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError, NoNumberError, SimulationError
 from aesi.numerics.typing import Array, Numbers
 from aesi.over_time import stamp
-from aesi.physics.arguments import check_cell, check_choice, check_temperature, checked_effects, checked_soc
+from aesi.physics.arguments import (
+    FARTHEST_SOC,
+    check_cell,
+    check_choice,
+    check_temperature,
+    checked_effects,
+    checked_soc,
+)
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
 from aesi.physics.depletion import depletion_sentence
@@ -96,14 +104,14 @@ def simulate(
     Raises SimulationError with time and electrode where the cell runs out, or where a clipped simulation has no
     solution; DataError for arrays that cannot be simulated, and for a rest voltage that no state of the cell has;
     InputError for an unknown model, hold or on_depletion, for a wrong type of cell, effect, state of charge or
-    temperature, and for an effect that the model already contains; CellError for an effect that needs a value which
-    the cell's file does not declare.
+    temperature, and for an effect that the model already contains; CellError for a potential, a rate or a film that the
+    models cannot tabulate, and for an effect that needs a value which the cell's file does not declare.
     """
     check_cell(cell)
     check_choice("hold", hold, Hold)
     check_choice("on_depletion", on_depletion, OnDepletion)
-    if on_depletion == "raise":  # a search may try states that no cell has
-        soc0 = checked_soc(soc0)
+    # A search may try states that no cell has.
+    soc0 = checked_soc(soc0, farthest=FARTHEST_SOC if on_depletion == "raise" else float_info.max)
     time, current = _checked_record(time_s, current_a)
     active = instruments_first(checked_effects(effects))
     profile_arrays: dict[str, Array] | None = {} if profiles else None
@@ -333,10 +341,13 @@ def _checked_record(time_s: object, current_a: object) -> tuple[Array, Array]:
 def _kelvin(temperature_degc: Numbers | None, time: Array) -> Array | None:
     if temperature_degc is None:
         return None
-    kelvin = numbers(temperature_degc, "temperature_degc") + ZERO_CELSIUS_K
-    if kelvin.shape not in ((), time.shape) or not np.isfinite(kelvin).all():
-        raise DataError(f"temperature_degc has to be one value or {len(time)} finite ones.")
-    check_temperature(temperature_degc)
+    degc = numbers(temperature_degc, "temperature_degc")
+    if degc.shape not in ((), time.shape):
+        raise DataError(f"temperature_degc has the shape {degc.shape}; give one value or {len(time)}.")
+    if degc.ndim:
+        check_row(degc, "temperature_degc")
+    check_temperature(degc)
+    kelvin = degc + ZERO_CELSIUS_K
     return np.ascontiguousarray(np.broadcast_to(kelvin, time.shape))
 
 
@@ -358,5 +369,5 @@ def _series(cell: Cell, rows: Array) -> dict[str, Array]:
         "c_sn": solved_rows.surface_n * n.c_max_mol_m3,
         "c_e0": solved_rows.c_e0,
         "c_eL": solved_rows.c_el,
-        "soc": (solved_rows.mean_n - n.theta_min) / (n.theta_max - n.theta_min),
+        "soc": cell.soc_of(solved_rows.mean_n),
     }

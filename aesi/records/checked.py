@@ -43,6 +43,10 @@ def numbers(values: object, name: str) -> Array:
         return np.asarray(values, dtype=float)
     except (TypeError, ValueError):
         raise DataError(f"{name} holds {_first_other(values)!r}, which is not a number.") from None
+    except OverflowError:
+        raise DataError(
+            f"{name} holds a whole number of more than 308 digits, which no float holds; correct it."
+        ) from None
 
 
 def complex_numbers(values: object, name: str) -> ComplexArray:

@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from aesi.errors import InputError
 from aesi.numerics.typing import Array, BoolArray
 from aesi.over_time import extent
 from aesi.records.horizons import steps_ahead
@@ -36,6 +37,7 @@ class ErrorSeries:
     that the error means nothing. None where none of them ran out, or where that is not known.
     own : the error over the record's own rows, at their times, where these are not the stamps but between them or
     denser; the values at a stamp are interpolated or averages then. None where the rows are the stamps.
+    current_beside_a : (n,) A, discharge positive, where the current is none of the inputs; None where it is one.
     The sparse model maps (error_v[k], inputs[k]) to error_v[k + 1]; records are never joined across a gap.
     """
 
@@ -54,6 +56,7 @@ class ErrorSeries:
     ran_out_s: float | None = None
     start_v: Array | None = None
     own: ErrorSeries | None = None
+    current_beside_a: Array | None = None
 
     def __len__(self) -> int:
         return len(self.error_v)
@@ -63,8 +66,14 @@ class ErrorSeries:
 
     @property
     def current_a(self) -> Array:
-        """(n,) A, discharge positive."""
-        return self.inputs[:, self.input_names.index("I")]
+        """(n,) A, discharge positive.  Raises InputError for a record without a current."""
+        if "I" in self.input_names:
+            return self.inputs[:, self.input_names.index("I")]
+        if self.current_beside_a is None:
+            raise InputError(
+                f"{self.name} has no current: I is none of its inputs, and nothing stands beside them."
+            )
+        return self.current_beside_a
 
     @property
     def collector_mol_m3(self) -> Array | None:
@@ -106,6 +115,7 @@ class ErrorSeries:
             temperature_degc=None if self.temperature_degc is None else self.temperature_degc[rows],
             slopes_v=None if self.slopes_v is None else self.slopes_v[rows],
             start_v=None if self.start_v is None else self.start_v[rows],
+            current_beside_a=None if self.current_beside_a is None else self.current_beside_a[rows],
             own=self._own_of(rows),
         )
 

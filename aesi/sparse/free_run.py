@@ -9,12 +9,19 @@ from __future__ import annotations
 
 import numpy as np
 
+from aesi.errors import DataError
 from aesi.numerics.compiled import kept_njit
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.sparse.terms.basis import FUNCTIONS, clipped_values, value
 
 LIMIT = 10.0
 """A prediction beyond this many times the trained half-range counts as diverged."""
+
+
+def check_steps(name: str, steps: object) -> None:
+    """Raises DataError, naming the model, for what is no number of steps ahead: no whole number, or none above 0."""
+    if not (isinstance(steps, int | np.integer) and steps >= 1):
+        raise DataError(f"{name}: a prediction {steps} steps ahead is none; give a whole number, at least 1.")
 
 
 @kept_njit()

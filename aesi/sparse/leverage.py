@@ -6,7 +6,8 @@
 h is the standard error of the fitted value at x, in units of the noise. It detects combinations that the ranges of the
 single inputs do not: a high current at a state of charge where no fitted current was high. The error of a wrong model
 grows with h too. W are the weights of the rows, lambda1 is the ridge. (2) has no unit, so that models with different
-rows can be compared. Hoaglin & Welsch, Am. Stat. 32 (1978) 17, doi:10.1080/00031305.1978.10479237.
+rows can be compared. Where h is zero in three quarters of the rows, h_u is that of the others. Hoaglin & Welsch, Am.
+Stat. 32 (1978) 17, doi:10.1080/00031305.1978.10479237.
 """
 
 from __future__ import annotations
@@ -41,7 +42,11 @@ class Leverage:
         top = float(np.max(np.sum(factor**2, axis=0)))
         ridge = np.sqrt(max(lambda1, LEAST_RIDGE * top)) * np.eye(len(theta))
         root = triangle(np.vstack([factor, ridge]))
-        return cls(root, float(np.quantile(_standard_error(root, theta), UPPER_QUARTILE)))
+        error = _standard_error(root, theta)
+        upper_quartile = float(np.quantile(error, UPPER_QUARTILE))
+        if upper_quartile == 0.0:  # no term is other than zero in most rows: those of rests between pulses
+            upper_quartile = float(np.quantile(error[error > 0.0], UPPER_QUARTILE))
+        return cls(root, upper_quartile)
 
     def excess(self, theta: Array) -> Array:
         """(n,) of (2), >= 0; theta : (m, n)."""

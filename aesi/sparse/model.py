@@ -120,10 +120,7 @@ class SparseModel:
 
         steps : whole number, at least 1.  Raises DataError for any other.
         """
-        if not (isinstance(steps, int | np.integer) and steps >= 1):
-            raise DataError(
-                f"{self.name}: a prediction {steps} steps ahead is none; give a whole number, at least 1."
-            )
+        free_run.check_steps(self.name, steps)
         return self._predicted_ahead(self._drive(self._variables(series), series), series.error_v, steps)
 
     def reach(self, series: ErrorSeries, steps: int | None = None, error0_v: float | None = None) -> Array:

@@ -152,6 +152,9 @@ class Alike(QuantileModel):
     def quantiles(self, rows):
         return np.tile(self.levels_v, (len(rows), 1))
 
+    def check_columns(self, count):
+        pass
+
     def to_state(self):
         return {"levels_v": self.levels_v}
 
@@ -180,6 +183,48 @@ def test_intervals_of_a_state_that_lacks_any_key_are_refused(calibrated: Calibra
     for key in state:
         with pytest.raises(InputError, match="schema" if key == "schema" else f"it lacks '{key}'"):
             calibrated_from_dict({name: value for name, value in state.items() if name != key})
+
+
+def first_split_to_itself(forest: dict) -> dict:
+    left = forest["left"].copy()
+    left[np.flatnonzero(forest["feature"] >= 0)[0]] = 0
+    return {"left": left}
+
+
+def first_leaf_beyond(forest: dict) -> dict:
+    left = forest["left"].copy()
+    left[np.flatnonzero(forest["feature"] < 0)[0]] = len(forest["leaf_cdf"])
+    return {"left": left}
+
+
+@pytest.mark.parametrize(
+    ("name", "inside", "damage", "told"),
+    [
+        ("spci_linear", (), lambda m: {"slope": m["slope"][:-1]}, "slope has 19 rows for 20 columns"),
+        ("spci_boosted", ("inner",), lambda m: {"feature": m["feature"] + 21}, "and a row has 21 columns"),
+        ("spci_boosted", (), lambda m: {"n_history": 99}, "n_history is 99, and a row has 20 columns"),
+        ("spci_boosted", ("line",), lambda m: {"slope": m["slope"][1:]}, "slope has 19 rows for 20 columns"),
+        (
+            "spci_forest",
+            (),
+            lambda m: {"feature": np.where(m["feature"] < 0, -1, m["feature"] + WINDOW)},
+            f"and a row has {WINDOW} columns",
+        ),
+        ("spci_forest", (), first_split_to_itself, "a split leads to no node after it"),
+        ("spci_forest", (), first_leaf_beyond, "a split leads to no leaf"),
+        ("spci_forest", (), lambda m: {"grid": m["grid"][1:]}, "leaf_cdf has the shape"),
+        ("spci_forest", (), lambda m: {"roots": m["roots"] + 10**6}, "roots holds 1e"),
+    ],
+)
+def test_a_damaged_regressor_read_beyond_its_rows(name, inside, damage, told) -> None:
+    """Compiled code read whatever lay there in memory, or followed a split for ever."""
+    state = METHODS[name].fit([series(1000, 1), series(600, 2)], window=WINDOW).to_dict()
+    model = state["band"]["model"]
+    for part in inside:
+        model = model[part]
+    model |= damage(model)
+    with pytest.raises(InputError, match=f"the saved intervals cannot be read back: .*{told}"):
+        calibrated_from_dict(state)
 
 
 def _pull_arrays(value, path, arrays):

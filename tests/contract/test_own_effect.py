@@ -11,10 +11,12 @@ import pytest
 from lead_effect import OWN
 
 import aesi
+from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import ConfigError, InputError, NoNumberError, OwnEffectError, ParameterError
 from aesi.parameters import Parameter
 from aesi.physics import Contribution, Effect
 from aesi.physics.effects import CATALOGUE, activated, known_effects, load_effect
+from aesi.physics.folded import folded
 from aesi.pipeline.discovery.discover import Case, write_discovery
 from aesi.pipeline.experiment.config import parse_experiment
 from aesi.pipeline.experiment.load import load
@@ -282,6 +284,30 @@ def test_what_an_effect_makes_of_a_record_or_a_cell_is_checked_as_what_a_user_gi
     path.write_text(acting + OWN[OWN.index("\n\nEFFECT") :].replace("on_voltage=drop", f"{place}=act"))
     with pytest.raises(error, match=sentence):
         aesi.simulate(cell, TIME, current, SOC0, [load_effect(path).activate()])
+
+
+@pytest.mark.parametrize("model", ["espm", "dfn"])
+def test_an_effect_of_ones_own_that_leaves_the_temperature_to_the_model_had_no_impedance(
+    tmp_path, cell, model
+):
+    path = tmp_path / "mine.py"
+    acting = OWN[: OWN.index("def drop")] + "from dataclasses import replace\n\n"
+    acting += "def act(record, *, lead_ohm):\n    return replace(record, temperature_k=None)\n"
+    path.write_text(acting + OWN[OWN.index("\n\nEFFECT") :].replace("on_voltage=drop", "on_record=act"))
+    declared_degc = cell.initial_temperature_k - ZERO_CELSIUS_K
+    expected = aesi.impedance(cell, [1e-2, 1.0], 0.5, declared_degc, model=model)
+    given = aesi.impedance(cell, [1e-2, 1.0], 0.5, 40.0, [load_effect(path).activate()], model=model)
+    np.testing.assert_allclose(given, expected, rtol=1e-12)
+
+
+def test_an_effect_of_ones_own_that_fails_on_the_cell_it_is_written_into_is_told_with_its_file(
+    tmp_path, cell
+):
+    path = tmp_path / "mine.py"
+    acting = OWN[: OWN.index("def drop")] + "def act(model, *, lead_ohm):\n    return model.cell.lead\n"
+    path.write_text(acting + OWN[OWN.index("\n\nEFFECT") :].replace("on_voltage=drop", "on_model=act"))
+    with pytest.raises(OwnEffectError, match="in act: AttributeError: 'Cell' object has no attribute 'lead'"):
+        folded(cell, [load_effect(path).activate()])
 
 
 @pytest.mark.parametrize(

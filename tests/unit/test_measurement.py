@@ -99,6 +99,15 @@ def test_a_step_that_no_float_holds_ended_in_an_overflow():
         checked_dt(10**400)
 
 
+@pytest.mark.parametrize("column", range(3))
+def test_a_column_with_a_number_that_no_float_holds_ended_in_an_overflow(column):
+    columns = [[0.0, 1.0], [1.0, 1.0], [3.9, 3.9]]
+    columns[column][1] = 10**400
+    label = ("time_s", "current_a", "voltage_v")[column]
+    with pytest.raises(DataError, match=f"m: {label} holds a whole number of more than 308 digits"):
+        Measurement(*columns, name="m")
+
+
 def test_a_plot_of_a_record_without_rows_ended_in_an_index_error():
     with pytest.raises(InputError, match="there is no row to draw"):
         Measurement([], [], []).plot()

@@ -229,6 +229,11 @@ def test_a_discovery_takes_files(cell, record, tmp_path, monkeypatch):
         ({"soc0": float("nan")}, "soc0 = nan is not a state of charge"),
         ({"soc0": "full"}, "soc0 = 'full' is not a state of charge"),
         ({"soc0": np.array([0.8])}, r"soc0 = array\(\[0.8\]\) is not a state of charge"),
+        ({"soc0": "full", "on_depletion": "clip"}, "soc0 = 'full' is not a state of charge"),
+        ({"soc0": [0.8], "on_depletion": "clip"}, r"soc0 = \[0.8\] is not a state of charge"),
+        ({"soc0": True, "on_depletion": "clip"}, "soc0 = True is not a state of charge"),
+        ({"soc0": float("nan"), "on_depletion": "clip"}, "soc0 = nan is not a state of charge"),
+        ({"soc0": float("inf"), "on_depletion": "clip"}, "soc0 = inf is not a state of charge"),
         (
             {"time_s": pd.date_range("2024", periods=len(TIME), freq="s")},
             "time_s holds dates or durations; give",
@@ -242,6 +247,12 @@ def test_a_discovery_takes_files(cell, record, tmp_path, monkeypatch):
         ({"current_a": np.full(len(TIME), np.nan)}, "current_a is nan in row 1, counted from 1"),
         ({"time_s": TIME[::-1]}, r"time_s does not increase at 1798 s \(row 2, counted from 1\)"),
         ({"time_s": 3.0}, r"time_s and current_a have shapes \(\) and \(1800,\)"),
+        ({"temperature_degc": [25.0] * 3}, r"temperature_degc has the shape \(3,\); give one value or 1800"),
+        (
+            {"temperature_degc": np.where(TIME == 4.0, np.nan, 25.0)},
+            "temperature_degc is nan in row 5, counted from 1; drop or fill",
+        ),
+        ({"temperature_degc": float("nan")}, "temperature_degc = nan degC is outside -60 to 150 degC"),
     ],
 )
 def test_what_cannot_be_meant_is_said_in_one_sentence(cell, current, changes, sentence):
@@ -284,6 +295,7 @@ def test_columns_that_are_no_measurement_are_refused(columns, sentence):
         ({"holdout": -0.1}, "holdout = -0.1 is not a share"),
         ({"holdout": "half"}, "holdout = 'half' is not a share"),
         ({"soh": "new"}, "a state of health of 'new'"),
+        ({"soh": 10**400}, r"a state of health of 1000+\.\.\.0+: it is the share"),
         ({"cell": None}, "an object of type NoneType is no cell; give a BPX file"),
         ({"only": 3}, "only = 3: give the id of an effect, or a list of ids"),
         ({"max_effects": -1}, "max_effects = -1 is not a whole number from 0 up to 10"),
@@ -324,6 +336,8 @@ def test_a_discovery_says_what_cannot_be_meant_before_it_searches(cell, record, 
         ({"cut_offs_v": (1, 2, 3)}, r"cut_offs_v = \(1, 2, 3\): give"),
         ({"body_mm": 5}, "a body of 5 mm: give diameter and height"),
         ({"mass_g": "x"}, "a mass of 'x' g is no number"),
+        ({"mass_g": 10**400, "body_mm": (21, 70)}, r"a mass of 1000+\.\.\.0+ g is no number"),
+        ({"cut_offs_v": (2.5, 10**400)}, r"1000+\.\.\.0+ V as the upper cut-off is no number"),
     ],
 )
 def test_a_calibration_says_what_cannot_be_meant_before_it_fits(cell, record, changes, sentence):
@@ -517,6 +531,8 @@ def test_a_table_in_place_of_a_file_is_told_what_takes_one():
 
 
 def test_a_parameter_that_is_no_number_is_told():
+    with pytest.raises(InputError, match="resistance_ohm is a whole number of more than 308 digits"):
+        CATALOGUE["series_resistance"].activate(resistance_ohm=10**400)
     with pytest.raises(InputError, match="resistance_ohm = '1m' is not a number"):
         CATALOGUE["series_resistance"].activate(resistance_ohm="1m")
 

@@ -7,7 +7,7 @@ from typing import Literal, Self, get_args
 
 import numpy as np
 
-from aesi.numerics.drive import drive_features, drive_row
+from aesi.numerics.drive import N_DRIVE_FEATURES, drive_features, drive_row
 from aesi.numerics.files.restored import saved_count
 from aesi.numerics.typing import Array, BoolArray, SavedState
 from aesi.numerics.windows import N_LAGS, history_features, history_row, n_features, raw_lags, spans
@@ -34,6 +34,11 @@ class History:
     def n_history(self) -> int:
         """Number of columns that are made of residuals, V; they come first."""
         return n_features(self.window) if self.view == "features" else self.window
+
+    @property
+    def n_columns(self) -> int:
+        """Number of columns of a row."""
+        return self.n_history + (N_DRIVE_FEATURES if self.with_current else 0)
 
     def rows(self, residuals: Array, current_a: Array | None) -> tuple[Array, BoolArray]:
         """(features (n, p) of every sample of a record, (n,) True where the history suffices)."""

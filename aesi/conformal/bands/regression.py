@@ -50,5 +50,7 @@ class RegressionBand(Band):
 
     @classmethod
     def from_state(cls, state: SavedState, kinds: Kinds) -> Self:
+        history = History.from_state(state["history"])
         model = kinds[state["model_kind"]].from_state(state["model"], kinds)
-        return cls(History.from_state(state["history"]), model)
+        model.check_columns(history.n_columns)
+        return cls(history, model)

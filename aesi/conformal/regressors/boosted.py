@@ -7,7 +7,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from aesi.conformal.regressors.model import FitTask, Kinds, QuantileModel
+from aesi.conformal.regressors.model import FitTask, Kinds, QuantileModel, check_features
 from aesi.numerics.files.restored import saved_array
 from aesi.numerics.trees.boosting import BoostedTrees, Growth, bin_edges, binned, fit_boosted
 from aesi.numerics.typing import Array, SavedState
@@ -34,6 +34,9 @@ class BoostedQuantiles(QuantileModel):
 
     def quantiles(self, rows: Array) -> Array:
         return np.column_stack([trees.predict(rows) for trees in self.trees])
+
+    def check_columns(self, count: int) -> None:
+        check_features(np.concatenate([each.feature.ravel() for each in self.trees]), count)
 
     def to_state(self) -> SavedState:
         return {

@@ -11,14 +11,17 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from aesi.conformal.regressors.model import FitTask, Kinds, QuantileModel
-from aesi.numerics.trees.forest import Splits, flatten, forest_quantiles
+from aesi.conformal.regressors.model import FitTask, Kinds, QuantileModel, check_features
+from aesi.numerics.files.restored import saved_array
+from aesi.numerics.trees.forest import Splits, check_splits, flatten, forest_quantiles
 from aesi.numerics.typing import Array, SavedState
 
 GRID_POINTS = 512
 """Levels of probability at which a forest's quantiles are kept; between them they are interpolated."""
 TAIL = 2e-4
 """The grid is even in probability between the tails and even in its logarithm within them."""
+MOST = 2.0**53
+"""Bound of a saved number of a column, node or leaf: of whole numbers that a float holds."""
 
 
 def _grid(targets: Array) -> Array:
@@ -87,12 +90,24 @@ class ForestQuantiles(QuantileModel):
         )
         return out
 
+    def check_columns(self, count: int) -> None:
+        check_features(self.splits.feature, count)
+
     def to_state(self) -> SavedState:
         return {"levels": self.levels, "grid": self.grid, "leaf_cdf": self.leaf_cdf, **vars(self.splits)}
 
     @classmethod
     def from_state(cls, state: SavedState, kinds: Kinds) -> Self:
-        real = {k: np.asarray(state[k], dtype=float) for k in ("levels", "grid", "leaf_cdf", "threshold")}
-        whole = {k: np.asarray(state[k], dtype=np.int64) for k in ("roots", "feature", "left", "right")}
-        splits = Splits(whole["roots"], whole["feature"], real["threshold"], whole["left"], whole["right"])
-        return cls(real["levels"], real["grid"], real["leaf_cdf"], splits)
+        levels = saved_array(state["levels"], "levels", (None,), 0.0, 1.0)
+        grid = saved_array(state["grid"], "grid", (None,))
+        leaf_cdf = saved_array(state["leaf_cdf"], "leaf_cdf", (None, len(grid)), 0.0, 1.0)
+        threshold = saved_array(state["threshold"], "threshold", (None,))
+        nodes = len(threshold)
+        feature, left, right = (
+            saved_array(state[key], key, (nodes,), -1.0, MOST).astype(np.int64)
+            for key in ("feature", "left", "right")
+        )
+        roots = saved_array(state["roots"], "roots", (None,), 0.0, nodes - 1.0).astype(np.int64)
+        splits = Splits(roots, feature, threshold, left, right)
+        check_splits(splits, len(leaf_cdf))
+        return cls(levels, grid, leaf_cdf, splits)

@@ -52,6 +52,10 @@ class LinearQuantiles(QuantileModel):
         _affine(rows, self.intercept, self.slope, out)
         return out
 
+    def check_columns(self, count: int) -> None:
+        if len(self.slope) != count:
+            raise ValueError(f"slope has {len(self.slope)} rows for {count} columns")
+
     def to_state(self) -> SavedState:
         return {"intercept": self.intercept, "slope": self.slope}
 

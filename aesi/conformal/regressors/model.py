@@ -12,7 +12,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from aesi.numerics.typing import Array, BoolArray, SavedState
+from aesi.numerics.typing import Array, BoolArray, IntArray, SavedState
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +45,10 @@ class QuantileModel(ABC):
         """(n, 2 B) V."""
 
     @abstractmethod
+    def check_columns(self, count: int) -> None:
+        """Raises ValueError where it is no map from rows of so many columns: compiled code would read beyond them."""
+
+    @abstractmethod
     def to_state(self) -> SavedState:
         """Everything `from_state` needs."""
 
@@ -53,6 +57,12 @@ class QuantileModel(ABC):
     def from_state(cls, state: SavedState, kinds: Kinds) -> Self:
         """Inverse of `to_state`; `kinds` has the regressors that may be part of this one.  Raises ValueError, or
         KeyError, for anything else."""
+
+
+def check_features(feature: IntArray, count: int) -> None:
+    """Raises ValueError for a split by a column beyond the rows' `count`.  feature : (n,) columns of the splits."""
+    if feature.size and feature.max() >= count:
+        raise ValueError(f"feature holds {feature.max()}, and a row has {count} columns")
 
 
 RegressorFit = Callable[[FitTask], QuantileModel]

@@ -45,6 +45,12 @@ class NormalisedQuantiles(QuantileModel):
         inside, middle, scale = _normalised(self.line, rows, self.n_history, self.floor_v)
         return np.asarray(middle[:, None] + scale[:, None] * self.inner.quantiles(inside))
 
+    def check_columns(self, count: int) -> None:
+        if self.n_history > count:
+            raise ValueError(f"n_history is {self.n_history}, and a row has {count} columns")
+        self.line.check_columns(count)
+        self.inner.check_columns(count + 1)
+
     def to_state(self) -> SavedState:
         return {
             "line": self.line.to_state(),

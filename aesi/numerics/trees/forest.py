@@ -88,6 +88,19 @@ def forest_quantiles(
             out[k, j] = _invert(cdf, grid, levels[j])
 
 
+def check_splits(splits: Splits, leaves: int) -> None:
+    """Raises ValueError for splits through which a row may not reach one of so many leaves: each node's children come
+    after it, as `flatten` numbers them."""
+    inner = splits.feature >= 0
+    nodes = np.arange(len(inner))
+    for children in (splits.left[inner], splits.right[inner]):
+        if ((children <= nodes[inner]) | (children >= len(nodes))).any():
+            raise ValueError("a split leads to no node after it")
+    numbers = splits.left[~inner]
+    if ((numbers < 0) | (numbers >= leaves)).any():
+        raise ValueError("a split leads to no leaf")
+
+
 def flatten(trees: list[Any]) -> Splits:
     """The splits of fitted scikit-learn trees (their `tree_` attribute)."""
     roots, feature, threshold, left, right = [], [], [], [], []

@@ -5,6 +5,7 @@ Sign convention of the whole package: current is positive on discharge.
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import pi, prod
@@ -21,6 +22,7 @@ from aesi.physics.cell.bpx.values import check_values
 from aesi.physics.cell.bpx.write import write_bpx
 from aesi.physics.cell.parts import CellParameters
 from aesi.physics.cell.relations import hashed_once
+from aesi.records.checked import is_finite_number
 
 EDGE_MM = (0.1, 5000.0)
 """Range of the diameter, height or edges of a body. A convention: 18 to 70 mm of round cells, 1 mm to a metre of flat
@@ -57,6 +59,9 @@ class Cell(CellParameters):
 
         Raises CellError for cut-offs that no cell has, and for an upper one far from the voltage of the full cell.
         """
+        for which, volts in (("lower", lower_v), ("upper", upper_v)):
+            if not is_finite_number(volts):
+                raise CellError(f"{self.name}: {reprlib.repr(volts)} V as the {which} cut-off is no number.")
         cell = replace(self, lower_voltage_v=lower_v, upper_voltage_v=upper_v)
         check_values(cell, self.name)
         return cell
@@ -76,9 +81,8 @@ class Cell(CellParameters):
             cell = replace(cell, volume_m3=volume, surface_area_m2=surface)
         if mass_g is None:
             return cell
-        given: object = mass_g
-        if not isinstance(given, Real):
-            raise CellError(f"a mass of {mass_g!r} g is no number.")
+        if not is_finite_number(mass_g):
+            raise CellError(f"a mass of {reprlib.repr(mass_g)} g is no number.")
         if cell.volume_m3 is None:
             raise CellError(
                 f"{self.name}: a mass of {mass_g:g} g makes no density without a volume; give the size of the body, "

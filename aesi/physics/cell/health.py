@@ -14,14 +14,15 @@ file's own state where no record has that day.
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Iterable, Mapping
 from datetime import date, datetime
-from numbers import Real
 
 import numpy as np
 
 from aesi.errors import CellError
 from aesi.numerics.typing import Array
+from aesi.records.checked import is_finite_number
 
 Soh = float | date
 """A share of the file's capacity, or the day of a test."""
@@ -60,8 +61,8 @@ def checked_soh(soh: Soh) -> Soh:
     if isinstance(soh, date):
         return day_of(soh)
     given: object = soh
-    if not (isinstance(given, Real) and LEAST_SOH <= float(given) <= MOST_SOH):
-        told = f"{float(given):g}" if isinstance(given, Real) else repr(given)
+    if not (is_finite_number(given) and LEAST_SOH <= given <= MOST_SOH):
+        told = f"{given:g}" if is_finite_number(given) else reprlib.repr(given)
         raise CellError(
             f"a state of health of {told}: it is the share of the cell file's capacity that the cell had, from "
             f"{LEAST_SOH:g} to {MOST_SOH:g}; 97 % is 0.97."

@@ -264,6 +264,12 @@ class CellParameters:
         """Rest stoichiometries (negative, positive) at a state of charge, by the declared limits."""
         return self.balance.stoichiometries(soc)
 
+    def soc_of(self, mean_n: Array) -> Array:
+        """(n,) state of charge at mean stoichiometries of the negative electrode (n,), by the declared limits; the
+        inverse of `stoichiometries`, below 0 and above 1 too."""
+        n = self.negative
+        return (mean_n - n.theta_min) / (n.theta_max - n.theta_min)
+
     def rest_voltage_v(self, soc: float | Array) -> Array:
         """(n,) V, the open-circuit voltage at the reference temperature."""
         return self.balance.rest_voltage_v(soc)

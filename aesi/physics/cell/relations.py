@@ -15,6 +15,7 @@ import numpy as np
 from aesi.errors import CellError
 from aesi.numerics.typing import Array
 from aesi.physics.cell.expression import compile_expression
+from aesi.records.checked import row_words
 
 OCP_POINTS = 8193
 """Points of the tables in which the models look up potentials and electrolyte properties. Four times as many change the
@@ -92,9 +93,20 @@ class LookupTable:
     def __post_init__(self) -> None:
         if len(self.x) != len(self.y) or len(self.x) < 2:
             raise CellError(f"a table needs x and y of one length >= 2, not {len(self.x)} and {len(self.y)}.")
-        x = np.array(self.x)
-        if not (np.all(np.diff(x) > 0) and np.isfinite(x).all() and np.isfinite(self.y).all()):
-            raise CellError("a table needs strictly increasing, finite x and finite y.")
+        x, y = np.array(self.x), np.array(self.y)
+        for name, column in (("x", x), ("y", y)):
+            finite = np.isfinite(column)
+            if not finite.all():
+                row = int(np.argmin(finite))
+                raise CellError(
+                    f"{name} of a table is {column[row]:g} in {row_words(row)}; give finite numbers."
+                )
+        rises = np.diff(x) > 0.0
+        if not rises.all():
+            row = int(np.argmin(rises)) + 1
+            raise CellError(
+                f"x of a table does not rise to {x[row]:g} in {row_words(row)}; sort its rows, and give each x once."
+            )
 
     def __call__(self, x: Array) -> Array:
         """(n,) interpolated."""

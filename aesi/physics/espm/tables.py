@@ -102,7 +102,8 @@ def electrolyte_diffusion(diffusivity: Relation, c0: float) -> DiffusionTable:
     top = ELECTROLYTE_SPAN * c0
     if isinstance(diffusivity, Constant):
         return DiffusionTable(diffusivity.value, np.zeros(2), top, True)
-    return _split(diffusivity, c0, top, tuple(c0 * s for s in WORKING_SPAN), EXTRAPOLATED_MARGIN)
+    at_rest = f"the electrolyte's diffusivity is {{:g}} m2/s at {c0:g} mol/m3"
+    return _split(diffusivity, c0, top, tuple(c0 * s for s in WORKING_SPAN), EXTRAPOLATED_MARGIN, at_rest)
 
 
 @lru_cache(maxsize=128)
@@ -110,18 +111,25 @@ def solid_diffusion(diffusivity: Relation) -> DiffusionTable:
     """Split of a solid diffusivity over stoichiometry."""
     if isinstance(diffusivity, Constant):
         return DiffusionTable(diffusivity.value, np.zeros(2), 1.0, True)
-    return _split(diffusivity, 0.5, 1.0, (0.0, 1.0), CORRECTED_MARGIN)
+    half_full = "the diffusivity of an electrode is {:g} m2/s at a stoichiometry of 0.5"
+    return _split(diffusivity, 0.5, 1.0, (0.0, 1.0), CORRECTED_MARGIN, half_full)
 
 
 def _split(
-    diffusivity: Relation, reference: float, top: float, working: tuple[float, ...], margin: float
+    diffusivity: Relation, reference: float, top: float, working: tuple[float, ...], margin: float, told: str
 ) -> DiffusionTable:
-    """Split of a diffusivity. Values that are not positive, outside the range of a fit, become `LEAST_TRANSPORT`."""
+    """Split of a diffusivity. Values that are not positive, outside the range of a fit, become `LEAST_TRANSPORT` of
+    that at the reference.
+
+    told : format of a clause on the value at the reference.  Raises CellError where that is not positive.
+    """
     grid = np.linspace(0.0, top, ELECTROLYTE_POINTS)
     values = diffusivity(grid)
     at_reference = float(diffusivity(np.array([reference]))[0])
     if not at_reference > 0:
-        raise CellError(f"a diffusivity is {at_reference:g} m2/s at {reference:g}; it has to be positive.")
+        raise CellError(
+            f"{told.format(at_reference)}; it has to be positive: give a table, or a formula that holds."
+        )
     values = np.where(np.isfinite(values) & (values > 0.0), values, LEAST_TRANSPORT * at_reference)
     largest = float(values[(grid >= working[0]) & (grid <= working[1])].max())
     d0 = max(at_reference, margin * largest)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from aesi.constants import ZERO_CELSIUS_K
-from aesi.errors import DataError
+from aesi.errors import CellError, DataError
 from aesi.numerics.typing import Array
 from aesi.physics.balance import aged_range
 from aesi.physics.cell import Cell
@@ -52,6 +52,7 @@ class OpenCircuit:
 
     kelvin : K; None is the cell file's initial temperature.  name : of the record whose voltages are read, if any.
     potentials_v : V, standard deviation of this voltage.
+    Raises CellError where a potential is not finite within `SOC_BEYOND` of the cell's range.
     """
 
     def __init__(
@@ -60,7 +61,14 @@ class OpenCircuit:
         self.cell, self.name, self.potentials_v = cell, name, potentials_v
         self.kelvin = cell.initial_temperature_k if kelvin is None else kelvin
         self.soc = np.linspace(*aged_range(cell), GRID)
-        self.ocv = np.maximum.accumulate(_ocv(cell, self.soc, self.kelvin))
+        ocv = _ocv(cell, self.soc, self.kelvin)
+        finite = np.isfinite(ocv)
+        if not finite.all():
+            raise CellError(
+                f"{cell.name}: by its potentials the open-circuit voltage is not finite at a state of charge of "
+                f"{self.soc[int(np.argmin(finite))]:.3f}; write there tables, or formulas that hold from 0 to 1."
+            )
+        self.ocv = np.maximum.accumulate(ocv)
 
     @classmethod
     def at_start(cls, cell: Cell, record: Measurement, potentials_v: float = READING_V) -> OpenCircuit:
@@ -137,6 +145,8 @@ class OpenCircuit:
     def reading(self, voltage_v: float, spread_v: float) -> tuple[float, float]:
         """(state of charge at an open-circuit voltage, half the range that voltage +/- `spread_v` covers). Beyond full
         and empty the range is that at the limit, with `spread_v` enlarged by the distance from it.
+
+        voltage_v : V.  spread_v : its standard deviation, V.  Raises DataError where `admits` does not hold.
         """
         if not self.admits(voltage_v, spread_v):
             low, high = np.interp([0.0, 1.0], self.soc, self.ocv)

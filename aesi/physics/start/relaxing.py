@@ -26,7 +26,7 @@ from aesi.numerics.typing import Array
 from aesi.physics.record_checks import ROWS_APART
 from aesi.physics.rest.open_circuit import OpenCircuit
 from aesi.physics.simulation import ModelName, simulate
-from aesi.physics.start.load import FLOWED_S, HISTORY_C_RATE, OTHER_C_RATES
+from aesi.physics.start.load import FLOWED_S, FLOWS, HISTORY_C_RATE, OTHER_C_RATES
 from aesi.records import Hold, Measurement
 
 C_RATE_SDS = OTHER_C_RATES[1:]
@@ -51,8 +51,6 @@ PARTS = 8
 """Number of equal parts of a rest whose means are used; rows where there are fewer."""
 UNKNOWN_V = 1.0
 """Prior standard deviation of U about the last voltage of the rest, V."""
-WITHIN = np.concatenate([[0.0], np.geomspace(0.02, 1.0, 8)])
-"""Rows of a simulated history, as shares of the time for which its current flows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +136,7 @@ def _histories(open_circuit: OpenCircuit, time_s: Array, soc: float, model: Mode
     current_a = rate * cell.capacity_ah
     after = np.geomspace(0.1, STOPPED_S[-1] + max(float(time_s[-1]), 1.0), 60)
     for flowed_s in FLOWED_S[1:]:
-        time = np.concatenate([flowed_s * WITHIN, flowed_s + after])
+        time = np.concatenate([flowed_s * FLOWS, flowed_s + after])
         current = np.where(time <= flowed_s, current_a, 0.0)
         before = soc + current_a * flowed_s / SECONDS_PER_HOUR / cell.capacity_ah
         degc = open_circuit.kelvin - ZERO_CELSIUS_K

@@ -64,7 +64,11 @@ class BoostedErrorModel:
         return FreeRun(error_v, None, self.scaling.is_outside(variables))
 
     def k_step(self, series: ErrorSeries, steps: int) -> Array:
-        """(n,) V: the prediction of error_v[k] given error_v[k - steps]; the first ones from error_v[0]."""
+        """(n,) V: the prediction of error_v[k] given error_v[k - steps]; the first ones from error_v[0].
+
+        steps : whole number, at least 1.  Raises DataError for any other.
+        """
+        free_run.check_steps(self.name, steps)
         measured = self.scaling.error_to_scaled(series.error_v)
         by_inputs = self._by_inputs(self._variables(series), series)
         scaled = free_run.autoregressive_ahead(by_inputs, self.memory, measured, steps)

@@ -139,7 +139,8 @@ def with_leverage(model: SparseModel, problem: Problem, lambda1: float) -> Spars
 
 
 def fold_samples(problem: Problem, a: int, b: int) -> tuple[ErrorSeries, slice]:
-    """The record that training rows a to b - 1 come from, and the samples they predict: row k, sample k + 1."""
+    """The record that training rows a to b - 1 come from, and the samples they predict: row k, sample k + 1.  Raises
+    IndexError for a row of no record."""
     for record, (first, last) in zip(problem.split.train, problem.spans, strict=True):
         if first <= a < last:
             return record, slice(a - first + 1, b - first + 1)

@@ -33,7 +33,8 @@ def low_pass(x: Array, dt_s: float, tau_s: float) -> Array:
 
 
 def with_inputs(series: ErrorSeries, names: Sequence[str]) -> ErrorSeries:
-    """The record with exactly the named inputs, in that order; those it lacks are derived.
+    """The record with exactly the named inputs, in that order; those it lacks are derived. Its current stays known,
+    also where that is none of them.
 
     Derive on the whole measurement before cutting it into records, so that filters know the past.
     Raises DataError for a name that is neither there nor derivable.
@@ -41,7 +42,13 @@ def with_inputs(series: ErrorSeries, names: Sequence[str]) -> ErrorSeries:
     if tuple(names) == series.input_names:
         return series
     columns = [_column(series, name) for name in names]
-    return replace(series, inputs=np.column_stack(columns), input_names=tuple(names))
+    known_a = series.current_a if "I" in series.input_names else series.current_beside_a
+    return replace(
+        series,
+        inputs=np.column_stack(columns),
+        input_names=tuple(names),
+        current_beside_a=None if "I" in names else known_a,
+    )
 
 
 SAME_STEP = 0.01

@@ -85,6 +85,8 @@ class Library:
 
         p_c : highest order of a polynomial, 0 to 5.  d : highest total degree.  factors : most variables in a
         product.  special : with trigonometric and hyperbolic functions.  mixed : and their products with T1.
+        Raises InputError for an order or a degree that there is none of, and for inputs that are no list of different
+        names other than `e`.
         """
         if not 0 <= p_c <= MAX_ORDER or d < 0:
             raise InputError(f"p_c = {p_c} must lie in 0 to {MAX_ORDER}, and d = {d} must not be negative.")

@@ -296,13 +296,15 @@ def test_an_excess_or_a_name_too_few_was_no_sentence(given, sentence) -> None:
         FreeRunBands.fit({1.0: [np.ones(40)] * 3}, DT, **given)
 
 
-@pytest.mark.parametrize("alpha", [0.0, 1.0, -0.1, 1.5, math.nan, "a tenth"])
+@pytest.mark.parametrize(
+    "alpha", [0.0, 1.0, -0.1, 1.5, pytest.param(10**400, id="vast"), math.nan, "a tenth"]
+)
 def test_bands_of_an_impossible_level_were_calibrated(alpha) -> None:
     with pytest.raises(InputError, match=f"alpha = {alpha} is not a share of misses"):
         FreeRunBands.fit({1.0: [np.ones(40)] * 3}, DT, alpha=alpha)
 
 
-@pytest.mark.parametrize("horizon_s", [0.0, -1.0, math.nan])
+@pytest.mark.parametrize("horizon_s", [0.0, -1.0, pytest.param(10**400, id="vast"), math.nan])
 def test_a_horizon_that_lies_nowhere_ahead_was_calibrated_or_ended_in_an_index(horizon_s) -> None:
     words = f"a horizon of {horizon_s} s is no time ahead; give a positive number of seconds"
     with pytest.raises(InputError, match=words):

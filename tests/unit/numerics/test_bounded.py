@@ -200,6 +200,16 @@ def test_a_descent_ended_on_the_wrong_side_of_a_jump_beside_which_its_slopes_are
     assert found.converged
 
 
+def test_a_point_past_a_jump_without_a_number_replaced_the_minimum():
+    model = Counted(
+        lambda x: np.array([np.nan if x[0] == 0.0 else x[0] + 1.0, 1.0]), lambda x: np.array([[1.0], [0.0]])
+    )
+    found = descend(model, np.array([-0.5]), np.full(1, -2.0), np.full(1, 2.0), 5, 1e-9, jumps=[0])
+    assert found.x == pytest.approx([-1.0], abs=1e-4)
+    assert found.cost == pytest.approx(0.5)
+    assert found.converged
+
+
 def test_what_is_no_gain_far_from_the_minimum_may_be_one_near_it():
     """A valley along which each step gains little beside what the first one gained: with the tolerance of the start the
     descent ends in it."""

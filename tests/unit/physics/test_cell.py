@@ -101,6 +101,15 @@ def test_what_bpx_has_no_field_for_travels_in_the_user_section(content):
     assert Cell.from_bpx(cell.to_bpx()) == cell
 
 
+@pytest.mark.parametrize("film", [{}, {"Negative electrode film resistance [Ohm.m2]": 0.0}])
+def test_an_activation_energy_of_a_film_is_kept_where_the_file_declares_no_film(content, film):
+    energy = "Negative electrode film resistance activation energy [J.mol-1]"
+    content["Parameterisation"]["User-defined"] = {energy: 4e4, **film}
+    cell = Cell.from_bpx(content)
+    assert cell.to_bpx()["Parameterisation"]["User-defined"] == {energy: 4e4}
+    assert Cell.from_bpx(cell.to_bpx()) == cell
+
+
 def test_a_record_at_celsius_is_told_that_it_is_in_kelvin(content):
     content["Parameterisation"]["User-defined"] = {"Mean temperature by record [K]": {"july": 10.0}}
     with pytest.raises(
@@ -124,6 +133,51 @@ def fault(content: dict) -> str:
     message = str(caught.value)
     assert "\n" not in message
     return message
+
+
+BEYOND_FLOATS = 10**400
+
+
+@pytest.mark.parametrize(
+    ("section", "field", "value", "below"),
+    [
+        ("Cell", "Electrode area [m2]", BEYOND_FLOATS, ""),
+        ("Cell", "Number of electrode pairs connected in parallel to make a cell", BEYOND_FLOATS, ""),
+        ("Electrolyte", "Conductivity [S.m-1]", -BEYOND_FLOATS, ""),
+        ("Positive electrode", "OCP [V]", {"x": [0.0, 1.0], "y": [BEYOND_FLOATS, 3.0]}, ": y"),
+        ("User-defined", "Contact resistance [Ohm]", BEYOND_FLOATS, ""),
+    ],
+    ids=["number", "count", "negative", "table", "own"],
+)
+def test_a_whole_number_that_no_float_holds_is_told_with_its_field(content, section, field, value, below):
+    content["Parameterisation"].setdefault(section, {})[field] = value
+    assert fault(content) == (
+        f"BPX data: Parameterisation: {section}: {field}{below} holds a whole number of more than 308 digits, which no "
+        "value of a cell has; correct it."
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ('{"Header": ' + 5000 * "1" + "}", "holds a whole number of thousands of digits"),
+        (100_000 * "[", "nests its sections more deeply than any BPX file does"),
+    ],
+    ids=["digits", "depth"],
+)
+def test_what_json_cannot_hold_in_python_is_one_sentence(tmp_path, text, told):
+    path = tmp_path / "cell.json"
+    path.write_text(text)
+    with pytest.raises(CellError, match=rf"cell\.json {told}"):
+        Cell.from_bpx(path)
+
+
+@pytest.mark.parametrize("value", [np.inf, -np.inf, np.nan])
+def test_no_number_of_a_file_is_taken_that_is_not_finite(content, value):
+    """JSON readers take 1e999, Infinity and NaN."""
+    parts = content["Parameterisation"]
+    parts["Electrolyte"]["Cation transference number"] = value
+    assert f"Electrolyte: transference = {value:g} has to be a share below 1" in fault(content)
 
 
 def test_a_missing_field_is_named(content):
@@ -733,3 +787,9 @@ def test_cut_offs_of_another_cell_are_taken_or_refused(content):
         cell.with_cut_offs(4.1, 2.8)
     with pytest.raises(CellError, match="the upper cut-off is 4200 V; one of them is in another unit"):
         cell.with_cut_offs(2800.0, 4200.0)
+
+
+def test_the_state_of_charge_of_a_mean_stoichiometry_is_that_which_has_it(lg_m50):
+    soc = np.array([-0.1, 0.0, 0.37, 1.0, 1.2])
+    mean_n, _ = lg_m50.stoichiometries(soc)
+    assert lg_m50.soc_of(mean_n) == pytest.approx(soc, abs=1e-15)

@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aesi.constants import SECONDS_PER_HOUR
-from aesi.errors import DataError, InputError
+from aesi.errors import CellError, DataError, InputError
 from aesi.physics import Cell, initial_state, simulate
-from aesi.physics.cell.relations import LookupTable
+from aesi.physics.cell.relations import Expression, LookupTable
 from aesi.physics.effect import Effect, Record, as_cell_saw
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.record_checks import SOC_MARGIN
@@ -616,6 +616,16 @@ def test_a_voltage_of_another_cell_is_refused():
         initial_state(LG_M50, resting(1.9))
 
 
+def test_a_potential_that_ends_within_the_range_was_told_as_a_voltage_between_two_that_are_no_number():
+    potential = LG_M50.negative.ocp.text + " + 0.0 * sqrt(x - 0.02)"
+    cell = LG_M50.with_negative(ocp=Expression(potential))
+    assert cell.negative.theta_min > 0.02
+    with pytest.raises(
+        CellError, match="by its potentials the open-circuit voltage is not finite at a state of"
+    ):
+        simulate(cell, [0.0, 1.0], [0.0, 0.0], rest_voltage_v=3.7)
+
+
 def test_no_voltage_and_nothing_given_is_refused():
     with pytest.raises(DataError, match="--soc0"):
         initial_state(LG_M50, resting(np.nan))
@@ -629,6 +639,20 @@ def test_a_voltage_that_is_not_known_further_on_made_a_start_that_is_no_number(c
     whole = initial_state(LG_M50, record(time[:40], current[:40], voltage[:40]))
     found = initial_state(LG_M50, record(time, current, np.where(time < 40.0, voltage, np.nan)))
     assert (found.soc, found.sd, found.basis) == (whole.soc, whole.sd, whole.basis)
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"hold": "zoh"}, "hold = 'zoh' is not known; give 'linear' or 'backward'"),
+        ({"model": "spm"}, "model = 'spm' is not known; give 'espm' or 'dfn'"),
+        ({"effects": "clock_skew"}, "effects is the text 'clock_skew'; give a list of them"),
+        ({"effects": [CATALOGUE["clock_skew"]]}, "which has no values yet"),
+    ],
+)
+def test_an_unknown_hold_was_taken_for_straight_lines_and_an_effect_without_values_for_one(changes, sentence):
+    with pytest.raises(InputError, match=sentence):
+        initial_state(LG_M50, resting(3.7), **changes)
 
 
 @pytest.mark.parametrize("soc0", [np.nan, 50.0])

@@ -22,7 +22,7 @@ from aesi.physics.cell.relations import (
     to_bpx,
     value_at,
 )
-from aesi.physics.espm.tables import ocp_table
+from aesi.physics.espm.tables import electrolyte_diffusion, ocp_table, solid_diffusion
 
 X = np.linspace(0.0, 1.0, 7)
 TABLE = LookupTable((0.0, 0.5, 1.0), (1.0, 3.0, 2.0))
@@ -134,12 +134,32 @@ def test_a_mixture_that_is_not_finite_inside_is_refused_in_one_sentence():
         ({"x": [0, 1], "y": [None, 1]}, "y of a table holds None, which is not a number"),
         ({"x": 0, "y": 1}, "x of a table is 0, and has to be a list of numbers"),
         ({"x": "01", "y": [0, 1]}, "x of a table is '01', and has to be a list of numbers"),
-        ({"x": [0, float("inf")], "y": [0, 1]}, "strictly increasing, finite x"),
+        ({"x": [0, float("inf")], "y": [0, 1]}, "x of a table is inf in row 2, counted from 1; give finite"),
+        ({"x": [0, 1], "y": [float("nan"), 1]}, "y of a table is nan in row 1, counted from 1; give finite"),
+        (
+            {"x": [0, 0.5, 0.5, 1], "y": [4, 3, 2, 1]},
+            "x of a table does not rise to 0.5 in row 3, counted from 1",
+        ),
+        (
+            {"x": [1, 0], "y": [4, 3]},
+            "x of a table does not rise to 0 in row 2, counted from 1; sort its rows",
+        ),
     ],
 )
 def test_a_table_of_what_is_no_number_was_an_error_of_python(table, told):
     with pytest.raises(CellError, match=f"Diffusivity: .*{told}"):
         relation(table, "Diffusivity")
+
+
+def test_a_diffusivity_without_a_value_at_half_filling_was_told_as_that_of_anything():
+    with pytest.raises(
+        CellError, match=r"the diffusivity of an electrode is -1e-14 m2/s at a stoichiometry of 0\.5;"
+    ):
+        solid_diffusion(Expression("1e-14 - 4e-14 * x"))
+    with pytest.raises(
+        CellError, match="the electrolyte's diffusivity is -1e-10 m2/s at 1000 mol/m3; it has to be"
+    ):
+        electrolyte_diffusion(Expression("-1e-13 * x"), 1000.0)
 
 
 @pytest.mark.parametrize("bad", [None, True, [1, 2], {"x": [0, 1]}, {"x": [1, 0], "y": [0, 1]}, "x +"])

@@ -291,6 +291,14 @@ def test_yaml_cannot_build_objects(tmp_path):
         ("name: [x\n", r"at line 2, column 1: while parsing a flow sequence, expected ',' or '\]'"),
         ("name: \x00\n", "is not YAML: character 7: "),
         ("name: 2001-99-99\n", "is not YAML: month must be in 1..12"),
+        (
+            f"seed: {5000 * '1'}\n",
+            r"is not YAML: Exceeds the limit \(4300 digits\) .*: value has 5000 digits\.$",
+        ),
+        (
+            f"name: {5000 * '['}",
+            r"x\.yaml: is not YAML of an experiment: its lists or keys are nested too deeply\.$",
+        ),
         ("name: x\n--- y\n", "line 2, column 1: expected a single document in the stream, but found another"),
     ],
 )

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from sparse_records import make_record
 
+from aesi.errors import DataError
 from aesi.records import HeldOutDrive, Split
 from aesi.sparse import Options, Problem
-from aesi.sparse.baselines.boosting import TREES, gradient_boosting
+from aesi.sparse.baselines.boosting import TREES, BoostedErrorModel, gradient_boosting
+from aesi.sparse.terms.scaling import Scaling
 
 OPTIONS = Options(p_c=1, d=2, mixed=False, resamples=10, block=60, feedback=False, fade=True)
 DRIVES = tuple(make_record(400, seed=seed, name=f"drive {seed}") for seed in range(3))
@@ -24,6 +26,14 @@ def test_rows_that_count_nothing_teach_nothing():
     other = replace(weighed, target=spoilt, fold_targets=np.broadcast_to(spoilt, honest.fold_targets.shape))
     runs = [gradient_boosting(each).free_run(DRIVES[0]).error_v for each in (weighed, other)]
     np.testing.assert_allclose(runs[0], runs[1], atol=1e-12)
+
+
+@pytest.mark.parametrize("steps", [0, -1, 1.5])
+def test_a_step_that_is_none_ended_in_an_index_out_of_bounds(steps):
+    scaling = Scaling(np.array([-1.0, -1.0]), np.array([1.0, 1.0]))
+    model = BoostedErrorModel(None, scaling, ("I",), 1.0, 0.5)
+    with pytest.raises(DataError, match=f"gradient boosting: a prediction {steps} steps ahead is none"):
+        model.k_step(DRIVES[0], steps)
 
 
 def flipped(places) -> tuple:

@@ -245,6 +245,16 @@ def test_a_constant_input_is_left_out_with_a_note():
     assert problem.notes == ("soc is constant over the training records; its terms were left out.",)
 
 
+def test_records_of_one_constant_current_lost_it_with_its_terms():
+    """Intervals are calibrated over the current: their score ended in the index of a tuple."""
+    record = make_record(300)
+    held = replace(record, inputs=np.column_stack([np.full(len(record), 2.0), record.inputs[:, 1:]]))
+    problem = Problem.build(Split((held,), (held,), ()), SMALL)
+    assert problem.library.variables == ("e", "soc", "c_e0")
+    for kept in (*problem.split.train, *problem.split.valid):
+        np.testing.assert_array_equal(kept.current_a, held.current_a)
+
+
 def test_a_repeated_input_is_left_out_with_a_note():
     problem = Problem.build(with_soc_input(lambda record: 5 + 3 * record.inputs[:, 0]), SMALL)
     assert "soc repeats I up to scale" in problem.notes[0]

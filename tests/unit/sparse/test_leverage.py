@@ -38,6 +38,17 @@ def test_collinear_terms_without_a_ridge_stay_finite():
     assert np.isfinite(Leverage.of(theta.T, 0.0, theta).excess(np.array([[0.5], [-0.5]]))).all()
 
 
+def test_a_term_that_is_zero_at_rest_left_pulses_without_a_finite_excess():
+    """The rests of pulses of either sign are the middle of the current's range: T1(I) is 0 in nine rows of ten."""
+    theta = np.zeros((1, 1000))
+    theta[0, ::10] = np.where(np.arange(100) % 2, 1.0, -1.0)
+    leverage = Leverage.of(theta.T, 1.0, theta)
+    np.testing.assert_allclose(
+        leverage.excess(np.array([[0.0, 1.0, -1.0, 3.0]])), [0.0, 0.0, 0.0, 2.0], atol=1e-12
+    )
+    assert Leverage.from_dict(leverage.to_dict(), 1).upper_quartile == leverage.upper_quartile
+
+
 def test_a_model_tells_the_excess_and_keeps_it_through_json(problem, split):
     genome = Genome.whole(problem.library, 1e-2, 2e-2, 0.5, 2, 2, feedback=False)
     candidate = evaluate(problem, genome)

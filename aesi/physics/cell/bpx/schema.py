@@ -41,6 +41,7 @@ def load_bpx(
     Raises CellError for content that cannot be read, fails the schema, or describes a cell that is not modelled.
     """
     raw, where = _load(source)
+    _check_whole_numbers(raw, where)
     v1 = _as_v1(raw, where)
     _check_modelled(v1, where)
     _check_schema(v1, where)
@@ -96,6 +97,14 @@ def _parsed(path: Path, text: str) -> Any:
         ) from None
     except _RepeatedField as error:
         raise CellError(f"{path}: the field {error} is there twice in one section; leave one.") from None
+    except ValueError:  # the only other one of `json`: Python converts no more than 4,300 digits
+        raise CellError(
+            f"{path} holds a whole number of thousands of digits, which no value of a cell has; correct it."
+        ) from None
+    except RecursionError:
+        raise CellError(
+            f"{path} nests its sections more deeply than any BPX file does, so it is none; copy or export it again."
+        ) from None
 
 
 def _fault_clause(text: str) -> str:
@@ -119,6 +128,24 @@ def _unique_fields(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
             raise _RepeatedField(repr(name))
         content[name] = value
     return content
+
+
+def _check_whole_numbers(content: Any, where: str) -> None:
+    """Raises CellError, naming sections and field, for a whole number that no float holds. Of those that are written
+    with a point or an exponent, the values are checked."""
+    if isinstance(content, Mapping):
+        for name, value in content.items():
+            _check_whole_numbers(value, f"{where}: {name}")
+    elif isinstance(content, list):
+        for value in content:
+            _check_whole_numbers(value, where)
+    elif isinstance(content, int):
+        try:
+            float(content)
+        except OverflowError:
+            raise CellError(
+                f"{where} holds a whole number of more than 308 digits, which no value of a cell has; correct it."
+            ) from None
 
 
 def _as_v1(raw: dict[str, Any], where: str) -> dict[str, Any]:

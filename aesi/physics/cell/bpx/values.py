@@ -298,7 +298,7 @@ def _check_electrode(electrode: Electrode, what: str) -> None:
 
 
 def _check_share(what: str, name: str, value: float) -> None:
-    if not value < 1.0:  # this way round, NaN fails too
+    if not -np.inf < value < 1.0:  # this way round, NaN fails too
         raise CellError(f"{what}: {name} = {value:g} has to be a share below 1; 30 % is 0.3.")
 
 

@@ -98,7 +98,7 @@ def _own_fields(cell: CellParameters) -> dict[str, Any]:
         own[DOUBLE_LAYERS[side]] = electrode.double_layer_f_m2
         if electrode.film_ohm_m2 != NO_FILM:
             own[FILM_RESISTANCES[side]] = to_bpx(electrode.film_ohm_m2)
-            own[FILM_ENERGIES[side]] = electrode.film_ea_j_mol
+        own[FILM_ENERGIES[side]] = electrode.film_ea_j_mol
     return {name: value for name, value in own.items() if value}
 
 
