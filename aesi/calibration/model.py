@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from threading import Lock
 from typing import Literal
 
 import numpy as np
@@ -15,6 +16,7 @@ from aesi.calibration.records.spectra import FittedSpectra
 from aesi.calibration.records.zero import Zero
 from aesi.calibration.shapes import Shapes
 from aesi.calibration.silicon import SILICON_SD, may_have_silicon, silicon_edge, stretched, with_silicon
+from aesi.numerics.threads import side_by_side
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
 from aesi.physics.effect import Record
@@ -131,7 +133,7 @@ class Model:
         self.low, self.high = np.array(bounds).T
         self.high[self.layout.ages] = ageing.bounds
         self.low[self.layout.ages] = -self.high[self.layout.ages]
-        self.simulations = 0
+        self.simulations, self._counting = 0, Lock()
 
     def set_thermal_data(self, found: Cell) -> None:
         """Set the heat capacity and the conductance to the surroundings of the start cell to those of `found`."""
@@ -176,7 +178,8 @@ class Model:
 
     def _simulated(self, index: int, cell: Cell, x: Array, more: float) -> tuple[SolvedRows, int]:
         """(a record's simulation, number of the first row without lithium or salt, -1 for none)."""
-        self.simulations += 1
+        with self._counting:
+            self.simulations += 1
         record = self.records[index]
         model = EspmModel(
             self.aged(cell, more * self.material(index, x), self.silicon(index, x)),
@@ -222,15 +225,19 @@ class Model:
         return np.concatenate([*misfits, self.spectra.misfits(cell), x])
 
     def jacobian(self, x: Array) -> Array:
-        """(rows + 2 frequencies + n, n) slopes of `residual`: one-sided differences, except the slopes of records over
-        the knots of potentials, which have a closed form."""
+        """(rows + 2 frequencies + n, n) slopes of `residual`: one-sided differences, in threads, except the slopes of
+        records over the knots of potentials, which have a closed form."""
         cell = self.cell_at(x)
         runs = [self.run(i, cell, x) for i in range(len(self.records))]
         blocks, of_spectra = self._differences(cell, x, [run.voltage_v for run in runs])
-        for i, (block, run) in enumerate(zip(blocks, runs, strict=True)):
+
+        def set_own(i: int) -> None:
+            run, block = runs[i], blocks[i]
             surface_n = stretched(run.surface_n, self.edge, self.silicon(i, x))
             block[:, self._closed] = self.shapes.columns(x[self.layout.shapes], surface_n, run.surface_p)
             self._set_own_slopes(i, cell, x, run.voltage_v, block)
+
+        list(side_by_side(set_own, range(len(self.records))))
         parts = []
         for block, run, record, w in zip(blocks, runs, self.records, self.weights, strict=True):
             lenient = w * leniency(record.rows.voltage_v - run.voltage_v)
@@ -253,10 +260,11 @@ class Model:
         off = self.spectra.misfits(cell)
         of_spectra = np.zeros((len(off), self.layout.size))
         closed = self._closed
-        for j in range(self.layout.shapes.stop):
+
+        def set_column(j: int) -> None:
             simulated = not closed.start <= j < closed.stop
             if not (simulated or len(off)):
-                continue
+                return
             h = STEP if x[j] + STEP <= self.high[j] else -STEP
             there = x.copy()
             there[j] += h
@@ -266,6 +274,8 @@ class Model:
             for i, record in enumerate(self.records if simulated else ()):
                 if j != self.layout.zero or record.slow:
                     blocks[i][:, j] = (self.run(i, changed, there).voltage_v - voltages_v[i]) / h
+
+        list(side_by_side(set_column, range(self.layout.shapes.stop)))
         return blocks, of_spectra
 
     def _set_own_slopes(self, index: int, cell: Cell, x: Array, voltage_v: Array, block: Array) -> None:

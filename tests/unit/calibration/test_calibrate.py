@@ -1,5 +1,6 @@
 """Calibration over temperatures: recovery, the temperature as an input, intervals, what stays open."""
 
+import os
 import re
 import warnings
 from copy import copy
@@ -251,6 +252,19 @@ def test_a_temperature_that_cannot_be_used_is_refused(start, records):
         calibrate(start, records, Conditions(temperatures_degc={"elsewhere": 5.0}))
     with pytest.raises(DataError, match="measured temperature of its own"):
         calibrate(start, records, Conditions(temperatures_degc={"at_0": 5.0}))
+
+
+def test_the_slopes_do_not_depend_on_the_number_of_threads(start, records, monkeypatch):
+    model = prepared_model(start, records, Conditions())[0]
+    x = 0.1 * np.sin(np.arange(model.layout.size))
+    found, counts = [], []
+    for threads in (1, 5):
+        monkeypatch.setattr(os, "cpu_count", lambda threads=threads: threads)
+        before = model.simulations
+        found.append(model.jacobian(x))
+        counts.append(model.simulations - before)
+    assert np.array_equal(*found)
+    assert counts[0] == counts[1] > len(records) * len(model.free)
 
 
 def test_the_slopes_are_those_of_the_residual(start, records):
