@@ -55,6 +55,7 @@ def test_the_command_gives_the_file_again(name, file, data, tmp_path):
         for cell in (shipped, again)
         for degc in (25.0, 5.0)
     ]
-    # Other processors and libraries end a descent elsewhere along what the data leave open.
+    # Other processors and libraries end a descent elsewhere along what the data leave open: lg_18650hg2 from an AMD
+    # and from an Intel processor differ by 1.2 mV at 25 degC and 5.6 mV at 5 degC.
     assert np.abs(voltages[0] - voltages[2]).max() < 2e-3
-    assert np.abs(voltages[1] - voltages[3]).max() < 4e-3
+    assert np.abs(voltages[1] - voltages[3]).max() < 8e-3
