@@ -487,6 +487,15 @@ def test_a_cell_that_was_taken_off_at_the_end_is_told_how_to_be_read(tmp_path):
     assert "--to-s" not in refusal(tmp_path, text(voltage=volts))
 
 
+def test_a_row_without_a_voltage_among_good_ones_was_told_as_a_wrong_column(tmp_path):
+    volts = np.array(VOLTAGE)
+    volts[50] = 0.0
+    assert "rows like it: 1): remove or correct these rows, or check the column" in refusal(
+        tmp_path, text(voltage=volts)
+    )
+    assert "remove" not in refusal(tmp_path, text(voltage=0.0 * VOLTAGE))
+
+
 @pytest.mark.parametrize(
     ("columns", "words"),
     [
