@@ -55,7 +55,8 @@ def ranking(
     path: Path, verdict: Verdict, test_rmse_v: Callable[[Explanation], float | None]
 ) -> tuple[CandidateEffect, ...]:
     """A row for every effect that could be simulated, best first. An effect of the verdict is shown in the chosen
-    hypothesis, any other in its best one, each with its gain at the trust that it was fitted at."""
+    hypothesis, any other in its best one, all with their gains in the search: scores at one trust do not compare with
+    those at another, at which the chosen one may have been refitted."""
     chosen, search = path.chosen, path.search or path
     tried, rows = search.explanations(), []
     for effect in path.problem.effects.values():
@@ -70,7 +71,7 @@ def ranking(
             CandidateEffect(
                 effect.id,
                 str(effect.kind),
-                where.gain(best),
+                search.gain(search.chosen if is_chosen else best),
                 test_rmse_v(best),
                 estimates(where, best, effect.id),
                 best.hypothesis,
