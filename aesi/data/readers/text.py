@@ -188,7 +188,8 @@ class TextTable:
         try:
             with closing(self._rows()) as rows:
                 for row, (line, cells) in enumerate(rows):
-                    self._check(f"{self.path.name}, row {row + 1} (line {line})", cells, positions)
+                    begins = line - sum(cell.rstrip("\n").count("\n") for cell in cells)
+                    self._check(f"{self.path.name}, row {row + 1} (line {begins})", cells, positions)
         except DAMAGED as error:
             raise self._damaged(error) from None
         except (csv.Error, UnicodeError, OSError) as error:
@@ -197,6 +198,10 @@ class TextTable:
 
     def _check(self, place: str, cells: list[str], positions: tuple[int, ...]) -> None:
         width = len(self.header)
+        if any("\n" in cell for cell in cells):
+            raise DataError(
+                f"{place}: a quotation mark is opened there and not closed in its line; remove it, or close it."
+            )
         if len(cells) != width:
             cause = (
                 "the row is cut short or damaged: correct or remove it"

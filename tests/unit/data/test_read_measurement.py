@@ -487,6 +487,19 @@ def test_a_cell_that_was_taken_off_at_the_end_is_told_how_to_be_read(tmp_path):
     assert "--to-s" not in refusal(tmp_path, text(voltage=volts))
 
 
+def test_a_quotation_mark_that_is_not_closed_was_told_as_a_row_cut_short_in_the_last_line(tmp_path):
+    lines = text().splitlines()
+    lines[50] = f'"{lines[50]}'
+    message = refusal(tmp_path, "\n".join(lines) + "\n")
+    assert "row 50 (line 51): a quotation mark is opened there and not closed" in message
+
+
+def test_a_file_without_a_column_said_that_it_has_and_no_more(tmp_path):
+    pd.DataFrame().to_parquet(tmp_path / "drive.parquet")
+    with pytest.raises(DataError, match="It has: none "):
+        read_measurement(tmp_path / "drive.parquet")
+
+
 def test_a_row_without_a_voltage_among_good_ones_was_told_as_a_wrong_column(tmp_path):
     volts = np.array(VOLTAGE)
     volts[50] = 0.0
@@ -556,6 +569,8 @@ def test_an_unknown_unit_in_a_name_was_taken_for_si(tmp_path, quantity, name):
         (text(separator=" ", header="time_s current_a voltage_v").encode(), "no comma"),
         (text(header="time_s,voltage_v,voltage_v").encode(), "2 columns named"),
         (text().encode() + b"200.0,5.0", "2 cells"),
+        (b"<!DOCTYPE html>\n<html><body>Log in, please</body></html>", "web page"),
+        (b"<html>\n<head><title>404</title></head></html>", "web page"),
     ],
 )
 def test_what_is_no_table_is_refused(tmp_path, content, word):
