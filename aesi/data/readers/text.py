@@ -249,9 +249,11 @@ def _advice(cell: str, name: str, layout: Layout) -> str:
     if _is_number(cell.replace(MINUS, "-"), layout.decimal):
         return f": its minus is the sign of a typesetter (U+{ord(MINUS):04X}); write a hyphen in all rows"
     if re.match(r"\d{1,4}[-/.:]\d{1,2}[-/.:]\d", cell):
+        date = "%d.%m.%Y" if re.match(r"\d+\.", cell) else "%m/%d/%Y"
+        fraction = ".%f" if re.search(r":\d+\.\d", cell) else ""
         return (
             ": declare what it is: --unit time_s=h:m:s, --unit time_s=date (2024-05-31 12:00:00), or a pattern such as "
-            "--unit 'time_s=%m/%d/%Y %H:%M:%S.%f'"
+            f"--unit 'time_s={date} %H:%M:%S{fraction}'"
         )
     if re.match(r"[+-]?[\d.,]+\s*(?!e[+-]?\d)[^\W\d_]", cell, re.IGNORECASE):
         return ": write numbers alone, and the unit in the name of the column"
