@@ -15,11 +15,11 @@ LIKELY = {
     "time_s": r"time|zeit|elapsed|\bt\b|^t$|duration",
     "current_a": r"current|strom|\bamps?\b|\bi\b|^<?i>?\b|ampere",
     "voltage_v": r"volt|spannung|ecell|ewe|potential|\b[uv]\b",
-    "temperature_degc": r"temp|°[cf]|deg[cf]|celsius|thermo|\bt[ck]?\d\b|" + OF_PLACE,
+    "temperature_degc": r"temp(?!el)|°[cf]|deg[cf]|celsius|thermo|\bt[ck]?\d\b|" + OF_PLACE,
     "state": r"^(state|status|step type|mode|md|command|zustand|direction)\b",
 }
 UNLIKELY = {
-    "time_s": r"step|rest\b|date|stamp|real|absolute|cycle|dpt|dt\b|/dt|" + OF_PLACE,
+    "time_s": r"step|rest\b|date|stamp|stempel|real|absolute|cycle|dpt|dt\b|/dt|" + OF_PLACE,
     "current_a": r"density|range|limit|capacity|control|set\b|rate|time|temp|dq|power|shunt|offset",
     "voltage_v": r"limit|control|set\b|max|min|dv|range|aux|offset|power|upper|lower",
     "temperature_degc": r"time|/dt|set\b|limit|circuit|\bt?amb|chamber|env|room|umgebung|kammer",
@@ -27,7 +27,7 @@ UNLIKELY = {
 }
 WHOLE_TIME = r"total|test|cumul|elapsed"
 """Pattern of names of the whole test's time; beside such a column, a plain 'Time' restarts with each step."""
-STAMP = r"stamp|date ?time|\bdat(e|um)\b|uhrzeit"
+STAMP = r"stamp|stempel|date ?time|\bdat(e|um)\b|uhrzeit"
 """Pattern of names of a date and time of day, which tell the time of a test where no other column does."""
 TEMPERATURE = "T"
 """Symbol of a temperature; without a unit it may be a time, where nothing else in a table is one."""

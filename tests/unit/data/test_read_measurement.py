@@ -186,6 +186,29 @@ def test_a_temperature_under_its_symbol_was_passed_over_without_a_word(tmp_path,
     assert '--column time_s="Zeit"' in message
 
 
+def test_a_zeitstempel_was_a_temperature_and_proposed_before_the_time(tmp_path):
+    message = refusal(tmp_path, "Zeitstempel,Zeit,current_a,voltage_v\n1,2,3,4\n1,2,3,4\n")
+    assert '--column time_s="Zeit"' in message
+    path = tmp_path / "drive.csv"
+    path.write_text("Zeitstempel,current_a,voltage_v,Temp\n1,2,3.7,25\n2,2,3.6,25\n")
+    assert not any(
+        "from 'Zeitstempel'" in note
+        for note in read(path, Reading({"time_s": "Zeitstempel", "temperature_degc": "Temp"})).notes
+    )
+
+
+@pytest.mark.parametrize(
+    ("stamp", "pattern"),
+    [
+        ("27.10.2024 02:45:00", "%d.%m.%Y %H:%M:%S'"),
+        ("27.10.2024 02:45:00.5", "%d.%m.%Y %H:%M:%S.%f'"),
+        ("10/27/2024 02:45:00", "%m/%d/%Y %H:%M:%S'"),
+    ],
+)
+def test_a_pattern_was_proposed_that_does_not_fit_the_dates(tmp_path, stamp, pattern):
+    assert f"--unit 'time_s={pattern}" in refusal(tmp_path, with_line(6, f"{stamp},1.0,3.7"))
+
+
 def test_a_test_s_time_is_proposed_before_a_date(tmp_path):
     message = refusal(tmp_path, "Date,Test Time,current_a,voltage_v\n1,2,3,4\n1,2,3,4\n")
     assert '--column time_s="Test Time"' in message
