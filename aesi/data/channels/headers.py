@@ -15,7 +15,7 @@ LIKELY = {
     "time_s": r"time|zeit|elapsed|\bt\b|^t$|duration",
     "current_a": r"current|strom|\bamps?\b|\bi\b|^<?i>?\b|ampere",
     "voltage_v": r"volt|spannung|ecell|ewe|potential|\b[uv]\b",
-    "temperature_degc": r"temp(?!el)|°[cf]|deg[cf]|celsius|thermo|\bt[ck]?\d\b|" + OF_PLACE,
+    "temperature_degc": r"temp(?!el|o\b|s\b)|°[cf]|deg[cf]|celsius|thermo|\bt[ck]?\d\b|" + OF_PLACE,
     "state": r"^(state|status|step type|mode|md|command|zustand|direction)\b",
 }
 UNLIKELY = {
@@ -52,14 +52,28 @@ def nearest(quantity: str, header: Sequence[str], doubtful: bool = False) -> str
 
 
 def likeliest(quantity: str, header: Sequence[str], doubtful: bool = False) -> str | None:
-    """The column to propose for the quantity: the nearest, or for the time one of dates where none else tells it, and
-    for a temperature a lone T.  doubtful : as in `nearest`.
+    """The column to propose for the quantity: the nearest, or for the time one of dates where none else tells it, for
+    a temperature a lone T, and else the only one of an unknown name with its unit.  doubtful : as in `nearest`, of
+    which a unit alone is no sign.
     """
     found = nearest(quantity, [name for name in header if name != TEMPERATURE], doubtful)
     if found is None and quantity == "time_s":
         found = next((name for name in header if re.search(STAMP, plain(name))), None)
     may_be_t = quantity in {"time_s", "temperature_degc"} and TEMPERATURE in header
+    if found is None and not may_be_t and not doubtful:
+        return _by_unit(quantity, header)
     return TEMPERATURE if found is None and may_be_t else found
+
+
+def _by_unit(quantity: str, header: Sequence[str]) -> str | None:
+    """The one column that has a unit of the quantity in brackets or behind a slash and a name that says nothing."""
+    named = [name for name in header if not any(_is_like(other, name) for other in LIKELY)]
+    of_unit = [
+        name
+        for name in named
+        if units.spelt(quantity, marked_unit(name)) and not re.search(UNLIKELY[quantity], plain(name))
+    ]
+    return of_unit[0] if len(of_unit) == 1 else None
 
 
 def temperatures(header: Sequence[str]) -> list[str]:

@@ -186,6 +186,20 @@ def test_a_temperature_under_its_symbol_was_passed_over_without_a_word(tmp_path,
     assert '--column time_s="Zeit"' in message
 
 
+@pytest.mark.parametrize(
+    "names",
+    ["Temps (s),Courant (A),Tension (V)", "Tempo [s],Corrente [A],Tensione [V]", "t/s,Ibat/A,Ubat/V"],
+)
+def test_names_in_other_languages_were_not_proposed_by_their_units(tmp_path, names):
+    message = refusal(tmp_path, text(header=names))
+    time, current, voltage = names.split(",")
+    assert (
+        f'--column time_s="{time}" --column current_a="{current}" --column voltage_v="{voltage}"' in message
+    )
+    limit = refusal(tmp_path, text(header=HEADER.replace("current_a", "Imax limit (A)")))
+    assert '--column current_a="NAME"' in limit
+
+
 def test_a_zeitstempel_was_a_temperature_and_proposed_before_the_time(tmp_path):
     message = refusal(tmp_path, "Zeitstempel,Zeit,current_a,voltage_v\n1,2,3,4\n1,2,3,4\n")
     assert '--column time_s="Zeit"' in message
