@@ -54,9 +54,11 @@ class CandidateEffect:
 def ranking(
     path: Path, verdict: Verdict, test_rmse_v: Callable[[Explanation], float | None]
 ) -> tuple[CandidateEffect, ...]:
-    """A row for every effect that could be simulated, best first. An effect of the verdict is shown in the chosen
-    hypothesis, any other in its best one, all with their gains in the search: scores at one trust do not compare with
-    those at another, at which the chosen one may have been refitted."""
+    """A row for every effect that could be simulated: those of the verdict, then the others, each best first.
+
+    An effect of the verdict is shown in the chosen hypothesis, any other in its best one, all with their gains in the
+    search: scores at one trust do not compare with those at another, at which the chosen one may have been refitted.
+    """
     chosen, search = path.chosen, path.search or path
     tried, rows = search.explanations(), []
     for effect in path.problem.effects.values():
@@ -78,7 +80,7 @@ def ranking(
                 remark,
             )
         )
-    return best_first(rows)
+    return tuple(sorted(best_first(rows), key=lambda row: row.effect not in verdict.effects))
 
 
 def best_first(rows: Sequence[CandidateEffect]) -> tuple[CandidateEffect, ...]:

@@ -123,6 +123,7 @@ def test_gains_are_of_the_search_not_of_the_trust_that_its_choice_was_refitted_a
     for name in of_search:
         assert of_exact[name].score == of_search[name].score
         assert of_exact[name].remark == of_search[name].remark
+    assert next(iter(of_exact)) == search.chosen.hypothesis[0]  # first, also where a longer one gains more
     # Against a base that is held more tightly the same finding gains more.
     assert exact.gain(exact.chosen) > search.gain(search.chosen) + 1.0
 
