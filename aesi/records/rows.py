@@ -122,8 +122,10 @@ class Rows:
 def written_decimals(column: Array) -> int:
     """Number of decimals in which a column (n,) is written, at most MOST_DECIMALS."""
     known = column[np.isfinite(column)]
+    moves = bool(np.any(known != known[:1]))
     for digits in range(MOST_DECIMALS):
         scaled = known * 10.0**digits
-        if np.all(np.abs(scaled - np.round(scaled)) < WHOLE):
+        whole = np.round(scaled)
+        if np.all(np.abs(scaled - whole) < WHOLE) and (not moves or np.any(whole != whole[0])):
             return digits
     return MOST_DECIMALS

@@ -213,9 +213,10 @@ def check_ranges(columns: Columns, context: Context) -> None:
     bad: BoolArray = (voltage <= 0) | (voltage > HIGHEST_VOLTAGE_V)
     if np.any(bad):
         row = int(np.argmax(bad))
+        lone = "" if 2 * np.sum(bad) > len(bad) else "remove or correct these rows, or "
         raise DataError(
-            f"{context.at('voltage_v', row)}: {voltage[row]:.6g} V is not the voltage of one cell (above 0 "
-            f"and at most {HIGHEST_VOLTAGE_V:g} V; rows like it: {int(np.sum(bad))}): check the column and its unit"
+            f"{context.at('voltage_v', row)}: {voltage[row]:.6g} V is not the voltage of one cell (above 0 and at "
+            f"most {HIGHEST_VOLTAGE_V:g} V; rows like it: {int(np.sum(bad))}): {lone}check the column and its unit"
             f"{_leave_out_clause(columns['time_s'], bad)}."
         )
     if typical < LOWEST_TYPICAL_V:

@@ -183,7 +183,8 @@ class _Finder:
         words = f', or --state "{state}" if the current is a magnitude' if sign and state else ""
         return DataError(
             f"{self._file} has no column {' and no column '.join(quantities)}{found}. "
-            f"Say which is meant: {headers.options(quantities, header)}{sign}{words}. It has: {names_listed(header)}."
+            f"Say which is meant: {headers.options(quantities, header)}{sign}{words}. "
+            f"It has: {names_listed(header) or 'none'}."
         )
 
     def check(self) -> None:

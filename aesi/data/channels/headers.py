@@ -15,11 +15,11 @@ LIKELY = {
     "time_s": r"time|zeit|elapsed|\bt\b|^t$|duration",
     "current_a": r"current|strom|\bamps?\b|\bi\b|^<?i>?\b|ampere",
     "voltage_v": r"volt|spannung|ecell|ewe|potential|\b[uv]\b",
-    "temperature_degc": r"temp|°[cf]|deg[cf]|celsius|thermo|\bt[ck]?\d\b|" + OF_PLACE,
+    "temperature_degc": r"temp(?!el|o\b|s\b)|°[cf]|deg[cf]|celsius|thermo|\bt[ck]?\d\b|" + OF_PLACE,
     "state": r"^(state|status|step type|mode|md|command|zustand|direction)\b",
 }
 UNLIKELY = {
-    "time_s": r"step|rest\b|date|stamp|real|absolute|cycle|dpt|dt\b|/dt|" + OF_PLACE,
+    "time_s": r"step|rest\b|date|stamp|stempel|real|absolute|cycle|dpt|dt\b|/dt|" + OF_PLACE,
     "current_a": r"density|range|limit|capacity|control|set\b|rate|time|temp|dq|power|shunt|offset",
     "voltage_v": r"limit|control|set\b|max|min|dv|range|aux|offset|power|upper|lower",
     "temperature_degc": r"time|/dt|set\b|limit|circuit|\bt?amb|chamber|env|room|umgebung|kammer",
@@ -27,7 +27,7 @@ UNLIKELY = {
 }
 WHOLE_TIME = r"total|test|cumul|elapsed"
 """Pattern of names of the whole test's time; beside such a column, a plain 'Time' restarts with each step."""
-STAMP = r"stamp|date ?time|\bdat(e|um)\b|uhrzeit"
+STAMP = r"stamp|stempel|date ?time|\bdat(e|um)\b|uhrzeit"
 """Pattern of names of a date and time of day, which tell the time of a test where no other column does."""
 TEMPERATURE = "T"
 """Symbol of a temperature; without a unit it may be a time, where nothing else in a table is one."""
@@ -52,14 +52,28 @@ def nearest(quantity: str, header: Sequence[str], doubtful: bool = False) -> str
 
 
 def likeliest(quantity: str, header: Sequence[str], doubtful: bool = False) -> str | None:
-    """The column to propose for the quantity: the nearest, or for the time one of dates where none else tells it, and
-    for a temperature a lone T.  doubtful : as in `nearest`.
+    """The column to propose for the quantity: the nearest, or for the time one of dates where none else tells it, for
+    a temperature a lone T, and else the only one of an unknown name with its unit.  doubtful : as in `nearest`, of
+    which a unit alone is no sign.
     """
     found = nearest(quantity, [name for name in header if name != TEMPERATURE], doubtful)
     if found is None and quantity == "time_s":
         found = next((name for name in header if re.search(STAMP, plain(name))), None)
     may_be_t = quantity in {"time_s", "temperature_degc"} and TEMPERATURE in header
+    if found is None and not may_be_t and not doubtful:
+        return _by_unit(quantity, header)
     return TEMPERATURE if found is None and may_be_t else found
+
+
+def _by_unit(quantity: str, header: Sequence[str]) -> str | None:
+    """The one column that has a unit of the quantity in brackets or behind a slash and a name that says nothing."""
+    named = [name for name in header if not any(_is_like(other, name) for other in LIKELY)]
+    of_unit = [
+        name
+        for name in named
+        if units.spelt(quantity, marked_unit(name)) and not re.search(UNLIKELY[quantity], plain(name))
+    ]
+    return of_unit[0] if len(of_unit) == 1 else None
 
 
 def temperatures(header: Sequence[str]) -> list[str]:

@@ -17,6 +17,7 @@ PARQUET_MAGIC = b"PAR1"
 XLSX_MAGIC = b"PK\x03\x04"
 XLS_MAGIC = b"\xd0\xcf\x11\xe0"
 JSON_MAGIC = b"{"
+HTML_MAGIC = (b"<!doctyp", b"<html")
 MATLAB_MAGIC = b"MATLAB"
 HDF_MAGIC = b"\x89HDF"
 PROMISES = {
@@ -71,6 +72,11 @@ def _refuse_unread_kinds(file: Path, magic: bytes) -> None:
     if magic.startswith(HDF_MAGIC):
         raise DataError(
             f"{file.name} is an HDF5 file, which is not read; export time, current and voltage as CSV."
+        )
+    if magic.removeprefix(codecs.BOM_UTF8).lstrip().lower().startswith(HTML_MAGIC):
+        raise DataError(
+            f"{file.name} is a web page (HTML), as a server sends in place of a file that asks for a login or is gone; "
+            "fetch the file itself."
         )
     if magic.removeprefix(codecs.BOM_UTF8).lstrip().startswith(JSON_MAGIC):
         raise DataError(

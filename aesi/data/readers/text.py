@@ -188,7 +188,8 @@ class TextTable:
         try:
             with closing(self._rows()) as rows:
                 for row, (line, cells) in enumerate(rows):
-                    self._check(f"{self.path.name}, row {row + 1} (line {line})", cells, positions)
+                    begins = line - sum(cell.rstrip("\n").count("\n") for cell in cells)
+                    self._check(f"{self.path.name}, row {row + 1} (line {begins})", cells, positions)
         except DAMAGED as error:
             raise self._damaged(error) from None
         except (csv.Error, UnicodeError, OSError) as error:
@@ -197,6 +198,10 @@ class TextTable:
 
     def _check(self, place: str, cells: list[str], positions: tuple[int, ...]) -> None:
         width = len(self.header)
+        if any("\n" in cell for cell in cells):
+            raise DataError(
+                f"{place}: a quotation mark is opened there and not closed in its line; remove it, or close it."
+            )
         if len(cells) != width:
             cause = (
                 "the row is cut short or damaged: correct or remove it"
@@ -244,9 +249,11 @@ def _advice(cell: str, name: str, layout: Layout) -> str:
     if _is_number(cell.replace(MINUS, "-"), layout.decimal):
         return f": its minus is the sign of a typesetter (U+{ord(MINUS):04X}); write a hyphen in all rows"
     if re.match(r"\d{1,4}[-/.:]\d{1,2}[-/.:]\d", cell):
+        date = "%d.%m.%Y" if re.match(r"\d+\.", cell) else "%m/%d/%Y"
+        fraction = ".%f" if re.search(r":\d+\.\d", cell) else ""
         return (
             ": declare what it is: --unit time_s=h:m:s, --unit time_s=date (2024-05-31 12:00:00), or a pattern such as "
-            "--unit 'time_s=%m/%d/%Y %H:%M:%S.%f'"
+            f"--unit 'time_s={date} %H:%M:%S{fraction}'"
         )
     if re.match(r"[+-]?[\d.,]+\s*(?!e[+-]?\d)[^\W\d_]", cell, re.IGNORECASE):
         return ": write numbers alone, and the unit in the name of the column"

@@ -75,7 +75,7 @@ def trained_sentence(
     share, kept = figures["outside_pct"], figures["kept_pct"]
     head = f"{name}: {percent_words(share)} of the rows lie outside the range the correction was trained on"
     where, beyond = "", figures["beyond_k"] or 0.0
-    if abs(beyond) >= TELLING_K:
+    if abs(beyond) >= TELLING_K or (beyond and share >= ALL_PCT):  # a small one puts all rows outside, too
         side = "below" if beyond < 0 else "above"
         where = f"at {figures['mean_degc']:.1f} degC, {_kelvin_words(abs(beyond))} {side} what it was trained at, "
     if kept is None:

@@ -96,7 +96,10 @@ def _useful_inputs(train: Sequence[ErrorSeries]) -> tuple[tuple[str, ...], tuple
             continue
         kept[name] = unit
     if not kept:
-        raise DataError("every input is constant over the training records: there is nothing to learn from.")
+        raise DataError(
+            "every input is constant over the training records, as where they rest: there is nothing to learn from; "
+            "train on records with a load."
+        )
     return tuple(kept), tuple(notes)
 
 

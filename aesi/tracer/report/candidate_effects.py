@@ -54,8 +54,11 @@ class CandidateEffect:
 def ranking(
     path: Path, verdict: Verdict, test_rmse_v: Callable[[Explanation], float | None]
 ) -> tuple[CandidateEffect, ...]:
-    """A row for every effect that could be simulated, best first. An effect of the verdict is shown in the chosen
-    hypothesis, any other in its best one, each with its gain at the trust that it was fitted at."""
+    """A row for every effect that could be simulated: those of the verdict, then the others, each best first.
+
+    An effect of the verdict is shown in the chosen hypothesis, any other in its best one, all with their gains in the
+    search: scores at one trust do not compare with those at another, at which the chosen one may have been refitted.
+    """
     chosen, search = path.chosen, path.search or path
     tried, rows = search.explanations(), []
     for effect in path.problem.effects.values():
@@ -70,14 +73,14 @@ def ranking(
             CandidateEffect(
                 effect.id,
                 str(effect.kind),
-                where.gain(best),
+                search.gain(search.chosen if is_chosen else best),
                 test_rmse_v(best),
                 estimates(where, best, effect.id),
                 best.hypothesis,
                 remark,
             )
         )
-    return best_first(rows)
+    return tuple(sorted(best_first(rows), key=lambda row: row.effect not in verdict.effects))
 
 
 def best_first(rows: Sequence[CandidateEffect]) -> tuple[CandidateEffect, ...]:

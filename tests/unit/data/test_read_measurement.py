@@ -186,6 +186,43 @@ def test_a_temperature_under_its_symbol_was_passed_over_without_a_word(tmp_path,
     assert '--column time_s="Zeit"' in message
 
 
+@pytest.mark.parametrize(
+    "names",
+    ["Temps (s),Courant (A),Tension (V)", "Tempo [s],Corrente [A],Tensione [V]", "t/s,Ibat/A,Ubat/V"],
+)
+def test_names_in_other_languages_were_not_proposed_by_their_units(tmp_path, names):
+    message = refusal(tmp_path, text(header=names))
+    time, current, voltage = names.split(",")
+    assert (
+        f'--column time_s="{time}" --column current_a="{current}" --column voltage_v="{voltage}"' in message
+    )
+    limit = refusal(tmp_path, text(header=HEADER.replace("current_a", "Imax limit (A)")))
+    assert '--column current_a="NAME"' in limit
+
+
+def test_a_zeitstempel_was_a_temperature_and_proposed_before_the_time(tmp_path):
+    message = refusal(tmp_path, "Zeitstempel,Zeit,current_a,voltage_v\n1,2,3,4\n1,2,3,4\n")
+    assert '--column time_s="Zeit"' in message
+    path = tmp_path / "drive.csv"
+    path.write_text("Zeitstempel,current_a,voltage_v,Temp\n1,2,3.7,25\n2,2,3.6,25\n")
+    assert not any(
+        "from 'Zeitstempel'" in note
+        for note in read(path, Reading({"time_s": "Zeitstempel", "temperature_degc": "Temp"})).notes
+    )
+
+
+@pytest.mark.parametrize(
+    ("stamp", "pattern"),
+    [
+        ("27.10.2024 02:45:00", "%d.%m.%Y %H:%M:%S'"),
+        ("27.10.2024 02:45:00.5", "%d.%m.%Y %H:%M:%S.%f'"),
+        ("10/27/2024 02:45:00", "%m/%d/%Y %H:%M:%S'"),
+    ],
+)
+def test_a_pattern_was_proposed_that_does_not_fit_the_dates(tmp_path, stamp, pattern):
+    assert f"--unit 'time_s={pattern}" in refusal(tmp_path, with_line(6, f"{stamp},1.0,3.7"))
+
+
 def test_a_test_s_time_is_proposed_before_a_date(tmp_path):
     message = refusal(tmp_path, "Date,Test Time,current_a,voltage_v\n1,2,3,4\n1,2,3,4\n")
     assert '--column time_s="Test Time"' in message
@@ -487,6 +524,28 @@ def test_a_cell_that_was_taken_off_at_the_end_is_told_how_to_be_read(tmp_path):
     assert "--to-s" not in refusal(tmp_path, text(voltage=volts))
 
 
+def test_a_quotation_mark_that_is_not_closed_was_told_as_a_row_cut_short_in_the_last_line(tmp_path):
+    lines = text().splitlines()
+    lines[50] = f'"{lines[50]}'
+    message = refusal(tmp_path, "\n".join(lines) + "\n")
+    assert "row 50 (line 51): a quotation mark is opened there and not closed" in message
+
+
+def test_a_file_without_a_column_said_that_it_has_and_no_more(tmp_path):
+    pd.DataFrame().to_parquet(tmp_path / "drive.parquet")
+    with pytest.raises(DataError, match="It has: none "):
+        read_measurement(tmp_path / "drive.parquet")
+
+
+def test_a_row_without_a_voltage_among_good_ones_was_told_as_a_wrong_column(tmp_path):
+    volts = np.array(VOLTAGE)
+    volts[50] = 0.0
+    assert "rows like it: 1): remove or correct these rows, or check the column" in refusal(
+        tmp_path, text(voltage=volts)
+    )
+    assert "remove" not in refusal(tmp_path, text(voltage=0.0 * VOLTAGE))
+
+
 @pytest.mark.parametrize(
     ("columns", "words"),
     [
@@ -547,6 +606,8 @@ def test_an_unknown_unit_in_a_name_was_taken_for_si(tmp_path, quantity, name):
         (text(separator=" ", header="time_s current_a voltage_v").encode(), "no comma"),
         (text(header="time_s,voltage_v,voltage_v").encode(), "2 columns named"),
         (text().encode() + b"200.0,5.0", "2 cells"),
+        (b"<!DOCTYPE html>\n<html><body>Log in, please</body></html>", "web page"),
+        (b"<html>\n<head><title>404</title></head></html>", "web page"),
     ],
 )
 def test_what_is_no_table_is_refused(tmp_path, content, word):

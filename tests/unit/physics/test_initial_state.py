@@ -55,6 +55,13 @@ def test_a_rest_gives_its_state_of_charge_within_the_uncertainty_it_claims(soc):
     assert abs(found.soc - soc) < found.sd
 
 
+def test_a_record_that_stays_within_a_millivolt_of_a_whole_one_was_written_in_steps_of_a_volt():
+    noise_v = 1e-4 * np.random.default_rng(0).standard_normal(600)
+    found = initial_state(LG_M50, record(np.arange(600.0), np.zeros(600), np.round(4.0 + noise_v, 5)))
+    assert "written in steps" not in found.sentence
+    assert found.sd < 0.02  # with a step of 1 V it was 0.295
+
+
 @pytest.mark.parametrize("soc", [0.3, 0.55, 0.8])
 def test_a_rest_voltage_is_known_to_the_step_that_it_is_written_in(soc):
     time = np.arange(600.0)

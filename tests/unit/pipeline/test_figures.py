@@ -185,7 +185,7 @@ def test_hypotheses_are_ranked_and_the_chosen_marked(views):
     order = list(fig.layout.yaxis.categoryarray)
     assert order[-1] == "★ self heating"
     assert order.index("clock skew") < order.index("★ self heating")
-    assert "nothing: as declared" in order
+    assert "no effect: own parameters alone" in order
 
 
 def test_a_hypothesis_that_shares_its_score_names_the_others():
@@ -205,7 +205,7 @@ def test_a_hypothesis_that_shares_its_score_names_the_others():
     ]
     fig = hypotheses.ranking_figure(rows, {}, ["series_resistance"])
     assert list(fig.layout.yaxis.categoryarray) == [
-        "nothing: as declared",
+        "no effect: own parameters alone",
         "★ series resistance",
         "porosity, beside series resistance",
     ]
@@ -227,10 +227,10 @@ def test_hypotheses_stand_as_far_as_they_are_behind_the_best():
         "★ a": (0.1, 0.0),
         "b": (1.0, 1.0),
         "c": (3002.0, 3002.0),
-        "nothing: as declared": (3000.0, 3000.0),
+        "no effect: own parameters alone": (3000.0, 3000.0),
     }
     worse = hypotheses.ranking_figure([rows[2]], {}, [])
-    assert worse.layout.yaxis.categoryarray[-1] == "nothing: as declared"
+    assert worse.layout.yaxis.categoryarray[-1] == "no effect: own parameters alone"
 
 
 def test_a_ranking_without_a_star_was_said_to_have_one():
@@ -244,7 +244,7 @@ def test_a_ranking_without_a_star_was_said_to_have_one():
 
 def test_a_kind_nobody_foresaw_is_still_shown():
     fig = hypotheses.ranking_figure([{"effect": "x", "kind": "numerical", "score": 1.0}], {}, [])
-    assert [dots.name for dots in fig.data] == ["numerical", "declared"]
+    assert [dots.name for dots in fig.data] == ["numerical", "no effect"]
 
 
 def test_a_hypothesis_without_a_figure_on_the_test_part_has_none_in_the_ranking():

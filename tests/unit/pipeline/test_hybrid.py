@@ -382,6 +382,10 @@ def test_a_cold_record_had_no_correction_and_nothing_said_so(fading, data, tmp_p
     fades = f"the correction fades towards the physics, to {share} of its size on average"
     assert f"at 18.0 degC, 6 K below what it was trained at, {fades}" in said
 
+    table, said = predicted(23.0)
+    assert table["outside"].all()
+    assert "at 23.0 degC, 1 K below what it was trained at, the correction fades" in said
+
     table, said = predicted(24.0)
     assert table["outside"].mean() < 0.05  # simulated a kelvin colder than it was trained
     assert table["weight"].mean() > 0.995

@@ -245,6 +245,13 @@ def test_a_constant_input_is_left_out_with_a_note():
     assert problem.notes == ("soc is constant over the training records; its terms were left out.",)
 
 
+def test_records_at_rest_alone_were_refused_without_a_word_on_what_to_give():
+    record = make_record(300)
+    resting = replace(record, inputs=np.ones_like(record.inputs))
+    with pytest.raises(DataError, match="train on records with a load"):
+        Problem.build(Split((resting,), (), ()), SMALL)
+
+
 def test_records_of_one_constant_current_lost_it_with_its_terms():
     """Intervals are calibrated over the current: their score ended in the index of a tuple."""
     record = make_record(300)

@@ -22,7 +22,7 @@ LEAST_NATS = 0.1
 
 
 def ranking_figure(candidates: Sequence[Row], titles: Mapping[str, str], chosen: Sequence[str]) -> Figure:
-    """Distance of each hypothesis, and of the declared model, behind the best; a star marks the added effects."""
+    """Distance of each hypothesis, and of the one without effects, behind the best; a star marks the added effects."""
     rows = sorted(candidates, key=lambda row: -row["score"])[:MOST_HYPOTHESES]
     best = max(rows[0]["score"], 0.0)
     starred = any(row["effect"] in chosen for row in rows)
@@ -36,14 +36,14 @@ def ranking_figure(candidates: Sequence[Row], titles: Mapping[str, str], chosen:
     fig = style.figure(
         "Score of each hypothesis, behind the best", caption, max(240, 130 + 20 * (len(rows) + 1))
     )
-    behind = {_label(row, titles, chosen): best - row["score"] for row in rows} | {DECLARED: best}
+    behind = {_label(row, titles, chosen): best - row["score"] for row in rows} | {NO_EFFECT: best}
     kinds = {row["kind"] for row in rows}
     for kind in (*KIND_ORDER, *sorted(kinds - set(KIND_ORDER))):
         shown = [row for row in rows if row["kind"] == kind]
         if shown:
             labels = [_label(row, titles, chosen) for row in shown]
             _add_dots(fig, kind, labels, behind, [_test_rmse_words(row) for row in shown])
-    _add_dots(fig, "declared", [DECLARED], behind, [""])
+    _add_dots(fig, "no effect", [NO_EFFECT], behind, [""])
     order = sorted(behind, key=lambda label: -behind[label])
     fig.update_yaxes(categoryorder="array", categoryarray=order)
     fig.add_vrect(x0=LEAST_NATS / 2.0, x1=ALIKE_NATS, fillcolor=style.GREY, opacity=0.12, line_width=0)
@@ -63,7 +63,8 @@ def _test_rmse_words(row: Row) -> str:
     return "" if error_mv is None else f", test RMSE {error_mv:.2f} mV"
 
 
-DECLARED = "nothing: as declared"
+NO_EFFECT = "no effect: own parameters alone"
+"""The hypothesis that gains are counted from: the file's parameters are fitted in it, as beside every effect."""
 
 
 def _add_dots(
