@@ -198,11 +198,11 @@ class TextTable:
 
     def _check(self, place: str, cells: list[str], positions: tuple[int, ...]) -> None:
         width = len(self.header)
-        if any("\n" in cell for cell in cells):
-            raise DataError(
-                f"{place}: a quotation mark is opened there and not closed in its line; remove it, or close it."
-            )
         if len(cells) != width:
+            if any("\n" in cell for cell in cells):  # which a cell of words may have
+                raise DataError(
+                    f"{place}: a quotation mark is opened there and not closed in its line; remove it, or close it."
+                )
             cause = (
                 "the row is cut short or damaged: correct or remove it"
                 if len(cells) < width

@@ -531,6 +531,15 @@ def test_a_quotation_mark_that_is_not_closed_was_told_as_a_row_cut_short_in_the_
     assert "row 50 (line 51): a quotation mark is opened there and not closed" in message
 
 
+def test_a_remark_of_two_lines_is_no_quotation_mark_left_open(tmp_path):
+    header, *lines = text().splitlines()
+    remarked = [f'{line},"two\nlines"' for line in lines]
+    (tmp_path / "drive.csv").write_text("\n".join([f"{header},remark", *remarked]) + "\n")
+    assert len(read_measurement(tmp_path / "drive.csv")) == len(lines)
+    remarked[70] = remarked[70].replace(lines[70], lines[70].replace(",", ",oops", 1), 1)
+    assert "oops" in refusal(tmp_path, "\n".join([f"{header},remark", *remarked]) + "\n")
+
+
 def test_a_file_without_a_column_said_that_it_has_and_no_more(tmp_path):
     pd.DataFrame().to_parquet(tmp_path / "drive.parquet")
     with pytest.raises(DataError, match="It has: none "):
