@@ -17,7 +17,8 @@ PARQUET_MAGIC = b"PAR1"
 XLSX_MAGIC = b"PK\x03\x04"
 XLS_MAGIC = b"\xd0\xcf\x11\xe0"
 JSON_MAGIC = b"{"
-HTML_MAGIC = (b"<!doctyp", b"<html")
+HTML_MAGIC = (b"<!doctype", b"<html")
+LFS_MAGIC = b"version https://git-lfs"
 MATLAB_MAGIC = b"MATLAB"
 HDF_MAGIC = b"\x89HDF"
 PROMISES = {
@@ -38,6 +39,11 @@ def open_table(path: str | Path, wanted: Collection[str] = ()) -> TableFile:
     """
     file = Path(path)
     magic = _first_bytes(file)
+    if magic == LFS_MAGIC:
+        raise DataError(
+            f"{file.name} holds not the data but a pointer to them, as a copy of a repository has without Git LFS; "
+            "fetch the file itself (git lfs pull)."
+        )
     suffix = file.suffix.lower()
     if suffix == ".mpr":
         from aesi.data.readers.biologic_mpr import open_mpr
@@ -102,12 +108,12 @@ def _open_text(file: Path, magic: bytes, wanted: Collection[str]) -> TableFile:
 
 
 def _first_bytes(file: Path) -> bytes:
-    """The first eight bytes of a file.  Raises DataError where it cannot be opened or is empty."""
+    """The first bytes of a file, enough to tell its kind.  Raises DataError where it cannot be opened or is empty."""
     if file.is_dir():
         raise DataError(f"{file} is a folder; give one file of it.")
     try:
         with file.open("rb") as stream:
-            magic = stream.read(8)
+            magic = stream.read(len(LFS_MAGIC))
     except FileNotFoundError:
         raise DataError(f"There is no file {file}.") from None
     except (OSError, ValueError) as error:

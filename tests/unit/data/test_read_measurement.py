@@ -617,6 +617,7 @@ def test_an_unknown_unit_in_a_name_was_taken_for_si(tmp_path, quantity, name):
         (text().encode() + b"200.0,5.0", "2 cells"),
         (b"<!DOCTYPE html>\n<html><body>Log in, please</body></html>", "web page"),
         (b"<html>\n<head><title>404</title></head></html>", "web page"),
+        (b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n", "git lfs pull"),
     ],
 )
 def test_what_is_no_table_is_refused(tmp_path, content, word):
