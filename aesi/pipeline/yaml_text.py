@@ -33,9 +33,8 @@ def parse_yaml(text: str) -> Any:
     except yaml.reader.ReaderError as error:
         raise ValueError(f"is not YAML: character {error.position + 1}: {error.reason}.") from None
     except (ValueError, AttributeError) as error:  # a date or a number that is none
-        said = str(error).partition("; use sys.")[
-            0
-        ]  # of a number of thousands of digits: advice for a programmer
+        # Of a number of thousands of digits Python advises programmers, too.
+        said, _, _ = str(error).partition("; use sys.")
         raise ValueError(f"is not YAML: {said}.") from None
     except RecursionError:
         raise ValueError("is not YAML of an experiment: its lists or keys are nested too deeply.") from None
