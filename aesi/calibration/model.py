@@ -239,7 +239,7 @@ class Model:
             block[:, self._closed] = self.shapes.columns(x[self.layout.shapes], surface_n, run.surface_p)
             self._set_own_slopes(i, cell, x, run.voltage_v, block)
 
-        list(side_by_side(set_own, range(len(self.records))))
+        list(side_by_side(set_own, range(len(self.records))))  # each writes a block of its own
         parts = []
         for block, run, record, w in zip(blocks, runs, self.records, self.weights, strict=True):
             lenient = w * leniency(record.rows.voltage_v - run.voltage_v)
@@ -277,7 +277,7 @@ class Model:
                 if j != self.layout.zero or record.slow:
                     blocks[i][:, j] = (self.run(i, changed, there).voltage_v - voltages_v[i]) / h
 
-        list(side_by_side(set_column, range(self.layout.shapes.stop)))
+        list(side_by_side(set_column, range(self.layout.shapes.stop)))  # each writes a column of its own
         return blocks, of_spectra
 
     def _set_own_slopes(self, index: int, cell: Cell, x: Array, voltage_v: Array, block: Array) -> None:

@@ -39,11 +39,7 @@ def open_table(path: str | Path, wanted: Collection[str] = ()) -> TableFile:
     """
     file = Path(path)
     magic = _first_bytes(file)
-    if magic == LFS_MAGIC:
-        raise DataError(
-            f"{file.name} holds not the data but a pointer to them, as a copy of a repository has without Git LFS; "
-            "fetch the file itself (git lfs pull)."
-        )
+    _refuse_unread_kinds(file, magic)
     suffix = file.suffix.lower()
     if suffix == ".mpr":
         from aesi.data.readers.biologic_mpr import open_mpr
@@ -61,7 +57,6 @@ def open_table(path: str | Path, wanted: Collection[str] = ()) -> TableFile:
         from aesi.data.readers.spreadsheet import open_sheet
 
         return open_sheet(file, wanted)
-    _refuse_unread_kinds(file, magic)
     if magic.startswith(MATLAB_MAGIC) or (
         suffix == ".mat" and b"\x00" in magic
     ):  # version 4 begins with numbers
@@ -79,12 +74,18 @@ def _refuse_unread_kinds(file: Path, magic: bytes) -> None:
         raise DataError(
             f"{file.name} is an HDF5 file, which is not read; export time, current and voltage as CSV."
         )
-    if magic.removeprefix(codecs.BOM_UTF8).lstrip().lower().startswith(HTML_MAGIC):
+    begin = magic.removeprefix(codecs.BOM_UTF8).lstrip()
+    if begin == LFS_MAGIC:
+        raise DataError(
+            f"{file.name} holds not the data but a pointer to them, as a copy of a repository has without Git LFS; "
+            "fetch the file itself (git lfs pull)."
+        )
+    if begin.lower().startswith(HTML_MAGIC):
         raise DataError(
             f"{file.name} is a web page (HTML), as a server sends in place of a file that asks for a login or is gone; "
             "fetch the file itself."
         )
-    if magic.removeprefix(codecs.BOM_UTF8).lstrip().startswith(JSON_MAGIC):
+    if begin.startswith(JSON_MAGIC):
         raise DataError(
             f"{file.name} is JSON, which holds no record: a table is read as CSV, Excel or Parquet, and a cell's file "
             "is given as --cell."

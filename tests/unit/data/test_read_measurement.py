@@ -531,6 +531,14 @@ def test_a_quotation_mark_that_is_not_closed_was_told_as_a_row_cut_short_in_the_
     assert "row 50 (line 51): a quotation mark is opened there and not closed" in message
 
 
+@pytest.mark.parametrize("suffix", [".mpr", ".ndax", ".parquet", ".csv"])
+def test_a_pointer_of_git_lfs_is_told_whatever_file_it_stands_for(tmp_path, suffix):
+    file = tmp_path / f"drive{suffix}"
+    file.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n")
+    with pytest.raises(DataError, match="a pointer to them"):
+        read_measurement(file)
+
+
 def test_a_remark_of_two_lines_is_no_quotation_mark_left_open(tmp_path):
     header, *lines = text().splitlines()
     remarked = [f'{line},"two\nlines"' for line in lines]
