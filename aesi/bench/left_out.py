@@ -17,6 +17,7 @@ from typing import Any
 
 from aesi.bench import CaseRow, some_chosen
 from aesi.bench.limit import LOST, NO_TIME, NOT_RUN, NoAnswer, Stopwatch, answer_of
+from aesi.bench.scoring import answer_words
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.data import read_measurement
 from aesi.data.catalogue import HG2, LFP, M50T, NMC, PANASONIC, locate
@@ -166,7 +167,7 @@ def summary(rows: Sequence[CaseRow]) -> dict[str, Any]:
         "no_worse": sum(row["times_better"] <= AS_GOOD for row in judged_rows),
         "worst_times": None if worst is None else worst["times_better"],
         "worst_case": None if worst is None else worst["case"],
-        "confusion": dict(Counter("+".join(row["effects"]) or row["verdict"] for row in judged_rows)),
+        "confusion": dict(Counter(map(answer_words, judged_rows))),
     }
 
 

@@ -68,6 +68,12 @@ def test_the_summary_counts_what_is_worse_than_leaving_the_cell_alone(rows):
     assert (last["worst_case"], last["worst_times"]) == ("b", 1.5)
 
 
+def test_names_beside_unknown_were_counted_as_findings(rows):
+    rows[0] |= {"verdict": "unknown"}
+    rows[1] |= {"verdict": "none", "effects": []}
+    assert summary(rows)["confusion"] == {"unknown: x": 1, "none": 1, "x": 1}
+
+
 def test_the_table_has_the_worst_in_bold_and_says_what_failed(rows):
     lines = table(rows)
     assert [line for line in lines if "**" in line] == ["| c | b | found: x | 10.0 | 8.0 | 12.0 | **1.50** |"]
