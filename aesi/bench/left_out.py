@@ -67,6 +67,7 @@ SETS = (
     MeasuredSet(
         PANASONIC, "panasonic_ncr18650pf.bpx.json", ("25degC_1c_start",),
         ("25degC_us06", "25degC_la92", "25degC_hwfet", "10degC_cycle_1", "0degC_cycle_1", "n10degC_cycle_1"),
+        ("25degC_1c_start",),
     ),
 )  # fmt: skip
 DEVELOPMENT_SETS = (

@@ -1,15 +1,31 @@
 """`aesi bench left_out`: its plan, what it tells of records that are not there, and its table."""
 
+from pathlib import Path
+
 import pytest
 
 from aesi.bench.left_out import DEVELOPMENT_SETS, SETS, judged, plan, summary, table
 from aesi.bench.real.plan import chosen
+from aesi.physics import Cell
+
+CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
 
 
 def test_every_record_is_left_out_once():
     names = [case.name for case in plan()]
-    assert len(names) == len(set(names)) == sum(len(one.slow) + len(one.drives) for one in SETS)
+    assert (
+        len(names)
+        == len(set(names))
+        == sum(len(one.slow) + len(one.drives) - len(one.fitted) for one in SETS)
+    )
     assert [case.test for case in plan("nmc/C2")] == ["C20", "C2"]
+
+
+@pytest.mark.parametrize("one", [one for one in (*SETS, *DEVELOPMENT_SETS) if one.cell])
+def test_a_discharge_that_the_cell_file_was_fitted_to_was_left_out_as_if_it_were_unseen(one):
+    fitted = {name for name, _ in Cell.from_bpx(CELLS / one.cell).fitted_at_k}
+    assert not fitted & set(one.left_out)
+    assert set(one.fitted) <= fitted & {*one.slow, *one.drives}
 
 
 def test_development_sets_hold_development_records_of_several_kinds():
