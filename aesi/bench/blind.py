@@ -15,12 +15,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from aesi.bench import some_chosen
 from aesi.bench.detectable import SEEN_NATS, Detectability, detectability
 from aesi.bench.limit import LOST, NO_ANSWER, NO_TIME, NoAnswer, Stopwatch, answer_of, timed
-from aesi.bench.scoring import TO_THE_NOISE, calibration, judge, rate
+from aesi.bench.scoring import TO_THE_NOISE, answer_words, calibration, judge, median_of, rate
 from aesi.constants import MV_PER_V
 from aesi.data.blind import FULL, BlindCase, CaseSpec, cells_in, generate, label_of, plan, small_plan
 from aesi.data.virtual import INSTRUMENT
@@ -126,10 +124,11 @@ def _scored(case: BlindCase, content: Mapping[str, Any]) -> dict[str, Any]:
     kept = ("verdict", "effects", "indistinguishable", "confidence", "margin", "noise_floor_mv")
     row = {key: content[key] for key in kept}
     for state in STATES:
-        row[f"{state}_test_mv"] = content[state]["test"]["rmse_mv"]
+        row[f"{state}_test_mv"] = content[state]["test"].get("rmse_mv")
     judgement = judge(case.label, case.also, case.neutral, content)
     noise_mv = MV_PER_V * INSTRUMENT.voltage_noise_v
-    after_over_noise = row["after_test_mv"] / noise_mv
+    after_mv = row["after_test_mv"]
+    after_over_noise = None if after_mv is None else after_mv / noise_mv
     errors, covered = _parameters(case, content)
     return row | {
         "exact": judgement.exact,
@@ -140,7 +139,9 @@ def _scored(case: BlindCase, content: Mapping[str, Any]) -> dict[str, Any]:
         "false_names": list(judgement.false_names),
         "after_over_noise": after_over_noise,
         "contradicted": content["contradicted"],
-        "fitted": judgement.named == 1.0 and after_over_noise <= TO_THE_NOISE,
+        "fitted": judgement.named == 1.0
+        and after_over_noise is not None
+        and after_over_noise <= TO_THE_NOISE,
         "parameter_error": max(errors) if errors else None,
         "parameters_covered": covered,
     }
@@ -212,13 +213,11 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
         **rate(fitted, "called_found").named("fitted_called_found"),
         **rate([r for r in claimed if r["exact"]], "contradicted").named("exact_contradicted"),
         **rate([r for r in claimed if not r["exact"]], "contradicted").named("wrong_contradicted"),
-        "after_over_noise_median": _median([r["after_over_noise"] for r in named]),
-        "parameter_error_median": _median(
-            [r["parameter_error"] for r in named if r["parameter_error"] is not None]
-        ),
+        "after_over_noise_median": median_of(named, "after_over_noise"),
+        "parameter_error_median": median_of(named, "parameter_error"),
         **rate(covered, "covered").named("parameters_covered"),
         "calibration": calibration(answered),
-        "processor_s_median": _median([r["processor_s"] for r in timed(rows)]),
+        "processor_s_median": median_of(timed(rows), "processor_s"),
         "processor_s_most": max((r["processor_s"] for r in timed(rows)), default=None),
         "confusion": _confusion(rows),
     }
@@ -234,8 +233,7 @@ def _confusion(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, int]]:
     """Confusion matrix: label -> answer -> number of cases."""
     counts: dict[str, Counter[str]] = {}
     for row in rows:
-        answer = "+".join([row["verdict"] if row["verdict"] != "found" else "", *row["effects"]]).strip("+")
-        counts.setdefault(row["label"], Counter())[answer or "found nothing"] += 1
+        counts.setdefault(row["label"], Counter())[answer_words(row)] += 1
     return {label: dict(answers) for label, answers in counts.items()}
 
 
@@ -271,7 +269,3 @@ def table(rows: Sequence[dict[str, Any]]) -> list[str]:
         ]
         lines.append(f"    | {' | '.join(cells)} |")
     return lines
-
-
-def _median(values: Sequence[float]) -> float | None:
-    return float(np.median(values)) if values else None

@@ -107,9 +107,8 @@ def _fits(problem: InverseProblem) -> Fits:
 
 def _said_more(fit: Fits, effects: tuple[str, ...]) -> float | None:
     """Log likelihood of held-out data under the effects minus that under the best hypothesis that lacks one of them,
-    nats; None if the effects cannot be simulated."""
+    nats; None if the effects cannot be simulated, or none of these hypotheses can."""
     whole = fit(effects)
-    if whole is None:
-        return None
-    rests = [fit(tuple(e for e in effects if e != name)) for name in effects]
-    return whole.score.total - max((r.score.total for r in rests if r is not None), default=-float("inf"))
+    fits = (fit(tuple(e for e in effects if e != name)) for name in effects)
+    rests = [rest.score.total for rest in fits if rest is not None]
+    return whole.score.total - max(rests) if whole is not None and rests else None

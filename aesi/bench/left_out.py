@@ -17,6 +17,7 @@ from typing import Any
 
 from aesi.bench import CaseRow, some_chosen
 from aesi.bench.limit import LOST, NO_TIME, NOT_RUN, NoAnswer, Stopwatch, answer_of
+from aesi.bench.scoring import answer_words
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.data import read_measurement
 from aesi.data.catalogue import HG2, LFP, M50T, NMC, PANASONIC, locate
@@ -66,6 +67,7 @@ SETS = (
     MeasuredSet(
         PANASONIC, "panasonic_ncr18650pf.bpx.json", ("25degC_1c_start",),
         ("25degC_us06", "25degC_la92", "25degC_hwfet", "10degC_cycle_1", "0degC_cycle_1", "n10degC_cycle_1"),
+        ("25degC_1c_start",),
     ),
 )  # fmt: skip
 DEVELOPMENT_SETS = (
@@ -166,7 +168,7 @@ def summary(rows: Sequence[CaseRow]) -> dict[str, Any]:
         "no_worse": sum(row["times_better"] <= AS_GOOD for row in judged_rows),
         "worst_times": None if worst is None else worst["times_better"],
         "worst_case": None if worst is None else worst["case"],
-        "confusion": dict(Counter("+".join(row["effects"]) or row["verdict"] for row in judged_rows)),
+        "confusion": dict(Counter(map(answer_words, judged_rows))),
     }
 
 

@@ -151,6 +151,19 @@ def proportion(hits: int, cases: int) -> Rate:
     return Rate(round(100.0 * hits / cases, 1), (low, high), cases)
 
 
+def median_of(rows: Sequence[Mapping[str, Any]], key: str) -> float | None:
+    """Median of an entry over the rows that have it; None if none has."""
+    values = [row[key] for row in rows if row.get(key) is not None]
+    return float(np.median(values)) if values else None
+
+
+def answer_words(row: Mapping[str, Any]) -> str:
+    """The answer of a row: the named effects, behind the word `unknown` where that is the verdict; the verdict if there
+    are none."""
+    names = "+".join(row.get("effects", ()))
+    return f"unknown: {names}" if names and row["verdict"] == "unknown" else names or str(row["verdict"])
+
+
 def calibration(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Mean stated confidence beside the frequency of right answers (`grouped`), per cent, by bins of the confidence of
     0.1; bins without a case are left out."""

@@ -68,7 +68,7 @@ def _encode(value: Any, arrays: dict[str, np.ndarray]) -> Any:
         return {"array": _store(value, arrays)}
     if isinstance(value, list):
         return [_encode(item, arrays) for item in value]
-    if isinstance(value, tuple):
+    if type(value) is tuple:  # one with names would come back without them
         return {"tuple": [_encode(item, arrays) for item in value]}
     if isinstance(value, Mapping):
         return {"dict": [[_encode(k, arrays), _encode(v, arrays)] for k, v in value.items()]}

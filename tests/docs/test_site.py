@@ -443,16 +443,18 @@ def test_figures_in_short_stand_on_the_pages_that_they_link_to(name, least):
 
 def test_every_formula_of_the_documentation_is_understood():
     change = hook("formulas").on_page_markdown
-    for page in sorted((ROOT / "docs").rglob("*.md")):
-        html = re.sub(r'aria-label="[^"]*"', "", change(page.read_text(encoding="utf-8")))
-        for math in re.findall(r"<math.*?</math>", html, re.DOTALL):
-            assert "\\" not in math, f"{page.name}: {math}"
+    pages = [page.read_text(encoding="utf-8") for page in (ROOT / "docs").rglob("*.md")]
+    html = "".join(re.sub(r'aria-label="[^"]*"', "", change(page)) for page in pages)
+    formulas = re.findall(r"<math.*?</math>", html, re.DOTALL)
+    assert len(formulas) > 100  # of none every one is understood
+    assert [math for math in formulas if "\\" in math] == []
 
 
 def test_pages_refer_to_files_that_exist():
     for page in [ROOT / "README.md", ROOT / "CONTRIBUTING.md"]:
-        for target in re.findall(r"\]\((?!https?:|#)([^)#]+)", page.read_text(encoding="utf-8")):
-            assert (ROOT / target).exists(), f"{page.name} refers to {target}"
+        targets = re.findall(r"\]\((?!https?:|#)([^)#]+)", page.read_text(encoding="utf-8"))
+        assert targets
+        assert [target for target in targets if not (ROOT / target).exists()] == []
 
 
 @pytest.mark.slow

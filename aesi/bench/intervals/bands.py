@@ -29,6 +29,7 @@ from aesi.bench.virtual_drives import SplitLayout, cuts_of, virtual_splits
 from aesi.conformal import WHOLE_DRIVE
 from aesi.conformal.scores import interval_score, worst_bin_coverage
 from aesi.constants import MV_PER_V
+from aesi.errors import FitError
 from aesi.numerics.typing import Array
 from aesi.physics import Cell
 from aesi.pipeline.experiment.intervals.bands import ALL_BUT_FIRST, OutOfSampleErrors, Unseen
@@ -125,7 +126,8 @@ def run(
     """One row per layout, horizon and design.
 
     cell : BPX file of the declared cell.  virtual : virtual cells of each layout.  layouts : see `SplitLayout`.
-    seed : of the virtual cells.  Widths and scores are in mV; `horizon_s` is null for the whole drive.
+    seed : of the virtual cells.  Widths and scores are in mV; `horizon_s` is null for the whole drive. `cells` counts
+    those that a model could be fitted to.  Raises FitError if there is none in a layout.
     """
     from threadpoolctl import threadpool_limits
 
@@ -134,6 +136,11 @@ def run(
         for layout in layouts:
             splits = virtual_splits(Cell.from_bpx(cell), layout, virtual, seed)
             errors = [e for e in (_errors(split, cuts_of(layout)) for split in splits) if e is not None]
+            if not errors:
+                raise FitError(
+                    f"bands: the genome gives no model of any of the {virtual} cells of the layout {layout}; ask for "
+                    "more cells (virtual), or another seed."
+                )
             for name, design in DESIGNS.items():
                 started = process_time()
                 widths = [design(each) for each in errors]

@@ -58,8 +58,9 @@ def run(
     cells: str = "experiments/cells", virtual: NonNegativeInt = 10, seed: NonNegativeInt = 0
 ) -> Iterator[dict[str, Any]]:
     """One row per measured record, or with an `error` one for the cell; one per temperature of the virtual cells; each
-    with the share of resistances inside their intervals (`inside_pct`, with its own 95 % interval), the median of high
-    over low of the intervals (`width`), and that of the larger over the smaller of prediction and truth (`off`).
+    with the share of resistances inside their intervals (`inside_pct`), the median of high over low of the intervals
+    (`width`), and that of the larger over the smaller of prediction and truth (`off`). The 95 % interval of the share
+    takes pulses for independent. Those of one record or cell err alike, so that it is too narrow.
 
     cells : folder of the cell files.  virtual : number of virtual cells.  seed : of these.
     """

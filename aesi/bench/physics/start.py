@@ -103,9 +103,9 @@ def reading_figures(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
     For each basis the number of readings, and their RMS and largest error in percentage points of the state of charge
     (`points`) and in stated standard deviations (`sds`). `refused` counts records without a reading.
-    `right_doubted_pct` and `wrong_caught_pct` are the shares of nearly right and of wrong given states that the voltage
-    contradicts. Readings under a charging load are separate, since the file of a cell with hysteresis has the potential
-    of the discharge alone.
+    `right_doubted_pct` is the share of readings where the voltage contradicts one of two nearly right states, NEAR
+    above and below the reference, and `wrong_caught_pct` that where it contradicts a wrong one. Readings under a
+    charging load are separate, since the file of a cell with hysteresis has the potential of the discharge alone.
     """
     out: dict[str, Any] = {"readings": len(rows), "refused": sum(r["basis"] == "refused" for r in rows)}
     read = [r for r in rows if r["basis"] != "refused"]

@@ -8,6 +8,7 @@ from typing import Any
 
 from aesi.bench import CaseRow
 from aesi.bench.real.figures import case_figure, confusion_figure, sizes_figure, worst_of
+from aesi.bench.scoring import answer_words
 from aesi.pipeline.report.page import write_page
 
 FIGURES: Mapping[str, tuple[str, str]] = {
@@ -125,13 +126,7 @@ def _by_kind(rows: Sequence[CaseRow]) -> list[dict[str, Any]]:
     return [
         {
             "put_in": put_in,
-            "said": [(r["record"].partition("/")[0], r.get("named"), _answer_text(r)) for r in each],
+            "said": [(r["record"].partition("/")[0], r.get("named"), answer_words(r)) for r in each],
         }
         for put_in, each in sorted(found.items())
     ]
-
-
-def _answer_text(row: CaseRow) -> str:
-    """The named effects, or the verdict if there are none."""
-    effects = " + ".join(row.get("effects") or ())
-    return effects or str(row["verdict"])

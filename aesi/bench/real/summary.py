@@ -7,15 +7,13 @@ same of cases in which no effect may be named.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
-
-import numpy as np
 
 from aesi.bench import CaseRow
 from aesi.bench.detectable import SEEN_NATS
 from aesi.bench.limit import NO_ANSWER, NOT_RUN, timed
-from aesi.bench.scoring import rate
+from aesi.bench.scoring import answer_words, median_of, rate
 from aesi.tracer.decide.model_to_write import AS_GOOD
 from aesi.tracer.report.outcome import STATES
 
@@ -64,7 +62,7 @@ def _rates(rows: Sequence[CaseRow]) -> CaseRow:
         **rate(detectable(faults), "named").named("fault_seen_named"),
         "fault_named_by_kind": _by_kind(faults),
         **rate(of("physics"), "named").named("physics_named"),
-        "size_error_median": _median(sized, "size_error"),
+        "size_error_median": median_of(sized, "size_error"),
         **rate([r for r in sized if r.get("size_covered") is not None], "size_covered").named("size_covered"),
         **_with_good_records(of("fault_beside"), of("control_beside")),
         **_initial_state([r for r in of("fault") if r["put_in"].startswith(SOC0)]),
@@ -75,7 +73,7 @@ def _rates(rows: Sequence[CaseRow]) -> CaseRow:
         ),
         **_resistances([r for r in rows if "ohmic_off" in r]),
         **rate([{"worse": _is_worse(r)} for r in rows if _has_errors(r)], "worse").named("after_worse"),
-        "processor_s_median": _median(timed(rows), "processor_s"),
+        "processor_s_median": median_of(timed(rows), "processor_s"),
         "processor_s_total": float(sum(r["processor_s"] for r in rows)),
     }
 
@@ -91,7 +89,7 @@ def _withheld(rows: Sequence[CaseRow]) -> CaseRow:
     return {
         **rate(rows, "named").named("withheld_named"),
         **rate(near, "near").named("withheld_within_2k"),
-        "withheld_course_rms_k_median": _median([r for r in rows if r["named"]], "course_rms_k"),
+        "withheld_course_rms_k_median": median_of([r for r in rows if r["named"]], "course_rms_k"),
         **rate(halved, "halved").named("withheld_error_halved"),
     }
 
@@ -111,7 +109,7 @@ def _with_good_records(rows: Sequence[CaseRow], controls: Sequence[CaseRow]) -> 
         **rate(faults, "named").named("beside_named"),
         **rate(detectable(faults), "named").named("beside_seen_named"),
         "beside_named_by_kind": _by_kind(faults),
-        "beside_size_error_median": _median(sized, "size_error"),
+        "beside_size_error_median": median_of(sized, "size_error"),
         **rate([r for r in sized if r.get("size_covered") is not None], "size_covered").named(
             "beside_size_covered"
         ),
@@ -123,7 +121,7 @@ def _with_good_records(rows: Sequence[CaseRow], controls: Sequence[CaseRow]) -> 
 def _initial_state(rows: Sequence[CaseRow]) -> CaseRow:
     return {
         **rate(rows, "named").named("wrong_soc0_silent"),
-        "wrong_soc0_error_median": _median(rows, "size_error"),
+        "wrong_soc0_error_median": median_of(rows, "size_error"),
     }
 
 
@@ -151,8 +149,8 @@ def _resistances(rows: Sequence[CaseRow]) -> CaseRow:
     both = [{"off": r[key]} for r in rows for key in ("ohmic_off", "transfer_off")]
     return {
         **_near(both, "off", NEAR_SHARE).named("witness_within_15pct"),
-        "witness_ohmic_off_median": _median(rows, "ohmic_off"),
-        "witness_transfer_off_median": _median(rows, "transfer_off"),
+        "witness_ohmic_off_median": median_of(rows, "ohmic_off"),
+        "witness_transfer_off_median": median_of(rows, "transfer_off"),
     }
 
 
@@ -185,17 +183,10 @@ def _is_worse(row: CaseRow) -> bool:
     return not row["after_test_mv"] <= AS_GOOD * better
 
 
-def _median(rows: Sequence[Mapping[str, Any]], key: str) -> float | None:
-    values = [row[key] for row in rows if row.get(key) is not None]
-    return float(np.median(values)) if values else None
-
-
 def _confusion(rows: Sequence[CaseRow]) -> dict[str, dict[str, int]]:
     """Confusion matrix: right answer -> given answer -> number of cases."""
     out: dict[str, Counter[str]] = {}
     for row in rows:
         asked = " or ".join(row["answer"]) or "no name"
-        names = "+".join(row["effects"])
-        said = f"unknown: {names}" if names and row["verdict"] == "unknown" else names or row["verdict"]
-        out.setdefault(asked, Counter())[said] += 1
+        out.setdefault(asked, Counter())[answer_words(row)] += 1
     return {asked: dict(counts) for asked, counts in out.items()}

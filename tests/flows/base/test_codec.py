@@ -1,5 +1,7 @@
 """Records to bytes and back: whole, without pickle, and never wrong in silence."""
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -37,7 +39,13 @@ def test_nested_records_come_back_to_the_last_bit():
     assert codec.loads(codec.dumps(Failed("why", 2.0))) == Failed("why", 2.0)
 
 
-@pytest.mark.parametrize("value", [lambda: 1, object(), np.array([object()]), {1, 2}, open])
+class Named(NamedTuple):
+    """A tuple that came back without its names."""
+
+    size_v: float
+
+
+@pytest.mark.parametrize("value", [lambda: 1, object(), np.array([object()]), {1, 2}, open, Named(1e-3)])
 def test_what_is_no_data_is_refused(value):
     with pytest.raises(codec.Uncodable):
         codec.dumps(value)

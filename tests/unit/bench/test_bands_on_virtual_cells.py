@@ -7,6 +7,7 @@ import pytest
 
 from aesi.bench.intervals.bands import DESIGNS, HORIZONS_S, run
 from aesi.bench.virtual_drives import virtual_splits
+from aesi.errors import FitError
 from aesi.physics import Cell
 
 
@@ -21,6 +22,14 @@ def test_every_horizon_and_design_has_a_line(cell) -> None:
     for line in lines:
         assert 0 < line["coverage_pct"] <= 100
         assert line["interval_score_mv"] >= line["width_mv"] > 0
+
+
+def test_a_layout_without_any_model_ended_in_a_division_by_zero(cell, monkeypatch) -> None:
+    monkeypatch.setattr("aesi.bench.intervals.bands._errors", lambda *_: None)
+    with pytest.raises(
+        FitError, match="no model of any of the 1 cells of the layout repeats; ask for more cells"
+    ):
+        next(run(cell=str(cell), virtual=1, layouts=["repeats"]))
 
 
 def test_cells_of_one_seed_are_the_same_and_differ_among_each_other(cell) -> None:

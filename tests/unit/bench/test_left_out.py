@@ -1,15 +1,31 @@
 """`aesi bench left_out`: its plan, what it tells of records that are not there, and its table."""
 
+from pathlib import Path
+
 import pytest
 
 from aesi.bench.left_out import DEVELOPMENT_SETS, SETS, judged, plan, summary, table
 from aesi.bench.real.plan import chosen
+from aesi.physics import Cell
+
+CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
 
 
 def test_every_record_is_left_out_once():
     names = [case.name for case in plan()]
-    assert len(names) == len(set(names)) == sum(len(one.slow) + len(one.drives) for one in SETS)
+    assert (
+        len(names)
+        == len(set(names))
+        == sum(len(one.slow) + len(one.drives) - len(one.fitted) for one in SETS)
+    )
     assert [case.test for case in plan("nmc/C2")] == ["C20", "C2"]
+
+
+@pytest.mark.parametrize("one", [one for one in (*SETS, *DEVELOPMENT_SETS) if one.cell])
+def test_a_discharge_that_the_cell_file_was_fitted_to_was_left_out_as_if_it_were_unseen(one):
+    fitted = {name for name, _ in Cell.from_bpx(CELLS / one.cell).fitted_at_k}
+    assert not fitted & set(one.left_out)
+    assert set(one.fitted) <= fitted & {*one.slow, *one.drives}
 
 
 def test_development_sets_hold_development_records_of_several_kinds():
@@ -66,6 +82,12 @@ def test_the_summary_counts_what_is_worse_than_leaving_the_cell_alone(rows):
     last = summary(rows)
     assert (last["cases"], last["failed"], last["no_worse"]) == (4, 1, 2)
     assert (last["worst_case"], last["worst_times"]) == ("b", 1.5)
+
+
+def test_names_beside_unknown_were_counted_as_findings(rows):
+    rows[0] |= {"verdict": "unknown"}
+    rows[1] |= {"verdict": "none", "effects": []}
+    assert summary(rows)["confusion"] == {"unknown: x": 1, "none": 1, "x": 1}
 
 
 def test_the_table_has_the_worst_in_bold_and_says_what_failed(rows):

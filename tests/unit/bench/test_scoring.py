@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from aesi.bench import blind
-from aesi.bench.detectable import Detectability, detectability
+from aesi.bench.detectable import Detectability, _said_more, detectability
 from aesi.bench.limit import NoAnswer, OutOfTime, answer_of, processor_limit
-from aesi.bench.scoring import calibration, judge, proportion, rate
+from aesi.bench.scoring import answer_words, calibration, judge, proportion, rate
 from aesi.data.blind import BlindCase
 from aesi.errors import SimulationError
 from aesi.physics import Cell, simulate
@@ -152,6 +152,48 @@ def test_a_case_that_the_tracer_refused_ended_all(monkeypatch):
     monkeypatch.setattr(blind, "generate", lambda spec, cells: case)
     row = blind.judged(spec, str(CELLS))
     assert (row["verdict"], row["exact"], row["seen_nats"]) == ("error", False, None)
+
+
+def test_a_model_that_fails_on_the_held_out_part_ended_the_benchmark(monkeypatch):
+    spec = blind.chosen(cases=1)[0]
+    case = BlindCase(
+        spec, (), "series_resistance", (), (), 0.5, CELLS / "lg_m50_chen2020.bpx.json", {"rms_mv": 1.0}
+    )
+    content = answer("found", "series_resistance") | {
+        "confidence": 0.9, "margin": 3.0, "noise_floor_mv": 1.0, "contradicted": False, "candidates": [],
+        "before": {"test": {"rmse_mv": 9.0}}, "recalibrated": {"test": {"rmse_mv": 5.0}}, "after": {"test": {}},
+    }  # fmt: skip
+    monkeypatch.setattr(blind, "generate", lambda *_: case)
+    monkeypatch.setattr(blind, "_content", lambda _: content)
+    monkeypatch.setattr(blind, "detectability", lambda *_: Detectability(9.0))
+    row = blind.judged(spec, str(CELLS))
+    assert (row["exact"], row["after_test_mv"], row["after_over_noise"], row["fitted"]) == (
+        True,
+        None,
+        None,
+        False,
+    )
+    last = blind.summary([row])
+    assert (last["exact_pct"], last["after_over_noise_median"], last["fitted_called_found_cases"]) == (
+        100.0,
+        None,
+        0,
+    )
+    assert "| found: series_resistance | yes | yes |  |  |" in blind.table([row])[-1]
+
+
+def test_a_name_beside_unknown_is_another_answer_than_a_finding():
+    assert answer_words({"verdict": "unknown", "effects": ["a", "b"]}) == "unknown: a+b"
+    assert answer_words({"verdict": "found", "effects": ["a", "b"]}) == "a+b"
+    assert answer_words({"verdict": "none", "effects": []}) == "none"
+    assert answer_words({"verdict": "not run"}) == "not run"
+
+
+def test_a_label_without_anything_to_compare_it_with_gained_infinitely_many_nats():
+    told = SimpleNamespace(score=SimpleNamespace(total=-7.0))
+    assert _said_more(lambda effects: told if effects else None, ("clock_skew",)) is None
+    assert _said_more(lambda effects: None if effects else told, ("clock_skew",)) is None
+    assert _said_more(lambda effects: told, ("clock_skew",)) == 0.0
 
 
 def test_how_far_the_label_is_ahead_of_another_answer():

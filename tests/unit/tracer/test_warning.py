@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from aesi.tracer.decide.verdict import Verdict
 from aesi.tracer.report.outcome import FileOutcome, rmse_difference
@@ -140,6 +141,23 @@ def test_resampled_blocks_of_steady_errors_have_the_gain_of_all_rows():
     first, second = 3e-3 * np.where(time % 2, 1.0, -1.0), np.full(len(time), 1e-3)
     gain = rmse_difference(first, second, time, np.random.default_rng(0))
     assert gain == pytest.approx((2e-3, 2e-3, 2e-3))
+
+
+def test_the_interval_of_95_per_cent_of_a_gain_held_three_quarters(rng):
+    """Two errors of one size, whose integral correlation time is 200 s, over 20 minutes: the true gain is zero."""
+    kept, n, held = np.exp(-1 / 100), 1200, []
+    for _ in range(300):
+        noise = np.sqrt(1 - kept**2) * rng.standard_normal((2, n + 1000))
+        first, second = lfilter([1.0], [1.0, -kept], noise)[:, 1000:]
+        _, low, high = rmse_difference(first, second, np.arange(float(n)), rng)
+        held.append(low <= 0.0 <= high)
+    # 92 % of a thousand; of 300 the share has a standard deviation of 1.6 %.
+    assert np.mean(held) == pytest.approx(0.92, abs=0.05)
+
+
+def test_a_single_row_has_a_gain_and_no_interval():
+    gain = rmse_difference(np.array([3e-3]), np.array([-1e-3]), np.array([7.0]), np.random.default_rng(0))
+    assert gain == pytest.approx((2e-3, np.nan, np.nan), nan_ok=True)
 
 
 def test_a_declared_model_that_is_written_unchanged_was_warned_of_as_if_it_were_another():
