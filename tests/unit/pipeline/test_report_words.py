@@ -736,6 +736,15 @@ def test_who_gave_a_known_good_record_was_told_to_give_one(views):
     assert discoveries.next_finding(beside).endswith("start it from the declared file.")
 
 
+def test_an_error_as_of_another_cells_file_was_told_as_that_of_a_measured_cell_alone(views):
+    near = views.discovery_view(200, verdict="unknown").discovery | {"structured_mv": 49.9}
+    assert "check that the cell file is of this cell" not in discoveries.next_finding(near)
+    far = discoveries.next_finding(near | {"structured_mv": 91.75})
+    assert (
+        "Next: check that the cell file is of this cell (those of others are off by 50 mV and more), " in far
+    )
+
+
 def test_an_unknown_says_what_came_nearest_and_what_to_do_next(views):
     view = views.discovery_view(200, verdict="unknown")
     said = discoveries.next_finding(view.discovery, view.titles)
