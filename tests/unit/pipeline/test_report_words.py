@@ -302,6 +302,19 @@ def test_other_corrections_that_do_better_are_told(views):
     )
 
 
+def test_errors_a_hundredth_apart_were_told_as_a_tenth_apart_or_as_equal(views, tmp_path):
+    view = views.run_view(200)
+    errors = {"ESPM recalibrated": 1.099, "ESPM + AESI I": 1.056, "ESPM + ridge": 1.046}
+    rows = [{"name": name, "terms": 1, "free_run": {"test_rmse_mv": mv}} for name, mv in errors.items()]
+    rows[1]["free_run"] |= {"test_mser_pct": 99.0, "test_mser_recalibrated_pct": 7.7}
+    close = replace(view, models=(view.models[0], *rows), corrected="ESPM recalibrated")
+    assert runs.others_finding(close).endswith("ESPM + ridge, has a lower RMSE there: 1.05 mV.")
+    page = write_run_report(tmp_path / "r.html", close).read_text(encoding="utf-8")
+    tiles = page[page.index('<div class="stats">') : page.index('<p class="lead">')]
+    assert "1.06\xa0mV" in tiles
+    assert "1.10\xa0mV" in tiles
+
+
 @pytest.mark.parametrize("figures", [{}, {"free_run": None}, {"free_run": {"test_rmse_mv": None}}])
 def test_a_model_that_diverged_has_no_figures_to_tell(views, figures):
     view = views.run_view(200)
