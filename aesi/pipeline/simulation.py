@@ -39,6 +39,7 @@ from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.simulation_words import (
     band_sentences,
+    baseline_of,
     changed_cell_sentences,
     effect_sentences,
     exact_start_sentence,
@@ -199,10 +200,9 @@ def predict_file(
     frame = prediction.to_frame()
     frame.insert(1, "current_a", profile.current_a)
     _write(out, frame)
-    # One step ahead knows the voltage before each row, which the physics does not: its errors are no peers of these.
-    alone_v = None if hybrid.correction is None or measured else prediction.physics_v
     say(changed_cell_sentences(record, hybrid, start.soc, prediction.soc))
-    say(simulated_record_sentences(hybrid.cell, record, prediction.voltage_v, prediction.soc, alone_v))
+    baseline = baseline_of(prediction, hybrid)
+    say(simulated_record_sentences(hybrid.cell, record, prediction.voltage_v, prediction.soc, baseline))
     say(dry_collector_sentences(record.name, prediction, hybrid.model))
     say(first_error_sentences(record, prediction, hybrid, measured))
     if hybrid.bands is not None and not measured and start.basis == "given" and asked.soc0_sd is None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from aesi.constants import MV_PER_V
@@ -26,6 +28,18 @@ TOLD_SD = 0.01
 """Change of state of charge for which a note gives the change of the voltage. A convention."""
 
 
+@dataclass(frozen=True, eq=False)
+class Baseline:
+    """What a prediction is compared with.
+
+    name : of it in a sentence.  voltage_v : (n,) V, its prediction.  how : words that say how to have its error.
+    """
+
+    name: str
+    voltage_v: Array
+    how: str
+
+
 def effect_sentences(record: Measurement, model: HybridModel) -> list[str]:
     """A sentence on the effects that act, or that the cell holds, with their values, which may be defaults; of those
     that were fitted beside what was found the names alone. Of one name several may act: each is told. So are those
@@ -46,11 +60,11 @@ def effect_sentences(record: Measurement, model: HybridModel) -> list[str]:
 
 
 def simulated_record_sentences(
-    cell: Cell, record: Measurement, voltage_v: Array, soc: Array, alone_v: Array | None = None
+    cell: Cell, record: Measurement, voltage_v: Array, soc: Array, baseline: Baseline | None = None
 ) -> list[str]:
     """Sentences on a simulated record: where it ended, its error, and how much lies outside what the file declares.
 
-    voltage_v, soc : (n,) simulated.  alone_v : (n,) V by the physics without a correction, where there is one.
+    voltage_v, soc : (n,) simulated.  baseline : what its error has to be below, where there is anything.
     A record without a voltage has no error.
     """
     said = [
@@ -61,7 +75,7 @@ def simulated_record_sentences(
         said.append(
             f"{record.name}: against the measured voltage {rms(error):.2f} mV RMSE, "
             f"{np.mean(error):+.2f} mV in the mean (measured minus model), at most {np.max(np.abs(error)):.1f} mV"
-            f"{_physics_error_clause(record, rms(error), alone_v)}."
+            f"{_baseline_clause(record, rms(error), baseline)}."
         )
     beyond = (soc < -GIVEN_SD) | (soc > 1.0 + GIVEN_SD)  # as closely as any is known
     unseen_v = 0.5 * 10.0**-VOLTAGE_DIGITS  # a full cell at rest is at its limit, give or take microvolts
@@ -86,15 +100,23 @@ def simulated_record_sentences(
     return said
 
 
-def _physics_error_clause(record: Measurement, corrected_mv: float, alone_v: Array | None) -> str:
-    """Clause, from '; ' on, on the error of the physics without its correction, and on that being the smaller one."""
-    if alone_v is None:
+def baseline_of(prediction: Prediction, model: HybridModel) -> Baseline | None:
+    """What a prediction has to beat: one step ahead persistence, which knows the same voltages, and in free run the
+    physics without its correction; None where there is none."""
+    if prediction.persistence_v is not None:
+        return Baseline("persistence (the last measured error again)", prediction.persistence_v, "with it")
+    if model.correction is None:
+        return None
+    return Baseline("the physics alone", prediction.physics_v, "without the correction")
+
+
+def _baseline_clause(record: Measurement, model_mv: float, baseline: Baseline | None) -> str:
+    """Clause, from '; ' on, on the error of the baseline, and on that being the smaller one."""
+    if baseline is None:
         return ""
-    alone, ours = f"{rms(MV_PER_V * (record.voltage_v - alone_v)):.2f}", f"{corrected_mv:.2f}"
-    better = (
-        ": without the correction the error on this record is lower" if float(alone) < float(ours) else ""
-    )
-    return f"; the physics alone {alone} mV RMSE{better}"
+    theirs, ours = f"{rms(MV_PER_V * (record.voltage_v - baseline.voltage_v)):.2f}", f"{model_mv:.2f}"
+    better = f": {baseline.how} the error on this record is lower" if float(theirs) < float(ours) else ""
+    return f"; {baseline.name} {theirs} mV RMSE{better}"
 
 
 def _beyond_limits_clause(soc: Array) -> str:

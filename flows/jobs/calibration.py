@@ -15,6 +15,7 @@ from aesi.pipeline.written import calibration_files
 from aesi.records import Measurement
 from flows.base import environment
 from flows.base.console import Console
+from flows.base.interrupt import kept_on_interrupt
 
 
 def calibrate(
@@ -37,7 +38,8 @@ def calibrate(
             f"at {100.0 * cost_share:.3g} % of the starting point's cost",
         )
 
-    content = calibrate_files(cell, measurements, out, request, show_step)
+    with kept_on_interrupt("Nothing of the fit is kept; the same command begins it anew."):
+        content = calibrate_files(cell, measurements, out, request, show_step)
     for row in content["files"]:
         console.say(
             f"  {row['name']}: {row['before_rmse_mv']:.2f} mV before, {row['after_rmse_mv']:.2f} mV after, "

@@ -214,10 +214,11 @@ def check_ranges(columns: Columns, context: Context) -> None:
     if np.any(bad):
         row = int(np.argmax(bad))
         lone = "" if 2 * np.sum(bad) > len(bad) else "remove or correct these rows, or "
+        in_series = "" if lone else ", and divide a voltage of cells in series by their number"
         raise DataError(
             f"{context.at('voltage_v', row)}: {voltage[row]:.6g} V is not the voltage of one cell (above 0 and at "
             f"most {HIGHEST_VOLTAGE_V:g} V; rows like it: {int(np.sum(bad))}): {lone}check the column and its unit"
-            f"{_leave_out_clause(columns['time_s'], bad)}."
+            f"{in_series}{_leave_out_clause(columns['time_s'], bad)}."
         )
     if typical < LOWEST_TYPICAL_V:
         taken = context.unit.get("voltage_v", "V")

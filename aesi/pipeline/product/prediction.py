@@ -27,6 +27,8 @@ class Prediction:
     collector_mol_m3 : (n,) the lower one of the salt concentrations at the two collectors, mol/m3, by the physics.
     diverged_s : time, s, from which a correction that feeds back is held, since it left ten times its trained range;
     None where it did not.
+    persistence_v : (n,) V, one step ahead: the physics plus the last error that was known, which a prediction has to
+    beat; at the first sample the physics alone. None in free run.
     """
 
     time_s: Array
@@ -41,6 +43,7 @@ class Prediction:
     temperature_degc: Array | None = None
     collector_mol_m3: Array | None = None
     diverged_s: float | None = None
+    persistence_v: Array | None = None
 
     def __len__(self) -> int:
         return len(self.time_s)

@@ -49,6 +49,7 @@ def write_run_report(path: str | Path, view: RunView) -> Path:
         chosen=chosen,
         physics=physics,
         corrected_mv=runs.corrected_mv(view),
+        headline_digits=runs.headline_digits(view),
         own_share=runs.own_share(view),
         finding=runs.run_finding(view),
         sentences=_said(

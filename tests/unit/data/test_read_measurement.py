@@ -563,6 +563,15 @@ def test_a_row_without_a_voltage_among_good_ones_was_told_as_a_wrong_column(tmp_
     assert "remove" not in refusal(tmp_path, text(voltage=0.0 * VOLTAGE))
 
 
+def test_the_voltage_of_a_pack_was_told_as_one_in_another_unit(tmp_path):
+    volts = np.array(VOLTAGE)
+    assert "divide a voltage of cells in series by their number" in refusal(
+        tmp_path, text(voltage=4.0 * volts)
+    )
+    volts[50] *= 4.0
+    assert "in series" not in refusal(tmp_path, text(voltage=volts))
+
+
 @pytest.mark.parametrize(
     ("columns", "words"),
     [

@@ -433,6 +433,21 @@ def test_a_negative_thickness_is_refused(content):
             r"coefficient is 0.1 V/K, more than any electrode's; .* 0.1 mV/K is 0.0001",
         ),
         ("Cell", {"Density [kg.m-3]": -5.0}, r"Density \[kg.m-3\] = -5 has to be a positive number"),
+        (
+            "Negative electrode",
+            {"OCP [V]": {"x": [2.6, 30.0, 95.0], "y": [0.9, 0.15, 0.05]}},
+            r"OCP \[V\]: x of a table runs from 2.6 to 95; .* 30 % is 0.3",
+        ),
+        (
+            "Positive electrode",
+            {"Diffusivity [m2.s-1]": {"x": [0.0, 50.0, 100.0], "y": [1e-14, 2e-14, 3e-14]}},
+            r"Positive electrode, Diffusivity \[m2.s-1\]: x of a table runs from 0 to 100",
+        ),
+        (
+            "Electrolyte",
+            {"Conductivity [S.m-1]": {"x": [0.1, 1.0, 2.0], "y": [0.3, 0.95, 0.8]}},
+            r"conductivity: x of a table runs from 0.1 to 2, without .* \(1000 mol/m3\); .* 1 mol/L is 1000",
+        ),
         ("Cell", {"Volume [m3]": 24.2}, "density, specific heat capacity and volume make 8.56e"),
     ],
 )
@@ -473,6 +488,14 @@ def test_a_value_in_another_unit_is_refused(content, section, field, factor, sen
     value = fields[field]
     fields[field] = f"({value}) * {factor!r}" if isinstance(value, str) else factor * value
     with pytest.raises(CellError, match=sentence):
+        Cell.from_bpx(content)
+
+
+@pytest.mark.parametrize("conductivity", [0.95, "0.1297 * (x / 1000) ** 3 - 0.001"])
+def test_a_salt_concentration_in_mol_l_was_passed_over_or_blamed_on_the_conductivity(content, conductivity):
+    content["Parameterisation"]["Electrolyte"]["Conductivity [S.m-1]"] = conductivity
+    content["State"]["Initial conditions"]["Initial electrolyte concentration [mol.m-3]"] = 1.2
+    with pytest.raises(CellError, match=r"Initial electrolyte .* = 1.2 is outside .* 1 mol/L is 1000"):
         Cell.from_bpx(content)
 
 

@@ -24,7 +24,12 @@ from aesi.pipeline.product.error_series import error_series
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.product.model_folder import SCHEMA
 from aesi.pipeline.simulation import ProfileRequest, predict_file, simulate_file
-from aesi.pipeline.simulation_words import band_sentences, simulated_record_sentences, voltage_words
+from aesi.pipeline.simulation_words import (
+    Baseline,
+    band_sentences,
+    simulated_record_sentences,
+    voltage_words,
+)
 from aesi.records import Run
 from aesi.sparse import SparseModel
 from aesi.sparse.fade import Fade
@@ -973,7 +978,8 @@ def test_a_correction_that_harms_a_record_was_told_by_its_csv_alone(model, data)
         (near, near, "at most 2.0 mV; the physics alone 2.00 mV RMSE."),
         (near, None, "at most 2.0 mV."),
     ):
-        assert simulated_record_sentences(model.cell, data, ours, soc, alone)[1].endswith(end)
+        baseline = None if alone is None else Baseline("the physics alone", alone, "without the correction")
+        assert simulated_record_sentences(model.cell, data, ours, soc, baseline)[1].endswith(end)
 
 
 def test_a_prediction_is_told_beside_the_physics_alone_where_the_two_know_the_same(model, record, tmp_path):
@@ -982,6 +988,20 @@ def test_a_prediction_is_told_beside_the_physics_alone_where_the_two_know_the_sa
         said: list[str] = []
         predict_file(folder, record, tmp_path / "o.csv", measured=measured, say_notes=said.extend)
         assert any("; the physics alone " in note for note in said) != measured
+
+
+@pytest.mark.parametrize("corrected", [True, False])
+def test_one_step_ahead_was_told_without_persistence(model, record, tmp_path, corrected):
+    given = model if corrected else replace(model, correction=None)
+    said: list[str] = []
+    predict_file(
+        given.save(tmp_path / "model"), record, tmp_path / "o.csv", measured=True, say_notes=said.extend
+    )
+    frame, measured_v = pd.read_csv(tmp_path / "o.csv"), pd.read_csv(record)["voltage_v"]
+    error_mv = 1e3 * (measured_v - frame["physics_v"])
+    repeated = np.sqrt(np.mean((error_mv - error_mv.shift(fill_value=0.0)) ** 2))
+    [line] = [note for note in said if "against the measured voltage" in note]
+    assert f"; persistence (the last measured error again) {repeated:.2f} mV RMSE" in line
 
 
 def test_a_voltage_of_no_cell_was_told_without_when_it_left_the_limits(model, data):

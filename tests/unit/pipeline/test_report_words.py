@@ -302,6 +302,19 @@ def test_other_corrections_that_do_better_are_told(views):
     )
 
 
+def test_errors_a_hundredth_apart_were_told_as_a_tenth_apart_or_as_equal(views, tmp_path):
+    view = views.run_view(200)
+    errors = {"ESPM recalibrated": 1.099, "ESPM + AESI I": 1.056, "ESPM + ridge": 1.046}
+    rows = [{"name": name, "terms": 1, "free_run": {"test_rmse_mv": mv}} for name, mv in errors.items()]
+    rows[1]["free_run"] |= {"test_mser_pct": 99.0, "test_mser_recalibrated_pct": 7.7}
+    close = replace(view, models=(view.models[0], *rows), corrected="ESPM recalibrated")
+    assert runs.others_finding(close).endswith("ESPM + ridge, has a lower RMSE there: 1.05 mV.")
+    page = write_run_report(tmp_path / "r.html", close).read_text(encoding="utf-8")
+    tiles = page[page.index('<div class="stats">') : page.index('<p class="lead">')]
+    assert "1.06\xa0mV" in tiles
+    assert "1.10\xa0mV" in tiles
+
+
 @pytest.mark.parametrize("figures", [{}, {"free_run": None}, {"free_run": {"test_rmse_mv": None}}])
 def test_a_model_that_diverged_has_no_figures_to_tell(views, figures):
     view = views.run_view(200)
@@ -734,6 +747,15 @@ def test_who_gave_a_known_good_record_was_told_to_give_one(views):
         assert "known-good record" in said(alone)
         assert "known-good record" not in said(beside)
     assert discoveries.next_finding(beside).endswith("start it from the declared file.")
+
+
+def test_an_error_as_of_another_cells_file_was_told_as_that_of_a_measured_cell_alone(views):
+    near = views.discovery_view(200, verdict="unknown").discovery | {"structured_mv": 49.9}
+    assert "check that the cell file is of this cell" not in discoveries.next_finding(near)
+    far = discoveries.next_finding(near | {"structured_mv": 91.75})
+    assert (
+        "Next: check that the cell file is of this cell (those of others are off by 50 mV and more), " in far
+    )
 
 
 def test_an_unknown_says_what_came_nearest_and_what_to_do_next(views):

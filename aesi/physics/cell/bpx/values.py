@@ -26,7 +26,7 @@ from aesi.physics.cell.parts import (
     Electrode,
     require_positive,
 )
-from aesi.physics.cell.relations import Relation
+from aesi.physics.cell.relations import LookupTable, Relation
 
 OTHER_UNIT = 10.0
 """Largest ratio, in both directions, of the nominal capacity to that of an electrode's window, or of the capacity of a
@@ -55,6 +55,13 @@ CONDUCTS_W_M_K = (0.01, 100.0)
 """Range of the thermal conductivity across a winding: 0.15 to 0.2 W/(m K) as measured (Drake et al. 2014), 0.18 to 0.69
 in the shipped files. Still air has 0.026, foils along their plane some 30. In W/(cm K) or mW/(m K) values are outside.
 """
+SALT_MOL_M3 = (20.0, 2e4)
+"""Range of the salt's concentration at rest: 1000 or 1200 mol/m3 in the shipped files; 0.1 to 5 mol/L in electrolytes
+that were tried in cells, which is 100 to 5000 mol/m3. The limits are a factor of four to five beyond, halfway to the
+number 5 in mol/L."""
+BEYOND_FILLING = 0.5
+"""Largest distance of a table's stoichiometries from 0 to 1: 0 in the shipped files. In per cent, or in mAh, a table
+ends at 50 or more."""
 LEAST_CUT_OFF_V = 0.1
 """Least lower cut-off: they are 1 V or more (LFP|LTO), which is 0.001 kV; 0.06 V is halfway between 1 and the 0.004 kV
 of the highest."""
@@ -84,8 +91,15 @@ def check_values(cell: CellParameters, where: str) -> None:
     _check_share(f"{where}: Separator", "porosity", cell.separator.porosity)
     _check_share(f"{where}: Separator", "transport efficiency", cell.separator.transport_efficiency)
     _check_share(f"{where}: Electrolyte", "transference", cell.electrolyte.transference)
+    least, most = SALT_MOL_M3
+    if not least <= cell.electrolyte.c0_mol_m3 <= most:
+        raise CellError(
+            f"{where}: Initial electrolyte concentration [mol.m-3] = {cell.electrolyte.c0_mol_m3:g} is outside "
+            f"{least:g} to {most:g} mol/m3, where all electrolytes are; 1 mol/L is 1000."
+        )
     at_rest = np.array([cell.electrolyte.c0_mol_m3])
     for name in ("conductivity", "diffusivity"):
+        _check_holds_rest(cell, getattr(cell.electrolyte, name), f"{where}: Electrolyte: {name}")
         _check_positive(getattr(cell.electrolyte, name), at_rest, f"{where}: Electrolyte: {name}", "mol/m3")
     if not LEAST_CUT_OFF_V <= cell.lower_voltage_v < cell.upper_voltage_v:
         raise CellError(
@@ -283,6 +297,7 @@ def _check_electrode(electrode: Electrode, what: str) -> None:
             f"{what}: stoichiometry limits [{electrode.theta_min:g}, {electrode.theta_max:g}] "
             "have to satisfy 0 <= minimum < maximum <= 1."
         )
+    _check_filling(electrode, what)
     inside = inside_window(electrode)
     _check_positive(electrode.diffusivity, inside, f"{what}: diffusivity", "")
     potential = electrode.ocp(inside)
@@ -294,6 +309,36 @@ def _check_electrode(electrode: Electrode, what: str) -> None:
             f"{what}: the open-circuit potential rises from {potential[0]:.4g} V at a stoichiometry of {inside[0]:.3g} "
             f"to {potential[-1]:.4g} V at {inside[-1]:.3g}; that of an electrode falls as it takes up lithium: the "
             "stoichiometry may be counted the other way round."
+        )
+
+
+def _check_filling(electrode: Electrode, what: str) -> None:
+    """Check that tables are over stoichiometries: beyond its ends a table is constant, so that one over per cent would
+    be taken for its first value."""
+    relations = {
+        "OCP [V]": electrode.ocp,
+        "Diffusivity [m2.s-1]": electrode.diffusivity,
+        "Entropic change coefficient [V.K-1]": electrode.entropic,
+        "OCP (lithiation) [V]": electrode.ocp_lithiation,
+        "OCP (delithiation) [V]": electrode.ocp_delithiation,
+    }
+    for name, table in relations.items():
+        if not isinstance(table, LookupTable):
+            continue
+        if table.x[0] < -BEYOND_FILLING or table.x[-1] > 1.0 + BEYOND_FILLING:
+            raise CellError(
+                f"{what}, {name}: x of a table runs from {table.x[0]:g} to {table.x[-1]:g}; it is a stoichiometry, "
+                "from 0 to 1, so that 30 % is 0.3."
+            )
+
+
+def _check_holds_rest(cell: CellParameters, table: Relation, what: str) -> None:
+    """Check that a table over the salt's concentration holds the one at rest, which is that of most of the cell."""
+    rest = cell.electrolyte.c0_mol_m3
+    if isinstance(table, LookupTable) and not table.x[0] <= rest <= table.x[-1]:
+        raise CellError(
+            f"{what}: x of a table runs from {table.x[0]:g} to {table.x[-1]:g}, without the concentration at rest "
+            f"({rest:g} mol/m3); it is in mol/m3, so that 1 mol/L is 1000."
         )
 
 

@@ -44,6 +44,9 @@ OF_MEASURED = (
     f"of some {MV_PER_V * MEASURED_V:.0f} mV. An effect that is named all the same explains only what exceeds these."
 )
 """Sentence on a verdict of `unknown`, which measured cells nearly always have."""
+OF_ANOTHER_CELL_MV = 50.0
+"""Least error of the file of another cell of similar chemistry, only scaled, at 25 degC: 50 to 117 mV (docs/cells.md).
+Calibrated files leave 6 to 22 there."""
 
 
 def discovery_finding(view: DiscoveryView) -> str:
@@ -238,10 +241,16 @@ def next_finding(discovery: Mapping[str, Any], titles: Mapping[str, str] | None 
         if discovery.get("good")
         else ", or a known-good record of the cell (--good), with which the verdict can be 'found' or 'none'"
     )
+    check = (
+        f"check that the cell file is of this cell (those of others are off by {OF_ANOTHER_CELL_MV:g} mV and more), "
+        "and fit it with aesi calibrate; then "
+        if discovery["structured_mv"] >= OF_ANOTHER_CELL_MV
+        else ""
+    )
     return (
-        f"{nearest}{'. ' if nearest else ''}Next: add data of another kind (a slow discharge, pulses with rests, "
-        f"another temperature) to narrow down the cause{beside}. aesi run learns a correction of the remaining error"
-        f"{'' if discovery['effects'] else '; start it from the declared file'}."
+        f"{nearest}{'. ' if nearest else ''}Next: {check}add data of another kind (a slow discharge, pulses with "
+        f"rests, another temperature) to narrow down the cause{beside}. aesi run learns a correction of the remaining "
+        f"error{'' if discovery['effects'] else '; start it from the declared file'}."
     )
 
 

@@ -15,6 +15,8 @@ NEARLY = 0.98
 """A one-step error above this share of persistence's is called no better than it."""
 HUNDREDTHS = 2
 """Most decimals of an error in mV, to which it has to be less to be called less."""
+TENTH_MV = 0.1
+"""Least distance of two errors that are told to a tenth, mV."""
 
 
 def run_finding(view: RunView) -> str:
@@ -162,6 +164,13 @@ def corrected_mv(view: RunView) -> float | None:
     """RMSE of the physics that the correction was learnt on, in free run on the test records, mV; None where it is not
     known."""
     return _physics_mv(view, view.corrected)
+
+
+def headline_digits(view: RunView) -> int:
+    """Decimals that tell the error of the chosen model, in free run on the test records, mV, from that of the physics
+    that it corrects."""
+    ours, physics = _figure(view.model(view.chosen), "free_run", "test_rmse_mv"), corrected_mv(view)
+    return 1 if ours is None or physics is None or view.chosen == view.corrected else _digits(ours, physics)
 
 
 def own_share(view: RunView) -> float | None:
@@ -322,11 +331,15 @@ def _is_less(first: float, other: float) -> bool:
 
 
 def _distinct_mv(first: float, other: float) -> tuple[str, str]:
-    """Two errors, mV, as text: to a tenth, or to a hundredth where that tells them apart."""
-    for digits in range(1, HUNDREDTHS + 1):
-        if f"{first:.{digits}f}" != f"{other:.{digits}f}":
-            break
+    """Two errors, mV, as text: to a tenth, or to a hundredth where they are less than a tenth apart, since rounding
+    alone would make 1.0 and 1.1 of 1.046 and 1.056."""
+    digits = _digits(first, other)
     return f"{first:.{digits}f}", f"{other:.{digits}f}"
+
+
+def _digits(first: float, other: float) -> int:
+    """Decimals of two errors that stand side by side, mV."""
+    return HUNDREDTHS if abs(first - other) < TENTH_MV or f"{first:.1f}" == f"{other:.1f}" else 1
 
 
 def _figure(row: Row | None, group: str, key: str) -> float | None:
