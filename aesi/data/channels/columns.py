@@ -17,7 +17,7 @@ import numpy as np
 from aesi.data import units
 from aesi.data.channels import headers
 from aesi.data.readers.formats.format import Sign
-from aesi.data.readers.heading import NUMBER
+from aesi.data.readers.heading import NUMBER, one_line
 from aesi.data.readers.table import TableFile, names_listed
 from aesi.errors import DataError, did_you_mean
 
@@ -242,7 +242,7 @@ class _Finder:
     def _find_by_given_name(self, name: str, quantity: str) -> int:
         """Position of the column that the user names.  Raises DataError, with the nearest, where there is none."""
         header = self._table.header
-        found = self._only([i for i, there in enumerate(header) if there == name.strip()])
+        found = self._only([i for i, there in enumerate(header) if one_line(there) == one_line(name)])
         if found is None:
             near = get_close_matches(name, header, n=1, cutoff=0.4)
             hint = f"; the nearest is {near[0]!r}" if near else ""

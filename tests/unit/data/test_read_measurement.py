@@ -1113,3 +1113,30 @@ def test_the_advice_to_remove_a_stretch_of_empty_cells_led_to_the_refusal_of_a_g
     assert read_measurement(path, start_s=80.0).time_s[0] == 80.0
     scattered = np.where(TIME % 40 == 7, np.nan, VOLTAGE)
     assert "read one side" not in refusal(tmp_path, text(voltage=scattered))
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_a_line_break_in_a_quoted_name_hid_the_names_of_a_table(tmp_path, separator):
+    names = ['"Test\nTime\n(s)"', '"Current\n(A)"', "U"]
+    rows = [f"{t}.0{separator}{1.0 if t > 2 else 0.0}{separator}{3.8 - 0.01 * t:.2f}" for t in range(20)]
+    path = tmp_path / "excel.csv"
+    lines = ['probe of 3" and 4.5"', f'Remark{separator}"of two\nlines"', separator.join(names), *rows]
+    path.write_bytes("\r\n".join([*lines, ""]).encode())
+    with pytest.raises(DataError, match='--column time_s="Test Time \\(s\\)" --column current_a='):
+        read_measurement(path)
+    columns = {"time_s": "Test Time (s)", "current_a": "Current\n(A)", "voltage_v": "U"}
+    record = read_measurement(path, columns)
+    np.testing.assert_array_equal(record.time_s, np.arange(20.0))
+    np.testing.assert_allclose(record.voltage_v, 3.8 - 0.01 * np.arange(20.0))
+
+
+def test_the_names_of_a_sheet_with_line_breaks_could_not_be_given_as_options(tmp_path):
+    pd.DataFrame(
+        {
+            "Zeit\n[s]": np.arange(20.0),
+            "Strom\n[A]": [0.0] * 3 + [1.0] * 17,
+            "U\n[V]": np.linspace(3.8, 3.6, 20),
+        }
+    ).to_excel(tmp_path / "sheet.xlsx", index=False)
+    columns = {"time_s": "Zeit [s]", "current_a": "Strom [A]", "voltage_v": "U [V]"}
+    assert len(read_measurement(tmp_path / "sheet.xlsx", columns)) == 20
