@@ -176,9 +176,7 @@ class _Finder:
                 f"{self._file} has no column {' and no column '.join(quantities)}; say which is meant: {options}. "
                 f"It has: {names_listed(header)}."
             )
-        sign = (
-            ", and --sign charge-positive if charging is positive there" if "current_a" in quantities else ""
-        )
+        sign = _sign_advice(headers.likeliest("current_a", header)) if "current_a" in quantities else ""
         state = headers.nearest("state", header)
         words = f', or --state "{state}" if the current is a magnitude' if sign and state else ""
         return DataError(
@@ -399,6 +397,14 @@ class _Finder:
                 f"{', '.join(str(p + 1) for p in places)}); rename all but one of them."
             )
         return places[0] if places else None
+
+
+def _sign_advice(current: str | None) -> str:
+    """What a proposal of options adds on the sign of the current in this column."""
+    said = headers.sign_in(current or "")
+    if said is None:
+        return ", and --sign charge-positive if charging is positive there"
+    return "" if said == "discharge-positive" else f" --sign {said}"
 
 
 def _without_blanks(name: str) -> str:

@@ -1140,3 +1140,41 @@ def test_the_names_of_a_sheet_with_line_breaks_could_not_be_given_as_options(tmp
     ).to_excel(tmp_path / "sheet.xlsx", index=False)
     columns = {"time_s": "Zeit [s]", "current_a": "Strom [A]", "voltage_v": "U [V]"}
     assert len(read_measurement(tmp_path / "sheet.xlsx", columns)) == 20
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "sign"),
+    [
+        ("Amps (chg+)", "", "charge-positive"),
+        ("Strom [mA] (Entladen = -)", "mA", "charge-positive"),
+        ("I [+ = discharge]", "", "discharge-positive"),
+        ("I (charge negative)", "", "discharge-positive"),
+        ("I (charge -)", "", "discharge-positive"),
+    ],
+)
+def test_a_direction_in_the_name_of_a_current_was_a_unit_to_declare_and_then_a_wrong_sign(
+    tmp_path, name, unit, sign
+):
+    scale = (-1.0 if sign == "charge-positive" else 1.0) * (1000.0 if unit else 1.0)
+    current = scale * np.r_[np.zeros(3), np.ones(17)]
+    rows = "".join(f"{t},{i},{3.8 - 0.01 * t:.2f}\n" for t, i in enumerate(current))
+    path = written(tmp_path, f"time_s,{name},voltage_v\n{rows}")
+    with pytest.raises(DataError) as caught:
+        read_measurement(path)
+    options = f" --unit current_a={unit}" * bool(unit) + f" --sign {sign}" * (sign == "charge-positive")
+    assert f'Say which is meant: --column current_a="{name}"{options}. It has' in str(caught.value)
+    columns, units = {"current_a": name}, {"current_a": unit} if unit else None
+    if sign == "charge-positive":
+        with pytest.raises(
+            DataError, match="is positive on charge by its name; declare it: --sign charge-positive"
+        ):
+            read_measurement(path, columns, units=units)
+    record = read_measurement(path, columns, sign if sign == "charge-positive" else None, units=units)
+    np.testing.assert_array_equal(record.current_a, np.r_[np.zeros(3), np.ones(17)])
+
+
+def test_a_channel_is_no_direction(tmp_path):
+    rows = "".join(f"{t},{i},{3.8 - 0.01 * t:.2f}\n" for t, i in enumerate([0.0] * 3 + [1.0] * 17))
+    path = written(tmp_path, f"time_s,I (channel -1),voltage_v\n{rows}")
+    with pytest.raises(DataError, match="'channel -1' in place of a unit"):
+        read_measurement(path, {"current_a": "I (channel -1)"})
