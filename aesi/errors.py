@@ -87,7 +87,7 @@ def not_written(path: object, error: OSError) -> str:
     return f"{path} cannot be written: {error.strerror or error}."
 
 
-def nearest(name: str, known: Iterable[str]) -> str | None:
+def nearest_name(name: str, known: Iterable[str]) -> str | None:
     """The known name that a name begins, as `temp` does, or else the one with a similar spelling; the most similar of
     several, None of none."""
     from difflib import get_close_matches
@@ -100,7 +100,7 @@ def nearest(name: str, known: Iterable[str]) -> str | None:
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """End of a sentence about an unknown name: the nearest known one, or a full stop."""
-    near = nearest(name, known)
+    near = nearest_name(name, known)
     return f"; did you mean {near!r}?" if near is not None else "."
 
 

@@ -9,7 +9,7 @@ from typing import Any, get_args
 import typer
 from typer.core import TyperCommand
 
-from aesi.errors import InputError, nearest, wanted
+from aesi.errors import InputError, nearest_name, wanted
 
 MEANT = {"--model": "a saved model is given with --cell"}
 """Option with a list of choices -> end of the sentence on a value that is not one of them."""
@@ -67,7 +67,7 @@ class Command(TyperCommand):
             from aesi.data.channels.columns import QUANTITIES
 
             instead |= {f"--{quantity}": f"--column {quantity}=..." for quantity in QUANTITIES}
-        near = nearest(option, instead)
+        near = nearest_name(option, instead)
         meant = "." if near is None else f"; did you mean {instead[near]}?"
         return f"{command} has no option {option}{meant} See {command} -h."
 
