@@ -108,7 +108,7 @@ def known_quantities(columns: Mapping[str, str | None]) -> Mapping[str, str | No
     for name in columns:
         if name not in known:
             raise DataError(
-                f"{name!r} is not a quantity to map{did_you_mean(name, known)} There are {', '.join(known)}."
+                f"{name!r} is not a quantity to map{did_you_mean(str(name), known)} There are {', '.join(known)}."
             )
     return columns
 

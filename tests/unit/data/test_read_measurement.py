@@ -1096,6 +1096,7 @@ def test_a_temperature_as_a_number_of_numpy_ended_in_a_traceback(tmp_path, state
         ({"start_s": "10"}, "from '10' s; give a time in seconds"),
         ({"state": 5}, "has no column '5' for state"),
         ({"max_rows": 2.5}, "max_rows = 2.5 is not a whole number"),
+        ({"columns": {1: "I"}}, "1 is not a quantity to map. There are time_s"),
     ],
 )
 def test_an_option_of_another_type_ended_in_a_traceback(tmp_path, options, words):
