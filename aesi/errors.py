@@ -87,15 +87,21 @@ def not_written(path: object, error: OSError) -> str:
     return f"{path} cannot be written: {error.strerror or error}."
 
 
-def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """End of a sentence about an unknown name: the only known name that it begins, as `temp` does, or else the one with
-    the most similar spelling, or a full stop."""
+def nearest_name(name: str, known: Iterable[str]) -> str | None:
+    """The known name that a name begins, as `temp` does, or else the one with a similar spelling; the most similar of
+    several, None of none."""
     from difflib import get_close_matches
 
     every = list(known)
     begun = [each for each in every if each.startswith(name)] if name else []
-    near = begun if len(begun) == 1 else get_close_matches(name, every, n=1)
-    return f"; did you mean {near[0]!r}?" if near else "."
+    near = begun if len(begun) == 1 else get_close_matches(name, begun or every, n=1)
+    return near[0] if near else None
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """End of a sentence about an unknown name: the nearest known one, or a full stop."""
+    near = nearest_name(name, known)
+    return f"; did you mean {near!r}?" if near is not None else "."
 
 
 OF_A_LIST = ("list_type", "tuple_type", "sequence_str", "is_instance_of")

@@ -70,23 +70,11 @@ def impedance(
     Raises DataError for frequencies that are not positive and for a state of charge outside the electrodes' range;
     InputError for a wrong type of cell, effect, state of charge or temperature; SimulationError for lithium plating.
     """
-    check_cell(cell)
-    share = checked_soc(soc, "soc")
-    if share is None:
-        raise InputError(
-            "soc = None is no state of charge; give a share of the capacity, so that 90 % is 0.9."
-        )
     frequency = _checked_frequency(frequency_hz)
     active = checked_effects(effects)
-    stated_k = _checked_kelvin(temperature_degc)
     check_choice("model", model, ModelName)
-    changed = model_with(cell, active)
-    kelvin = _true_kelvin(changed, active, stated_k)
-    rest = _rest_stoichiometries(cell, changed, share)
-    if not ((rest > 0.0) & (rest < 1.0)).all():
-        raise DataError(
-            f"{cell.name} has no state of charge of {share:g}: a stoichiometry leaves (0, 1) there."
-        )
+    at_rest = _at_rest(cell, soc, temperature_degc, active)
+    changed, rest, kelvin = at_rest.model, at_rest.rest, at_rest.kelvin
     if changed.negative.plating is not None:
         raise SimulationError("lithium plating has no linear answer at rest; leave the effect out.")
     omega: Array = 2.0 * np.pi * frequency
@@ -97,7 +85,7 @@ def impedance(
         check_whole(changed)
         z = porous_impedance(changed, _slopes(changed.cell, rest, kelvin), rest, kelvin, omega)
     else:
-        z = _Linear(changed, rest, kelvin).impedance(omega)
+        z = at_rest.impedance(omega)
     acting = [(one, one.effect.on_voltage) for one in active if one.effect.on_voltage is not None]
     if not acting:
         return z
@@ -128,26 +116,38 @@ def _checked_kelvin(temperature_degc: float) -> float:
     return float(degc) + ZERO_CELSIUS_K
 
 
+def _at_rest(cell: Cell, soc: float, temperature_degc: float, active: tuple[ActiveEffect, ...]) -> _Linear:
+    """`cell` with the effects applied, at the rest voltage that it has without them.  Raises as `impedance` does."""
+    check_cell(cell)
+    share = checked_soc(soc, "soc")
+    if share is None:
+        raise InputError(
+            "soc = None is no state of charge; give a share of the capacity, so that 90 % is 0.9."
+        )
+    stated_k = _checked_kelvin(temperature_degc)
+    model = model_with(cell, active)
+    rest = np.array(model.cell.stoichiometries(same_rest(cell, model.cell, share)))
+    if not ((rest > 0.0) & (rest < 1.0)).all():
+        raise DataError(
+            f"{cell.name} has no state of charge of {share:g}: a stoichiometry leaves (0, 1) there."
+        )
+    return _Linear(model, rest, _true_kelvin(model, active, stated_k))
+
+
 def slowest_diffusion_hz(
     cell: Cell, soc: float, temperature_degc: float = 25.0, effects: Iterable[ActiveEffect] = ()
 ) -> float:
     """Frequency, Hz, of the slowest diffusion of `cell` at rest (in a particle or in the salt): its rate over 2 pi,
     where it lags by 45 degrees. Well below it diffusion follows the current, and Z is that of a capacitance.
 
-    Arguments as of `impedance`; both models have the same particles and salt.
+    Arguments and errors as of `impedance`; both models have the same particles and salt.
     """
-    active = checked_effects(effects)
-    model = model_with(cell, active)
-    kelvin = _true_kelvin(model, active, float(temperature_degc) + ZERO_CELSIUS_K)
-    rest, units = _rest_stoichiometries(cell, model, soc), particle_units(model)
+    at_rest = _at_rest(cell, soc, temperature_degc, checked_effects(effects))
+    model, rest, kelvin = at_rest.model, at_rest.rest, at_rest.kelvin
+    units = particle_units(model)
     faster = [_diffusion_factor(model, side, float(rest[side]), kelvin) for side in units.place[:, 0]]
     solid = float(np.min(np.array(faster)[:, None] * units.rates))
     return min(solid, float(np.min(_salt_rates(model, kelvin)[1:]))) / (2.0 * np.pi)
-
-
-def _rest_stoichiometries(cell: Cell, model: EspmModel, soc: float) -> Array:
-    """(2,) rest stoichiometries of the cell with the effects applied, at the rest voltage of `cell`."""
-    return np.array(model.cell.stoichiometries(same_rest(cell, model.cell, soc)))
 
 
 def _diffusion_factor(model: EspmModel, side: int, at: float, kelvin: float) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import DataError
 from aesi.numerics.typing import AnyArray, Array, ComplexArray, Numbers
-from aesi.over_time import extent, over_time, range_words
+from aesi.over_time import extent, over_time, range_words, stamp
 from aesi.records.checked import check_row, check_times, complex_numbers, numbers, row_words
 
 if TYPE_CHECKING:
@@ -232,8 +232,14 @@ class Measurement:
         )
 
     def between(self, start_s: float, stop_s: float) -> Measurement:
-        """The rows with start_s <= time_s < stop_s."""
-        low, high = np.searchsorted(self.time_s, [start_s, stop_s])
+        """The rows with start_s <= time_s < stop_s.  Raises DataError where there is none."""
+        bounds = numbers([start_s, stop_s], f"{self.name}: start_s or stop_s")
+        low, high = np.searchsorted(self.time_s, bounds)
+        if np.isnan(bounds).any() or low >= high:
+            runs = (
+                f" It runs from {stamp(self.time_s[0])} to {stamp(self.time_s[-1])} s." if len(self) else ""
+            )
+            raise DataError(f"{self.name} has no row from {bounds[0]:g} s up to {bounds[1]:g} s.{runs}")
         return self.take(slice(int(low), int(high)))
 
 

@@ -1,4 +1,4 @@
-"""Base class of the commands: a wrong value or a repeated option is refused with one sentence."""
+"""Base class of the commands: an unknown option, a wrong value or a repeated option is refused with one sentence."""
 
 from __future__ import annotations
 
@@ -9,16 +9,17 @@ from typing import Any, get_args
 import typer
 from typer.core import TyperCommand
 
-from aesi.errors import InputError, wanted
+from aesi.errors import InputError, nearest_name, wanted
 
 MEANT = {"--model": "a saved model is given with --cell"}
 """Option with a list of choices -> end of the sentence on a value that is not one of them."""
 
 
 class Command(TyperCommand):
-    """A command that raises InputError, naming the option or its environment variable, for an invalid value and for an
-    option that is given twice but takes one value. Of two values the last would count without a message. Its help names
-    what an option takes each time, not a list of it: several values are given by several options."""
+    """A command that raises InputError, naming the option or its environment variable, for an unknown option, for an
+    invalid value and for an option that is given twice but takes one value. Of two values the last would count without
+    a message. Its help names what an option takes each time, not a list of it: several values are given by several
+    options."""
 
     def __init__(self, *args: Any, **how: Any) -> None:
         super().__init__(*args, **how)
@@ -32,7 +33,12 @@ class Command(TyperCommand):
         if (
             not ctx.resilient_parsing
         ):  # set while a shell asks for completions, where a line may be incomplete
-            _, left, given = self.make_parser(ctx).parse_args(list(args))
+            try:
+                _, left, given = self.make_parser(ctx).parse_args(list(args))
+            except Exception as error:
+                if type(error).__name__ != "NoSuchOption":  # of typer or of click, by the version of typer
+                    raise
+                raise InputError(self._unknown(str(vars(error)["option_name"]), ctx.command_path)) from None
             if left:
                 raise InputError(
                     f"{' '.join(left)}: nothing is taken in this place; see {ctx.command_path} -h."
@@ -52,6 +58,18 @@ class Command(TyperCommand):
             if source is not None and source.name == "ENVIRONMENT":
                 option = f"the environment variable {error.param.envvar} ="
             raise InputError(_sentence(option, faults[0])) from None
+
+    def _unknown(self, option: str, command: str) -> str:
+        """A sentence on an option that there is not: the nearest one, where the name of a quantity, which many write as
+        an option, stands for the column that `--column` names."""
+        instead = {known: known for parameter in self.params for known in parameter.opts}
+        if "--column" in instead:
+            from aesi.data.channels.columns import QUANTITIES
+
+            instead |= {f"--{quantity}": f"--column {quantity}=..." for quantity in QUANTITIES}
+        near = nearest_name(option, instead)
+        meant = "." if near is None else f"; did you mean {instead[near]}?"
+        return f"{command} has no option {option}{meant} See {command} -h."
 
 
 class App(typer.Typer):

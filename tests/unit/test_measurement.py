@@ -111,3 +111,20 @@ def test_a_column_with_a_number_that_no_float_holds_ended_in_an_overflow(column)
 def test_a_plot_of_a_record_without_rows_ended_in_an_index_error():
     with pytest.raises(InputError, match="there is no row to draw"):
         Measurement([], [], []).plot()
+
+
+@pytest.mark.parametrize(
+    ("start_s", "stop_s", "words"),
+    [
+        (100.0, 200.0, "m has no row from 100 s up to 200 s. It runs from 10 to 12 s."),
+        (12.0, 11.0, "m has no row from 12 s up to 11 s. It runs from 10 to 12 s."),
+        (10.0, None, "m has no row from 10 s up to nan s. It runs from 10 to 12 s."),
+        ("ten", 12.0, "m: start_s or stop_s holds 'ten', which is not a number."),
+    ],
+)
+def test_a_part_beyond_a_record_was_an_empty_record_without_a_word(start_s, stop_s, words):
+    record = Measurement([10.0, 11.0, 12.0], [0.0] * 3, [3.7] * 3, name="m")
+    assert len(record.between(11.0, np.inf)) == 2
+    with pytest.raises(DataError) as caught:
+        record.between(start_s, stop_s)
+    assert str(caught.value) == words

@@ -17,7 +17,7 @@ import numpy as np
 from aesi.data import units
 from aesi.data.channels import headers
 from aesi.data.readers.formats.format import Sign
-from aesi.data.readers.heading import NUMBER
+from aesi.data.readers.heading import NUMBER, one_line
 from aesi.data.readers.table import TableFile, names_listed
 from aesi.errors import DataError, did_you_mean
 
@@ -108,7 +108,7 @@ def known_quantities(columns: Mapping[str, str | None]) -> Mapping[str, str | No
     for name in columns:
         if name not in known:
             raise DataError(
-                f"{name!r} is not a quantity to map{did_you_mean(name, known)} There are {', '.join(known)}."
+                f"{name!r} is not a quantity to map{did_you_mean(str(name), known)} There are {', '.join(known)}."
             )
     return columns
 
@@ -176,9 +176,7 @@ class _Finder:
                 f"{self._file} has no column {' and no column '.join(quantities)}; say which is meant: {options}. "
                 f"It has: {names_listed(header)}."
             )
-        sign = (
-            ", and --sign charge-positive if charging is positive there" if "current_a" in quantities else ""
-        )
+        sign = _sign_advice(headers.likeliest("current_a", header)) if "current_a" in quantities else ""
         state = headers.nearest("state", header)
         words = f', or --state "{state}" if the current is a magnitude' if sign and state else ""
         return DataError(
@@ -242,7 +240,7 @@ class _Finder:
     def _find_by_given_name(self, name: str, quantity: str) -> int:
         """Position of the column that the user names.  Raises DataError, with the nearest, where there is none."""
         header = self._table.header
-        found = self._only([i for i, there in enumerate(header) if there == name.strip()])
+        found = self._only([i for i, there in enumerate(header) if one_line(there) == one_line(name)])
         if found is None:
             near = get_close_matches(name, header, n=1, cutoff=0.4)
             hint = f"; the nearest is {near[0]!r}" if near else ""
@@ -399,6 +397,14 @@ class _Finder:
                 f"{', '.join(str(p + 1) for p in places)}); rename all but one of them."
             )
         return places[0] if places else None
+
+
+def _sign_advice(current: str | None) -> str:
+    """What a proposal of options adds on the sign of the current in this column."""
+    said = headers.sign_in(current or "")
+    if said is None:
+        return ", and --sign charge-positive if charging is positive there"
+    return "" if said == "discharge-positive" else f" --sign {said}"
 
 
 def _without_blanks(name: str) -> str:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Sequence
 
 from aesi.data import units
-from aesi.data.readers.formats.format import plain
+from aesi.data.readers.formats.format import Sign, plain
 from aesi.data.readers.layout import COLUMN_NUMBER
 
 OF_PLACE = r"\bt[ _]?(cell|can|case|surf|skin|batt|core|amb|chamber|env|room)"
@@ -38,6 +38,11 @@ RATE_OR_POWER = r"\bc[-_ ]?rate\b|\bpower\b|\bleistung\b"
 UNIT = re.compile(
     r"[\[(<]\s*([^\])>]+?)\s*[\])>]\s*$|[/#]\s*([^/#\[\](){}]+?)\s*$|[_ ]\s*([^/_ \[\](){}]+)\s*$"
 )
+DIRECTION = re.compile(
+    r"[\[(<]\s*([+-]?)\s*=?\s*(dis\w*|dchg?|entlad\w*|charg\w*|chg?|lad\w*)\.?\s*=?\s*([+-]|pos|neg)?[^\])>]*[\])>]\s*$",
+    re.IGNORECASE,
+)
+"""What says at the end of a current's name which direction is positive: (chg+), [+ = discharge], (dis. -)."""
 NO_NAME = re.compile(rf"{COLUMN_NUMBER}\d+")
 
 
@@ -97,17 +102,31 @@ def _spelt_anywhere(text: str) -> bool:
     return any(units.spelt(quantity, text) is not None for quantity in units.SPELLINGS)
 
 
+def sign_in(name: str) -> Sign | None:
+    """The direction in which a current is positive by its name, such as 'I (chg+)'; None where it does not say."""
+    found = DIRECTION.search(name)
+    if found is None or not (mark := found.group(1) or found.group(3)):
+        return None
+    on_charge = found.group(2).lower().startswith(("ch", "lad"))
+    return "charge-positive" if on_charge != (mark.lower() in ("-", "neg")) else "discharge-positive"
+
+
 def unit_in(name: str) -> str:
     """The unit in a column's name, such as 'I[mA]', 'Current (mA)', 'Voltage / mV', 'time_ms'; '' without one."""
-    found = UNIT.search(name)
+    found = UNIT.search(_unsigned(name))
     return next((text for text in found.groups() if text), "") if found else ""
 
 
 def marked_unit(name: str) -> str:
     """What stands in brackets or behind a slash at the end of a column's name, where names hold their unit; '' without
     one. A last word alone, as in 'current_cell', and a number, as in '#1', need not be a unit."""
-    found = None if NO_NAME.fullmatch(name) else UNIT.search(name)
+    found = None if NO_NAME.fullmatch(name) else UNIT.search(_unsigned(name))
     return next((text for text in found.groups()[:2] if text), "") if found else ""
+
+
+def _unsigned(name: str) -> str:
+    """The name without the direction at its end."""
+    return name if sign_in(name) is None else DIRECTION.sub("", name).strip()
 
 
 def is_rate_or_power(name: str) -> bool:
@@ -116,8 +135,8 @@ def is_rate_or_power(name: str) -> bool:
 
 
 def unit_of(quantity: str, name: str) -> str | None:
-    """The unit of the quantity in a column's name, as `--unit` takes it; None where the name has none."""
-    return units.spelt(quantity, unit_in(name))
+    """The unit of the quantity that a column's name has, or is, as `--unit` takes it; None without one."""
+    return units.spelt(quantity, unit_in(name) or _unsigned(name))
 
 
 def options(quantities: Iterable[str], header: Sequence[str]) -> str:

@@ -95,6 +95,12 @@ def _orient(table: TableFile, data: Columns, mapped: Mapped, reading: Reading, n
         notes.append(
             "Words of a state were declared, and the sign of the current comes from itself; name their column: --state."
         )
+    name = mapped.header["current_a"]
+    if not (reading.sign or mapped.maker_sign) and headers.sign_in(name) == "charge-positive":
+        raise DataError(
+            f"{table.path.name}: column {name!r} is positive on charge by its name; declare it: --sign "
+            "charge-positive, or --sign discharge-positive if its name is wrong."
+        )
     _orient_by_declaration(data, mapped, reading, notes)
 
 

@@ -50,7 +50,7 @@ def find_heading(rows: Sequence[Sequence[str]], wanted: Collection[str]) -> Head
     for line, cells in enumerate(rows[:LINES_LOOKED_AT]):
         if len(cells) < 2:
             continue
-        header = tuple(cell.strip().lstrip("~") for cell in cells)
+        header = tuple(one_line(cell).lstrip("~") for cell in cells)
         below = rows[line + 1] if line + 1 < len(rows) else ()
         form = recognise(header)
         if form is not None:
@@ -69,7 +69,7 @@ def likely_heading(rows_from: Iterable[Sequence[Sequence[str]]]) -> Heading | No
     rows_from : for each line, its cells and those of the two lines below.
     """
     for line, (cells, *below) in enumerate(rows_from):
-        names = tuple(cell.strip() for cell in cells)
+        names = tuple(map(one_line, cells))
         if sum(map(bool, names)) < 2 or any(_is_number(name) for name in names):
             continue
         units = _units(names, below[0]) if below else ()
@@ -93,6 +93,11 @@ def first_of_numbers(rows_from: Iterable[Sequence[Sequence[str]]]) -> int | None
         if any(cell.strip() for cell in cells):
             names_above = sum(bool(cell.strip()) for cell in cells) >= 2
     return None
+
+
+def one_line(name: str) -> str:
+    """A column's name with a blank for each line break, as it can be written in an option."""
+    return re.sub(r"\s*[\r\n]\s*", " ", name.strip())
 
 
 def _is_number(cell: str) -> bool:

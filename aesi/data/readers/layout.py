@@ -29,6 +29,10 @@ COLUMN_NUMBER = "#"
 """Prefix of the number of a column in a table without names."""
 LINES_BELOW = 49
 """Number of lines of the table from which its decimal sign and width are determined. A convention."""
+CELL_OPEN = re.compile(r'(?:^|[,;\t|])\s*"[^"]*$')
+"""End of a line within a quoted cell."""
+LINES_OF_A_ROW = 99
+"""Largest number of lines that the quoted cells of a row take; a mark that stays open opens no cell. A convention."""
 THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
 BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
@@ -88,6 +92,7 @@ def layout_of(text: str, encoding: str, *, whole: bool, name: str, wanted: Colle
         del lines[-1]  # the empty text after the last line end
     if not whole:
         lines = lines[:-1]  # the last one may be cut off
+    lines, above = _rows_as_lines(lines)
     found = _find_header(lines, name, wanted)
     notes, start, first_row = found.notes, found.line, found.first_row
     separator = _separator_at(lines, start)
@@ -102,8 +107,32 @@ def layout_of(text: str, encoding: str, *, whole: bool, name: str, wanted: Colle
     layer = _layer_depth(lines[:start], header, below, separator) if form else 0
     if layer:
         notes.append("The rows of cycles and steps between the records were passed over.")
-    layout = Layout(encoding, separator, "", header, first_row, tuple(notes), form, units, layer)
+    layout = Layout(encoding, separator, "", header, above[first_row], tuple(notes), form, units, layer)
     return layout if decimal is None else with_decimal(layout, decimal)
+
+
+def _rows_as_lines(lines: Sequence[str]) -> tuple[list[str], list[int]]:
+    """The lines with a blank for each line break within a quoted cell, as spreadsheets write them in names; and the
+    number of lines of the file above each of them, and above their end."""
+    rows: list[str] = []
+    above = [0]
+    while above[-1] < len(lines):
+        start = above[-1]
+        above.append(start + _lines_of_row(lines[start : start + LINES_OF_A_ROW]))
+        rows.append(" ".join(lines[start : above[-1]]))
+    return rows, above
+
+
+def _lines_of_row(lines: Sequence[str]) -> int:
+    """Number of lines that the row takes which begins in the first one."""
+    marks = 0
+    for number, line in enumerate(lines, start=1):
+        marks += line.count('"')
+        if marks % 2 == 0:
+            return number
+        if number == 1 and not CELL_OPEN.search(line):
+            return 1
+    return 1
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,9 @@ from aesi.records import Hold
 Share = Annotated[float, Field(gt=0, lt=1)]
 Positive = Annotated[float, Field(gt=0)]
 Weight = Annotated[float, Field(ge=0)]
-Count = Annotated[int, Field(ge=1)]
+LARGEST_COUNT = 10**9
+"""Of rows, candidates and processes: no machine holds as many, and what arrays hold ends not far above."""
+Count = Annotated[int, Field(ge=1, le=LARGEST_COUNT)]
 RandomSeed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
 SHORT_FOR = {"cell": "bpx"}
 """Section that may be written as a single text, also below `fallback` -> key that the text is the value of."""
@@ -362,11 +364,11 @@ class SearchConfig(Section):
     """
 
     candidates: Count = 40
-    population: Annotated[int, Field(ge=2)] = 20
-    resamples: Annotated[int, Field(ge=2)] = 100
+    population: Annotated[Count, Field(ge=2)] = 20
+    resamples: Annotated[Count, Field(ge=2)] = 100
     block: Count | None = None
     horizon: Count | None = None
-    fold: Annotated[int, Field(ge=10)] | None = None
+    fold: Annotated[Count, Field(ge=10)] | None = None
     regime: Literal["free_run", "one_step"] = "free_run"
     top_share: Annotated[float, Field(gt=0, le=1)] = 0.1
     lambda1: tuple[Positive, Positive] = (0.1, 1e4)
@@ -410,7 +412,7 @@ class ConformalConfig(Section):
 
     method: str = "spci_boosted"
     alpha: Share = 0.1
-    window: Annotated[int, Field(ge=2)] = 200
+    window: Annotated[Count, Field(ge=2)] = 200
     horizons_s: tuple[Positive, ...] | None = None
     compare: tuple[str, ...] = ("split", "enbpi", "spci_refitted", "spci_linear")
 

@@ -1105,6 +1105,7 @@ def test_a_temperature_as_a_number_of_numpy_ended_in_a_traceback(tmp_path, state
         ({"start_s": "10"}, "from '10' s; give a time in seconds"),
         ({"state": 5}, "has no column '5' for state"),
         ({"max_rows": 2.5}, "max_rows = 2.5 is not a whole number"),
+        ({"columns": {1: "I"}}, "1 is not a quantity to map. There are time_s"),
     ],
 )
 def test_an_option_of_another_type_ended_in_a_traceback(tmp_path, options, words):
@@ -1122,3 +1123,68 @@ def test_the_advice_to_remove_a_stretch_of_empty_cells_led_to_the_refusal_of_a_g
     assert read_measurement(path, start_s=80.0).time_s[0] == 80.0
     scattered = np.where(TIME % 40 == 7, np.nan, VOLTAGE)
     assert "read one side" not in refusal(tmp_path, text(voltage=scattered))
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_a_line_break_in_a_quoted_name_hid_the_names_of_a_table(tmp_path, separator):
+    names = ['"Test\nTime\n(s)"', '"Current\n(A)"', "U"]
+    rows = [f"{t}.0{separator}{1.0 if t > 2 else 0.0}{separator}{3.8 - 0.01 * t:.2f}" for t in range(20)]
+    path = tmp_path / "excel.csv"
+    lines = ['probe of 3" and 4.5"', f'Remark{separator}"of two\nlines"', separator.join(names), *rows]
+    path.write_bytes("\r\n".join([*lines, ""]).encode())
+    with pytest.raises(DataError, match='--column time_s="Test Time \\(s\\)" --column current_a='):
+        read_measurement(path)
+    columns = {"time_s": "Test Time (s)", "current_a": "Current\n(A)", "voltage_v": "U"}
+    record = read_measurement(path, columns)
+    np.testing.assert_array_equal(record.time_s, np.arange(20.0))
+    np.testing.assert_allclose(record.voltage_v, 3.8 - 0.01 * np.arange(20.0))
+
+
+def test_the_names_of_a_sheet_with_line_breaks_could_not_be_given_as_options(tmp_path):
+    pd.DataFrame(
+        {
+            "Zeit\n[s]": np.arange(20.0),
+            "Strom\n[A]": [0.0] * 3 + [1.0] * 17,
+            "U\n[V]": np.linspace(3.8, 3.6, 20),
+        }
+    ).to_excel(tmp_path / "sheet.xlsx", index=False)
+    columns = {"time_s": "Zeit [s]", "current_a": "Strom [A]", "voltage_v": "U [V]"}
+    assert len(read_measurement(tmp_path / "sheet.xlsx", columns)) == 20
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "sign"),
+    [
+        ("Amps (chg+)", "", "charge-positive"),
+        ("Strom [mA] (Entladen = -)", "mA", "charge-positive"),
+        ("I [+ = discharge]", "", "discharge-positive"),
+        ("I (charge negative)", "", "discharge-positive"),
+        ("I (charge -)", "", "discharge-positive"),
+    ],
+)
+def test_a_direction_in_the_name_of_a_current_was_a_unit_to_declare_and_then_a_wrong_sign(
+    tmp_path, name, unit, sign
+):
+    scale = (-1.0 if sign == "charge-positive" else 1.0) * (1000.0 if unit else 1.0)
+    current = scale * np.r_[np.zeros(3), np.ones(17)]
+    rows = "".join(f"{t},{i},{3.8 - 0.01 * t:.2f}\n" for t, i in enumerate(current))
+    path = written(tmp_path, f"time_s,{name},voltage_v\n{rows}")
+    with pytest.raises(DataError) as caught:
+        read_measurement(path)
+    options = f" --unit current_a={unit}" * bool(unit) + f" --sign {sign}" * (sign == "charge-positive")
+    assert f'Say which is meant: --column current_a="{name}"{options}. It has' in str(caught.value)
+    columns, units = {"current_a": name}, {"current_a": unit} if unit else None
+    if sign == "charge-positive":
+        with pytest.raises(
+            DataError, match="is positive on charge by its name; declare it: --sign charge-positive"
+        ):
+            read_measurement(path, columns, units=units)
+    record = read_measurement(path, columns, sign if sign == "charge-positive" else None, units=units)
+    np.testing.assert_array_equal(record.current_a, np.r_[np.zeros(3), np.ones(17)])
+
+
+def test_a_channel_is_no_direction(tmp_path):
+    rows = "".join(f"{t},{i},{3.8 - 0.01 * t:.2f}\n" for t, i in enumerate([0.0] * 3 + [1.0] * 17))
+    path = written(tmp_path, f"time_s,I (channel -1),voltage_v\n{rows}")
+    with pytest.raises(DataError, match="'channel -1' in place of a unit"):
+        read_measurement(path, {"current_a": "I (channel -1)"})

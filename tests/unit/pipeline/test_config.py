@@ -131,6 +131,23 @@ def test_an_inadmissible_value_is_named(changes, words):
 
 
 @pytest.mark.parametrize(
+    "key",
+    [
+        *(f"search.{key}" for key in ("candidates", "population", "resamples", "block", "horizon", "fold")),
+        "search.workers",
+        "conformal.window",
+        "data.repeats.train.0",
+    ],
+)
+def test_a_count_that_no_array_holds_was_told_by_an_overflow_or_not_at_all(key):
+    section, name, *_ = key.split(".")
+    value = {"period_s": 1, "train": [10**400], "test": [1]} if name == "repeats" else 10**400
+    kind = {"kind": "files", "record": "a.csv"} if section == "data" else {}
+    found = sentence({section: kind | {name: value}})
+    assert f"{key} = 1{'0' * 400} is not admissible: it has to be less than or equal to 1000000000." in found
+
+
+@pytest.mark.parametrize(
     ("changes", "words"),
     [
         ({"data": FILES | {"valid": ["a.csv"]}}, "a.csv is in train and in valid"),

@@ -211,3 +211,27 @@ def test_an_instruments_frequencies_were_refused(tmp_path, name, factor):
     path.write_text("Hertz,Re(Z)/Ohm\n0.1,0.02\n")
     with pytest.raises(DataError, match="as instruments name it with its unit"):
         read_frequencies(str(path))
+
+
+@pytest.mark.parametrize(
+    ("of", "soc", "how", "words"),
+    [
+        ("lg_m50.bpx.json", 0.5, {}, "cell is the text 'lg_m50.bpx.json', not a Cell"),
+        (None, 50.0, {}, "soc = 50.0 is not a state of charge"),
+        (None, None, {}, "soc = None is no state of charge"),
+        (None, 0.5, {"temperature_degc": 298.15}, "in kelvin? 298.15 K is 25 degC"),
+        (None, 0.5, {"temperature_degc": [25.0, 26.0]}, "a cell at rest is at one temperature"),
+        (None, 0.5, {"effects": ("double_layer",)}, "'double_layer'"),
+    ],
+)
+def test_the_slowest_diffusion_refuses_what_the_impedance_does(cell, of, soc, how, words):
+    sentences = []
+    for asked in (
+        lambda: slowest_diffusion_hz(of or cell, soc, **how),
+        lambda: aesi.impedance(of or cell, [1.0], soc, **how),
+    ):
+        with pytest.raises(InputError) as caught:
+            asked()
+        sentences.append(str(caught.value))
+    assert words in sentences[0]
+    assert sentences[0] == sentences[1]

@@ -1,5 +1,7 @@
 """The physics models beside a correction: fitted to the training rows alone, and refitted without each drive."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from small_experiment import BPX, NOISE_V, SOC0, experiment, write_record
@@ -135,6 +137,27 @@ def test_validation_comes_from_drives_that_chose_nothing(loaded, config):
     assert figures[DECLARED] == pytest.approx(0.0, abs=1e-9)
     assert 99.0 < figures[RECALIBRATED] <= 100.0
     assert set(figures) == {*PHYSICS_NAMES, "AESI I", "AESI II"}
+
+
+def test_a_left_out_piece_without_an_error_has_no_say_in_the_validation_figure(loaded, config):
+    problem = build_problem(loaded, config)
+    candidate = evaluate(problem, Genome.whole(problem.library, 1.0, 1e-3, 0.5, 1, 1, feedback=False))
+    assert isinstance(candidate, Candidate)
+
+    def exact(out):
+        series = out.series
+        zero = np.zeros(len(series))
+        same = dict.fromkeys(series.physics, series.model_v)
+        return replace(out, series=replace(series, error_v=zero, physics=same))
+
+    def figures(**pieces):
+        left_out = replace(loaded.left_out, **pieces)
+        with np.errstate(divide="raise", invalid="raise"):
+            return validation_mser(replace(loaded, left_out=left_out), problem, [candidate])
+
+    parts, drives = loaded.left_out.parts, loaded.left_out.drives
+    assert figures(drives=(*drives[:-1], exact(drives[-1]))) == figures(drives=drives[:-1])
+    assert figures(parts=tuple(map(exact, parts)), drives=tuple(map(exact, drives))) == {}
 
 
 def test_a_found_model_may_be_named_as_the_cell(config):

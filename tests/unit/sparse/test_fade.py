@@ -89,6 +89,16 @@ def test_an_error_that_no_other_drive_has_is_left_to_the_physics():
     np.testing.assert_allclose(nested_shares(problem, [candidate], 0), 1.0)
 
 
+def test_a_drive_that_the_physics_errs_nowhere_on_divided_by_zero():
+    exact, *others = drives(range(4))
+    exact = replace(exact, error_v=np.zeros(len(exact)))
+    problem, candidate = fitted((exact, *others))
+    with np.errstate(divide="raise", invalid="raise"):
+        shares = nested_shares(problem, [candidate], 0)
+    assert shares[0] == 1.0
+    assert np.isfinite(shares).all()
+
+
 def test_a_correction_that_feeds_back_was_shrunk_where_it_was_judged_by_folds_apart_and_not_where_it_is_used():
     records = tuple(replace(make_record(600, seed=s, feedback=0.8), name=f"drive {s}") for s in range(4))
     problem = Problem.build(Split(records, (), ()), OPTIONS)

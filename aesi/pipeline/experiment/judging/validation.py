@@ -38,12 +38,16 @@ SquaresLeft = dict[str, float]
 def validation_mser(loaded: Loaded, problem: Problem, candidates: Sequence[Candidate]) -> dict[str, float]:
     """Model -> the figure (1), per cent: the reduction of the declared physics' squared error on the median piece.
 
-    The physics is refitted without each piece, and the ensembles are chosen without it (`picked`).
-    Empty if the search leaves out other pieces than drives or parts of them.
+    The physics is refitted without each piece, and the ensembles are chosen without it (`picked`). A piece on which the
+    error of the declared physics is exactly zero has no share and is left out, as a test record has no reduction then.
+    Empty if no piece has one, and if the search leaves out other pieces than drives or parts of them.
     """
     if len(problem.folds) < 2 or not problem.folds_are_drives:
         return {}
-    pieces = [*_part_squares(loaded, problem, candidates), *_drive_squares(loaded, problem, candidates)]
+    every = [*_part_squares(loaded, problem, candidates), *_drive_squares(loaded, problem, candidates)]
+    pieces = [left for left in every if left[DECLARED] > 0.0]
+    if not pieces:
+        return {}
     return {
         name: 100.0 * (1.0 - float(np.median([left[name] / left[DECLARED] for left in pieces])))
         for name in pieces[0]

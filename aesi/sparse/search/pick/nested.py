@@ -52,15 +52,14 @@ def picked(
 
 def nested_shares(problem: Problem, candidates: Sequence[Candidate], ensemble: int) -> Array:
     """(n_folds,) squared error on each fold with the choice of the other folds, over that of the bare physics; 1 where
-    there is no choice.
+    there is no choice, and where that error is exactly zero, so that nothing is there to be shared.
 
     ensemble : as for `picked`.
     """
     shares = np.ones(len(problem.folds))
     for d in range(len(problem.folds)):
         pick = picked(problem, candidates, ensemble, np.arange(len(problem.folds)) != d)
-        if pick is not None:
-            sums = pick.candidate.fold_sums[ensemble][d]
+        if pick is not None and (sums := pick.candidate.fold_sums[ensemble][d])[0] > 0.0:
             shares[d] = _squared_error(sums, pick.amplitude) / sums[0]
     return shares
 
