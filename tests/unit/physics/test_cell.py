@@ -339,6 +339,14 @@ def test_two_rows_of_a_table_that_were_swapped_made_a_potential_rise_in_silence(
     )
 
 
+def test_potentials_that_are_constant_in_both_electrodes_are_told(content):
+    content["Parameterisation"]["Negative electrode"]["OCP [V]"] = 0.1
+    assert Cell.from_bpx(content).unread == ()  # of one electrode, as lithium metal's, it may be
+    content["Parameterisation"]["Positive electrode"]["OCP [V]"] = 3.8
+    (said,) = Cell.from_bpx(content).unread
+    assert "3.7 V at every state of charge" in said
+
+
 def test_a_potential_over_the_lithium_that_was_taken_out_is_refused(content):
     side = content["Parameterisation"]["Positive electrode"]
     side["OCP [V]"] = {"x": [0.0, 1.0], "y": [3.0, 4.4]}

@@ -14,6 +14,7 @@ from aesi.physics.cell.bpx.schema import load_bpx
 from aesi.physics.cell.bpx.transport import check_kinetics, check_transport
 from aesi.physics.cell.bpx.unread import (
     capacity_sentences,
+    flat_voltage_sentences,
     replaced_relation_sentences,
     rising_potential_sentences,
     unread_field_sentences,
@@ -68,6 +69,7 @@ def read_bpx(source: str | PathLike[str] | Mapping[str, Any], fitted: bool) -> C
             *version_0_sentences(left_behind),
             *replaced_relation_sentences(cell),
             *rising_potential_sentences(cell),
+            *flat_voltage_sentences(cell),
             *capacity_sentences(cell),
         ),
     )

@@ -137,6 +137,17 @@ def rising_potential_sentences(cell: CellParameters) -> tuple[str, ...]:
     return tuple(sentences)
 
 
+def flat_voltage_sentences(cell: CellParameters) -> tuple[str, ...]:
+    """A sentence where both potentials are constant, so that no voltage tells a state of charge."""
+    rest_v = cell.rest_voltage_v(np.linspace(0.0, 1.0, POINTS))
+    if np.ptp(rest_v) > 0.0:
+        return ()
+    return (
+        f"the open-circuit voltage by the cell's file is {rest_v[0]:.4g} V at every state of charge, since 'OCP [V]' "
+        "of both electrodes is constant: give tables or formulas over the stoichiometry.",
+    )
+
+
 def replaced_relation_sentences(cell: CellParameters) -> tuple[str, ...]:
     """Sentences on relations that are not simulated as declared somewhere in the range of the surfaces or the salt."""
     sentences = []
