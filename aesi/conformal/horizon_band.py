@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
+from scipy.special import ndtri, stdtrit
 
 from aesi.conformal.local_scale import LocalScale
 from aesi.errors import FitError, InputError
 from aesi.numerics.files.restored import LEAST_POSITIVE, saved_array, saved_number
-from aesi.numerics.quantiles import student_widening
 from aesi.numerics.typing import Array, BoolArray, IntArray, SavedState
 
 WHOLE_DRIVE = math.inf
@@ -161,7 +161,7 @@ def calibrated_band(
         tuple(scales),
         np.array([np.quantile(score, np.linspace(0, 1, N_LEVELS)) for score in scores]),
         counts,
-        student_widening(independent, alpha),  # k of (2)
+        _widening(independent, alpha),
         tuple(float(np.mean(score <= pooled_quantile)) for score in scores),
         extrapolated,
     )
@@ -203,6 +203,11 @@ def _apart_from(piece: _Piece, pieces: Sequence[_Piece], horizon: float) -> list
             f"{_ahead(horizon)}; give errors of another record, or of other rows."
         )
     return others
+
+
+def _widening(independent: float, alpha: float) -> float:
+    """k of (2)."""
+    return float(stdtrit(independent - 1, 1 - alpha / 2) / ndtri(1 - alpha / 2))
 
 
 def _arrays_apart(pieces: Sequence[_Piece]) -> int:

@@ -1,11 +1,10 @@
-"""Quantiles that allow for few samples: the rank of conformal prediction, and the width of Student's t."""
+"""Empirical quantiles with the finite-sample correction of conformal prediction."""
 
 from __future__ import annotations
 
 from numbers import Real
 
 import numpy as np
-from scipy.special import ndtri, stdtrit
 
 from aesi.errors import FitError, InputError
 from aesi.numerics.typing import Array
@@ -33,9 +32,3 @@ def conformal_quantile(scores: Array, alpha: float, tails: int = 1) -> float:
             "are needed; give more calibration data or a larger alpha."
         )
     return float(np.partition(scores, rank - 1)[rank - 1])
-
-
-def student_widening(independent: float, alpha: float) -> float:
-    """Factor by which an interval at miss rate alpha is wider where the scatter is known from few samples alone:
-    t(1 - alpha / 2; m - 1) / z(1 - alpha / 2), with m = `independent` > 1, the number of independent samples."""
-    return float(stdtrit(independent - 1, 1 - alpha / 2) / ndtri(1 - alpha / 2))

@@ -89,7 +89,7 @@ def search(
     finished is stored, and they propagate.
     """
     settings = settings or SearchSettings()
-    space = settings.space or GenomeSpace.of(problem.library)
+    space = settings.space or GenomeSpace.of(problem.library, problem.options.feedback)
     if space.size != len(problem.library):
         raise ConfigError(f"the genome space has {space.size} terms, the library {len(problem.library)}.")
     starts = space.plain_starts() if settings.warm_start is None else settings.warm_start

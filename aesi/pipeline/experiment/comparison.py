@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from aesi.constants import MV_PER_V
-from aesi.numerics.quantiles import student_widening
-from aesi.numerics.typing import Array, IntArray
+from aesi.numerics.blocks import INTERVAL_BLOCKS, pieces, resampled_interval
+from aesi.numerics.typing import Array
 from aesi.pipeline.experiment.outputs import Result, published_by
 from aesi.pipeline.experiment.physics_models import DECLARED
 from aesi.pipeline.report.arrays.binning import error_map
 from aesi.pipeline.report.views import RecordTrace
+from aesi.sparse.search.rows import spans_of
 
 SCHEMA = "aesi.comparison/1"
-BLOCK_S = 300.0
-"""Length of a bootstrap block, s. On drives of measured cells n seconds of a model's error tell as much as n / 45 to
-n / 670 independent ones (see `aesi.tracer.case.problem`). Of simulated errors of one hour for which that is 120 and 400
-s, nominal 90 % intervals of the RMSE hold the true one in 85 and 76 % of cases; with blocks of 60 s, as if these told
-the scatter exactly, in 76 and 55 %."""
-DRAWS = 1000
-"""Number of block-bootstrap resamples. The ends of a 90 % interval are then known to about one percentile."""
-LEVEL_PCT = 90.0
-"""Nominal coverage of the bootstrap intervals, per cent."""
+DRAWS = 4000
+"""Number of block-bootstrap resamples. The ends of a 90 % interval are then known to half a percentile."""
+SHARE = 0.9
+"""Nominal coverage of the bootstrap intervals."""
 BINS = 16
 """Number of bins of the current, and of the state of charge, in a map. A convention."""
 
@@ -55,46 +52,27 @@ def _free_run_error_v(trace: RecordTrace, name: str) -> Array:
 
 
 def _intervals(tests: list[RecordTrace], name: str, seed: int) -> dict[str, list[float]]:
-    """Bootstrap intervals [low, high] of a model's test figures, of those that have one (see `_ratio_interval`): RMSE,
-    mV, and reduction of the declared model's mean squared error, per cent. The same blocks are drawn for the model and
-    for the declared physics, so that what both have in common cancels in the reduction."""
-    squares = np.concatenate([_block_sums(trace, _free_run_error_v(trace, name)) for trace in tests])
-    bare = np.concatenate([_block_sums(trace, _free_run_error_v(trace, DECLARED)) for trace in tests])
-    rows = np.concatenate([_block_sums(trace, np.ones(len(trace.time_s))) for trace in tests])
+    """Bootstrap intervals [low, high] of a model's test figures: RMSE, mV, and reduction of the declared model's mean
+    squared error, per cent. The records are resampled in about `INTERVAL_BLOCKS` blocks, of which none reaches over two
+    records. The same blocks are drawn for the model and for the declared physics, so that what both have in common
+    cancels in the reduction."""
+    spans = spans_of([len(trace.time_s) for trace in tests])
+    starts = np.array([start for start, _ in pieces(spans, max(1, spans[-1][1] // INTERVAL_BLOCKS))])
+
+    def block_sums(of: Callable[[RecordTrace], Array]) -> Array:
+        return np.asarray(np.add.reduceat(np.concatenate([of(trace) for trace in tests]), starts))
+
+    squares = block_sums(lambda trace: _free_run_error_v(trace, name) ** 2)
+    bare = block_sums(lambda trace: _free_run_error_v(trace, DECLARED) ** 2)
+    rows = np.diff(starts, append=spans[-1][1])
     drawn = np.random.default_rng([seed, 7]).integers(len(rows), size=(DRAWS, len(rows)))
-    out = {}
-    if (mean_square := _ratio_interval(squares, rows, drawn)) is not None:
-        out["test_rmse_mv"] = [MV_PER_V * float(np.sqrt(v)) for v in mean_square]
-    if (left := _ratio_interval(squares, bare, drawn)) is not None:
-        out["test_mser_pct"] = [100.0 * (1.0 - v) for v in reversed(left)]
-    return out
-
-
-def _ratio_interval(over: Array, under: Array, drawn: IntArray) -> tuple[float, float] | None:
-    """Interval of the ratio of two sums over blocks, from resamples of the blocks; None for a single block, and for a
-    ratio of zero or without bound.
-
-    m blocks tell the scatter as m samples do, so the interval is as wide as Student's t has it, in the logarithm of the
-    ratio, which stays positive.
-    over, under : (m,) of each block, >= 0.  drawn : (DRAWS, m) blocks of each resample.
-    """
-    m = len(over)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        value = np.log(over.sum() / under.sum())
-        resampled = np.log(over[drawn].sum(axis=1) / under[drawn].sum(axis=1))
-    if m == 1 or not np.isfinite(resampled).all():
-        return None
-    ends = np.percentile(resampled, (50 - LEVEL_PCT / 2, 50 + LEVEL_PCT / 2))
-    wider = np.sqrt(m / (m - 1)) * student_widening(m, 1 - LEVEL_PCT / 100)
-    low, high = np.exp(value + wider * (ends - value))
-    return float(low), float(high)
-
-
-def _block_sums(trace: RecordTrace, values: Array) -> Array:
-    """Sums of squares over consecutive blocks of BLOCK_S of a record, (blocks,).  values : (n,)."""
-    step = float(np.median(np.diff(trace.time_s)))
-    starts = np.arange(0, len(values), max(1, round(BLOCK_S / step)))
-    return np.asarray(np.add.reduceat(values**2, starts))
+    total = squares[drawn].sum(axis=1)
+    rmse = MV_PER_V * np.sqrt(total / rows[drawn].sum(axis=1))
+    reduction = 100.0 * (1.0 - total / bare[drawn].sum(axis=1))
+    return {
+        "test_rmse_mv": list(resampled_interval(rmse, len(rows), SHARE)),
+        "test_mser_pct": list(resampled_interval(reduction, len(rows), SHARE)),
+    }
 
 
 def _map(tests: list[RecordTrace], name: str) -> dict[str, Any]:

@@ -39,7 +39,7 @@ MACHINE = "system/"
 """Beginning of MLflow's names for what the machine did meanwhile."""
 MSER = "MSER: by how much it lowers the mean squared error of the declared model, and of that model recalibrated."
 RANGES = (
-    "Ranges below a figure: 90 % over resampled blocks of 60 s of the test records; they say how much the test itself "
+    "Ranges below a figure: 90 % over resampled eighths of the test records; they say how much the test itself "
     "scatters, not how much another seed would."
 )
 JOB_WORDS = {

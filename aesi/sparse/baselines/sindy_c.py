@@ -45,7 +45,8 @@ def tuned_sindy_c(
     seed : of the search.  population : size of a generation.  space : ranges of the genes; None takes the widest.
     on_candidate : called with each candidate, a row of plain values.  Raises FitError where none survives.
     """
-    space, judge = space or GenomeSpace.of(problem.library), judge or Judge()
+    space = space or GenomeSpace.of(problem.library, problem.options.feedback)
+    judge = judge or Judge()
     rng = np.random.default_rng([seed, 1])
 
     def evaluate(genome: Genome) -> Single | Failed:

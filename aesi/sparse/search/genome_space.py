@@ -30,10 +30,13 @@ class GenomeSpace:
     feedback: bool = True
 
     @classmethod
-    def of(cls, library: Library) -> GenomeSpace:
-        """The widest space of a library: up to its own highest order and degree."""
+    def of(cls, library: Library, feedback: bool = True) -> GenomeSpace:
+        """The widest space of a library: up to its own highest order and degree.  feedback : as `Options.feedback`."""
         return cls(
-            len(library), p_c=(0, int(library.orders.max())), d=(1, max(1, int(library.degrees.max())))
+            len(library),
+            p_c=(0, int(library.orders.max())),
+            d=(1, max(1, int(library.degrees.max()))),
+            feedback=feedback,
         )
 
     def random(self, rng: np.random.Generator) -> Genome:

@@ -5,11 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from aesi.numerics.blocks import coverage, moving_block_weights
 from aesi.pipeline.report import style
 from aesi.pipeline.report.figures import before_and_after_maps, paper_figures
 from aesi.pipeline.report.plots import ensemble, hypotheses, maps, records, timeline
 from aesi.pipeline.report.views import BootstrapView
 from aesi.pipeline.report.write import discovery_figures
+from aesi.sparse.search.rows import spans_of
 
 
 def test_every_figure_of_the_paper_is_there(views):
@@ -152,13 +154,18 @@ def test_the_bootstrap_of_single_samples_is_the_classic_one():
     assert ensemble.expected_unique_fraction([10_000], 1) == pytest.approx(1 - np.exp(-1), abs=1e-4)
 
 
+@pytest.mark.parametrize(("lengths", "block"), [((1099,), 109), ((900,), 500), ((1000, 1000), 130)])
+def test_the_last_block_of_the_bootstrap_was_expected_to_be_whole(lengths, block):
+    """Of 1,099 rows in blocks of 109 the last block has 9: 66.5 % were expected, and 63.5 are drawn."""
+    drawn = coverage(moving_block_weights(spans_of(lengths), block, 2000, np.random.default_rng(0)))
+    sure = 4.0 * np.std(drawn) / np.sqrt(len(drawn))
+    assert ensemble.expected_unique_fraction(lengths, block) == pytest.approx(np.mean(drawn), abs=sure)
+
+
 @pytest.mark.parametrize(
     ("lengths", "block"), [((300,) * 6, 60), ((300, 50, 900), 60), ((3600, 1200, 700), 500)]
 )
 def test_the_bootstrap_of_several_records_was_expected_to_be_that_of_one(lengths, block):
-    from aesi.numerics.blocks import coverage, moving_block_weights
-    from aesi.sparse.search.rows import spans_of
-
     drawn = coverage(moving_block_weights(spans_of(lengths), block, 400, np.random.default_rng(0)))
     fig = ensemble.bootstrap_figure(BootstrapView(lengths, block, drawn))
     expected = float(fig.layout.meta["caption"].rpartition("(dashed) ")[2].removesuffix(" %."))

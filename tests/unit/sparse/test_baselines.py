@@ -58,3 +58,8 @@ def test_peers_were_picked_without_the_constraints_of_the_search(problem, name):
     bound = BASELINES[name](problem, Tuning(judge=Watching(FitnessWeights(), only=min(free.asked))))
     said = [model.free_run(DRIVES[0]).error_v for model in (fittest, bound)]
     assert np.abs(said[0] - said[1]).max() > 1e-5
+
+
+def test_sindy_c_fed_the_error_back_where_the_library_forbids_it(problem):
+    model = BASELINES["SINDy-C"](problem, Tuning(candidates=4, population=4))
+    assert not model.has_feedback

@@ -139,25 +139,26 @@ def test_a_test_part_at_rest_was_taken_for_one_that_says_something_of_a_load():
 def test_resampled_blocks_of_steady_errors_have_the_gain_of_all_rows():
     time = np.arange(2000.0)
     first, second = 3e-3 * np.where(time % 2, 1.0, -1.0), np.full(len(time), 1e-3)
-    gain = rmse_difference(first, second, time, np.random.default_rng(0))
+    gain = rmse_difference(first, second, np.random.default_rng(0))
     assert gain == pytest.approx((2e-3, 2e-3, 2e-3))
 
 
-def test_the_interval_of_95_per_cent_of_a_gain_held_three_quarters(rng):
-    """Two errors of one size, whose integral correlation time is 200 s, over 20 minutes: the true gain is zero."""
-    kept, n, held = np.exp(-1 / 100), 1200, []
-    for _ in range(300):
-        noise = np.sqrt(1 - kept**2) * rng.standard_normal((2, n + 1000))
-        first, second = lfilter([1.0], [1.0, -kept], noise)[:, 1000:]
-        _, low, high = rmse_difference(first, second, np.arange(float(n)), rng)
-        held.append(low <= 0.0 <= high)
-    # 92 % of a thousand; of 300 the share has a standard deviation of 1.6 %.
-    assert np.mean(held) == pytest.approx(0.92, abs=0.05)
+def test_the_interval_of_a_gain_holds_it_on_a_part_that_is_short_beside_the_memory_of_the_errors():
+    # 15 min at 1 Hz, errors correlated over 20 s; 95 % are so, of 200 draws 0.95 +- 0.016. In 80 % with plain
+    # percentiles of four blocks.
+    rng, true = np.random.default_rng(0), 1e-3 * (1.0 - np.sqrt(2.0))
+    keep = np.exp(-1.0 / 20.0)
+    within = []
+    for _ in range(200):
+        noise = 1e-3 * np.sqrt(1.0 - keep**2) * rng.standard_normal((1100, 2))
+        after, beside = lfilter([1.0], [1.0, -keep], noise, axis=0)[200:].T
+        _, low, high = rmse_difference(after, after + beside, rng)
+        within.append(low <= true <= high)
+    assert 0.9 < np.mean(within) < 0.99
 
 
-def test_a_single_row_has_a_gain_and_no_interval():
-    gain = rmse_difference(np.array([3e-3]), np.array([-1e-3]), np.array([7.0]), np.random.default_rng(0))
-    assert gain == pytest.approx((2e-3, np.nan, np.nan), nan_ok=True)
+def test_a_single_row_has_no_gain_with_an_interval():
+    assert np.isnan(rmse_difference(np.array([1e-3]), np.array([2e-3]), np.random.default_rng(0))).all()
 
 
 def test_a_declared_model_that_is_written_unchanged_was_warned_of_as_if_it_were_another():

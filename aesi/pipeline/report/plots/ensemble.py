@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aesi.numerics.blocks import record_shares
+from aesi.numerics.typing import Array
 from aesi.pipeline.report import style
 from aesi.pipeline.report.views import BootstrapView, Row
 
@@ -167,21 +168,31 @@ def bootstrap_figure(bootstrap: BootstrapView) -> Figure:
 
 
 def expected_unique_fraction(lengths: Sequence[int], block: int) -> float:
-    """Expected share of distinct samples in one resample of records of these lengths (`moving_block_weights`), in as
-    many blocks as have the samples of all.
+    """Expected share of distinct samples in one resample of records of these lengths (`moving_block_weights`), in the
+    mean number of blocks that have the samples of all, of which the last one is cut.
 
     A sample near an edge lies in fewer blocks, so the mean runs over all samples.
     """
     rows = np.array(lengths)
-    shares, starts = record_shares(rows, block), np.maximum(rows - block + 1, 1)
-    blocks = np.ceil(np.round(rows.sum() / (shares @ np.minimum(rows, block)), 9))  # of whole blocks no more
-    holding = np.concatenate(
-        [
-            share / here * np.minimum(np.minimum(np.arange(1, n + 1), np.arange(n, 0, -1)), min(block, here))
-            for n, here, share in zip(lengths, starts, shares, strict=True)
-        ]
+    shares, whole = record_shares(rows, block), np.minimum(rows, block)
+    blocks = float(np.round(rows.sum() / (shares @ whole), 9))
+    missing = (
+        (1.0 - _holding(n, own, own, share)) ** int(blocks)
+        * (1.0 - _holding(n, own, blocks % 1 * own, share))
+        for n, own, share in zip(lengths, whole, shares, strict=True)
     )
-    return float(np.mean(1 - (1 - holding) ** blocks))
+    return 1.0 - float(np.mean(np.concatenate(list(missing))))
+
+
+def _holding(n: int, whole: int, drawn: float, share: float) -> Array:
+    """(n,) probability that a block holds each sample of a record.
+
+    whole : samples of a block, at whose starts it is drawn.  drawn : those that are left where it is cut.  share :
+    probability that the block lies in this record.
+    """
+    sample, starts = np.arange(n), n - whole + 1
+    last, first = np.minimum(sample, starts - 1), np.maximum(sample - drawn + 1.0, 0.0)
+    return np.asarray(share * np.maximum(last - first + 1.0, 0.0) / starts)
 
 
 def _bars(rows: Sequence[Row], values: Sequence[float], title: str, caption: str, axis: str) -> Figure:
