@@ -41,7 +41,8 @@ class PreparedRecord:
     """One measurement as the tracer uses it.
 
     data : as measured.  thin : thinned rows for fits, fit part and held-out part.  n_fit : rows of `thin` in the fit
-    part.  fit_until_s : time at which the fit part of `data` ends, s (inf for all).  start : state at the first row.
+    part, none of which averages over rows that are held out.  fit_until_s : time at which the fit part of `data` ends,
+    s (inf for all).  start : state at the first row.
     hold, thin_hold : how the current runs between the rows of `data` and of `thin`.  white_v : (n_thin,) V, standard
     deviation of the noise in each row of `thin`.  equivalent_white_v : (n_thin,) V, standard deviation of white noise
     with the same information, larger where rows share one value of the noise.  noise_full_v : standard deviation of the
@@ -128,12 +129,13 @@ def _prepared(
     thin = replace(record.thin, voltage_v=record.thin.voltage_v - lost)
     duration = float(data.time_s[-1] - data.time_s[0])
     until = data.time_s[0] + (1.0 - holdout) * duration if holdout > 0 else np.inf
-    n_fit = int(np.searchsorted(thin.time_s, until))
+    held_back = record.averaged((data.time_s >= until).astype(float)) > 0.0  # in whole or in part
+    n_fit = int(np.argmax(held_back)) if held_back.any() else len(thin)
     fitted = data.take(slice(0, int(np.searchsorted(data.time_s, until))))
     noise = noise_of(fitted, cell.nominal_capacity_ah)
     thin_noise = noise_of(thin.take(slice(0, n_fit)), cell.nominal_capacity_ah)
     white = _white_v(record, noise, thin_noise)
-    equivalent = _equivalent_white_v(record, noise, thin_noise, white, n_fit)
+    equivalent = _equivalent_white_v(record, noise, thin_noise, white, n_fit, quantum_v(fitted.voltage_v))
     as_given = start.basis == "given" and not (start.contradicted or start.doubted)
     start_note = () if as_given else (start.sentence,)
     return PreparedRecord(
@@ -170,17 +172,18 @@ def _white_v(record: ThinnedRecord, noise: Noise, thin_noise: Noise) -> Array:
 
 
 def _equivalent_white_v(
-    record: ThinnedRecord, noise: Noise, thin_noise: Noise, white_v: Array, n_fit: int
+    record: ThinnedRecord, noise: Noise, thin_noise: Noise, white_v: Array, n_fit: int, resolution_v: float
 ) -> Array:
     """(n_thin,) V, `PreparedRecord.equivalent_white_v` for the noise `white_v` (n_thin,) of the rows.
 
     Rows that share one value of the noise carry the information of a single row: rows over which a channel is smooth,
-    and rows that were rounded to one value, which share the rounding error `resolution_v`.
+    and rows that were rounded to one value, which share the rounding error `noise.resolution_v`.
+    resolution_v : V, least step of the fit part's voltage.
     """
     share = np.maximum(noise.rows / record.rows, 1.0) if record.rows is not None else float(thin_noise.rows)
     if not noise.resolution_v:
         return np.sqrt(share) * white_v
-    code = np.round(record.thin.voltage_v / quantum_v(record.whole.voltage_v))
+    code = np.round(record.thin.voltage_v / resolution_v)
     first_of_run = np.diff(code, prepend=np.nan) != 0.0
     first_of_run[n_fit : n_fit + 1] = True  # rows held back must not change the weight of fitted ones
     run = np.cumsum(first_of_run) - 1
