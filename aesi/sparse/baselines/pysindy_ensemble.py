@@ -34,17 +34,17 @@ _RIDGES = (1.0, 10.0, 100.0, 1000.0)
 
 def pysindy_ensemble(problem: Problem, seed: int, judge: Judge | None = None) -> SparseModel:
     """The median of the ensemble. Raises FitError where no setting of the grid runs freely."""
-    best = _best_genome(problem, judge or Judge())
-    active = np.flatnonzero(best.active(problem.library))
+    best = _best_single(problem, judge or Judge())
+    active = np.flatnonzero(best.genome.active(problem.library))
     thinning = -(-len(problem.target) // MOST_ROWS)
     root_weights = np.sqrt(problem.row_weights[::thinning])[:, None]
     theta = problem.theta(active).T[::thinning] * root_weights
     coefficients = _median_coefficients(
-        theta, problem.target[::thinning, None] * root_weights, best.lambda1 / thinning, seed
+        theta, problem.target[::thinning, None] * root_weights, best.genome.lambda1 / thinning, seed
     )
     if not coefficients.any():
         raise FitError(f"{NAME}: every coefficient is below the threshold of {THRESHOLD:g}.")
-    return sparse_model(problem, active, coefficients, 0.0, NAME)
+    return sparse_model(problem, active, coefficients, best.model.memory, NAME)
 
 
 def _median_coefficients(theta: np.ndarray, target: np.ndarray, ridge: float, seed: int) -> np.ndarray:
@@ -65,8 +65,8 @@ def _median_coefficients(theta: np.ndarray, target: np.ndarray, ridge: float, se
     return np.asarray(np.median([member[0] for member in ensemble.coef_list], axis=0), dtype=float)
 
 
-def _best_genome(problem: Problem, judge: Judge) -> Genome:
-    """The best setting of the grid, judged by a single fit.  Raises FitError where none runs freely."""
+def _best_single(problem: Problem, judge: Judge) -> Single:
+    """The best setting of the grid, by its single fit.  Raises FitError where none runs freely."""
     singles = []
     top = int(problem.library.degrees.max())
     for d, ridge in product(range(1, min(2, top) + 1), _RIDGES):
@@ -77,4 +77,4 @@ def _best_genome(problem: Problem, judge: Judge) -> Genome:
             singles.append(single)
     if not singles:
         raise FitError(f"{NAME}: no setting of its grid runs freely without diverging.")
-    return judge.best(singles).genome
+    return judge.best(singles)

@@ -63,3 +63,16 @@ def test_peers_were_picked_without_the_constraints_of_the_search(problem, name):
 def test_sindy_c_fed_the_error_back_where_the_library_forbids_it(problem):
     model = BASELINES["SINDy-C"](problem, Tuning(candidates=4, population=4))
     assert not model.has_feedback
+
+
+def test_the_ensemble_of_pysindy_keeps_a_measured_error_as_ridge_does(problem):
+    """One step ahead of an error that mostly repeats itself. Judged with a memory and used without one, it repeated its
+    free run."""
+    drive = make_record(400, seed=5, feedback=0.9, name="another drive")
+    for name in ("ridge", "PySINDy ensemble"):
+        model = BASELINES[name](problem, Tuning())
+        one_step, free = (
+            np.mean((drive.error_v - said) ** 2)
+            for said in (model.one_step(drive), model.free_run(drive).error_v)
+        )
+        assert one_step < 0.8 * free
