@@ -221,11 +221,11 @@ class _StartReading:
         capacity_ah = self.cell.capacity_ah
         rest = resting_rows(self.record, REST_C_RATE * capacity_ah, ONE_STATE * capacity_ah, self.hold)
         begins_v = first_rows_v(rest.rows.voltage_v)
-        terminal_v = freed_of_instruments(self.model, self.effects, begins_v)
+        terminal_v = self._freed_of_instruments(begins_v)
         if self.open_circuit.charged(terminal_v):
             return self._full_charge(terminal_v, f"rests at {begins_v:.3f} V", begins_v)
         settled_v, settled_sd_v = settled_voltage(self.open_circuit, rest.rows, self.model_name)
-        ocv_v = self._freed_of_series(freed_of_instruments(self.model, self.effects, settled_v))
+        ocv_v = self._freed_of_series(self._freed_of_instruments(settled_v))
         # Before what these rows move, the cell was as much fuller and higher.
         moved = float(rest.rows.discharged_ah(self.hold)[-1]) / capacity_ah
         ocv_rise_before_v = self._rise_v(ocv_v, moved)
@@ -294,7 +294,7 @@ class _StartReading:
 
     def _first_voltages(self) -> tuple[float, float]:
         """(first voltage without instrument faults, the same without effects in series either), V."""
-        terminal = freed_of_instruments(self.model, self.effects, float(self.record.voltage_v[0]))
+        terminal = self._freed_of_instruments(float(self.record.voltage_v[0]), self.current_a)
         return terminal, self._freed_of_series(terminal, self.current_a)
 
     def _read_load(self) -> InitialState:
@@ -330,6 +330,9 @@ class _StartReading:
         least_v = begun_v - DOUBTED_SDS * DROP_ERROR * drop_v
         as_read_v = begun_v - drop_v
         return self.current_a > 0.0 and self.open_circuit.charged(least_v, least_v - as_read_v)
+
+    def _freed_of_instruments(self, reading_v: float, current_a: float = 0.0) -> float:
+        return freed_of_instruments(self.open_circuit, self.model, self.effects, reading_v, current_a)
 
     def _freed_of_series(self, terminal_v: float, current_a: float = 0.0) -> float:
         return freed_of_series(self.open_circuit, self.model, self.effects, terminal_v, current_a)

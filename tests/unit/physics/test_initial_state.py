@@ -793,3 +793,40 @@ def test_a_third_of_the_uncertainty_was_told_without_a_word_where_the_potentials
     told = {v: initial_state(LG_M50, at_rest, potentials_v=v).sentence for v in (READING_V, GOOD_READING_V)}
     assert told[GOOD_READING_V].endswith(" by potentials that are fitted with it.")
     assert "potentials" not in told[READING_V]
+
+
+def _reading(fault):
+    return Effect("fault", "instrument", "A fault of the voltmeter.", on_reading=fault).activate()
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        lambda trace: 1.03 * trace.voltage_v,
+        lambda trace: trace.voltage_v - 0.02 * trace.current_a,
+        lambda trace: trace.voltage_v + 1e-3 * (trace.series["temperature_k"] - 298.15),
+        lambda trace: trace.voltage_v + 0.1 * trace.series["hysteresis"],
+    ],
+    ids=["gain", "leads", "drift with temperature", "a state of another effect"],
+)
+@pytest.mark.parametrize("rest_s", [0.0, 300.0])
+def test_a_fault_of_the_voltmeter_other_than_an_offset_moved_the_start_or_had_no_states(fault, rest_s):
+    """A gain of 3 % left 4 mV, leads under 3 A six points of charge, and a state raised KeyError."""
+    time = np.arange(0.0, rest_s + 120.0)
+    effects = [CATALOGUE["ocv_hysteresis"].activate(start=-1.0)]
+    true, faulty = (
+        simulate(LG_M50, time, np.where(time < rest_s, 0.0, 3.0), 0.6, active, 35.0, "backward").voltage_v
+        for active in (effects, [*effects, _reading(fault)])
+    )
+    current, degc = np.where(time < rest_s, 0.0, 3.0), np.full(len(time), 35.0)
+    known = initial_state(LG_M50, record(time, current, true, degc), effects=effects)
+    found = initial_state(LG_M50, record(time, current, faulty, degc), effects=[*effects, _reading(fault)])
+    # A gain also stretches what the voltage changes by over the first minutes.
+    assert found.soc == pytest.approx(known.soc, abs=1e-4 if rest_s else 3e-3)
+    if rest_s:
+        rest_v = float(faulty[0])
+        run = simulate(
+            LG_M50, time[:2], np.zeros(2), effects=[*effects, _reading(fault)], temperature_degc=35.0,
+            rest_voltage_v=rest_v,
+        )  # fmt: skip
+        assert run.voltage_v[0] == pytest.approx(rest_v, abs=1e-5)
