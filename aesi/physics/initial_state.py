@@ -247,11 +247,12 @@ class _StartReading:
             if by_minutes.sd < sd:
                 return by_minutes
         low, high = self.open_circuit.ends(ocv_v, spread_v)
+        begun = self._in_declared_windows(soc + moved)
         return InitialState(
-            self._in_declared_windows(soc + moved),
+            begun,
             sd,
             "rest",
-            self._rest_words(begins_v, settled_v, settled_sd_v, soc + moved, sd, step_v if coarse else None),
+            self._rest_words(begins_v, settled_v, settled_sd_v, begun, sd, step_v if coarse else None),
             rest_voltage_v=settled_v + ocv_rise_before_v,
             ends=(self._in_declared_windows(low + moved), self._in_declared_windows(high + moved)),
         )
@@ -314,13 +315,14 @@ class _StartReading:
 
         first_v : V, the first voltage, without what effects add in series and instruments do.
         """
-        soc, sd, began_there = self.load.state_of_charge(first_v)
+        own_soc, sd, began_there = self.load.state_of_charge(first_v)
+        soc = self._in_declared_windows(own_soc)
         likelier = "as if the current began there" if began_there else "as if it had flowed before"
         words = (
             f"{self.record.name} {said}, {likelier}: "
             f"state of charge {soc:.3f} +/- {sd:.3f}; give --soc0 if it is known."
         )
-        return InitialState(self._in_declared_windows(soc), sd, "load", words)
+        return InitialState(soc, sd, "load", words)
 
     def _charge_ended_before(self, begun_v: float, drop_v: float) -> bool:
         """Has a charge ended before this load, also where the model drops by two of its deviations too much?
@@ -346,7 +348,7 @@ class _StartReading:
         drop_v : part of true_v that the model adds to the voltage as it was read, V.
         """
         ocv_v = self._freed_of_series(true_v)
-        inside = self.open_circuit.soc_at(ocv_v)
+        full, inside = map(self._in_declared_windows, (1.0, self.open_circuit.soc_at(ocv_v)))
         sd = self.open_circuit.full_sd(ocv_v, DROP_ERROR * drop_v)
         above_v = true_v - self.cell.upper_voltage_v
         near, doubt = f"within {MV_PER_V * CHARGED_V:.0f} mV of", ""
@@ -360,17 +362,10 @@ class _StartReading:
         doubt = self._limits_doubt(ocv_v - drop_v) or doubt
         words = (
             f"{self.record.name} {how}, {near} the upper cut-off "
-            f"({self.cell.upper_voltage_v:g} V): a full charge, state of charge 1 +/- {sd:.4f} "
+            f"({self.cell.upper_voltage_v:g} V): a full charge, state of charge {full:.4g} +/- {sd:.4f} "
             f"(by the open-circuit voltage {inside:.4f}){doubt}."
         )
-        return InitialState(
-            self._in_declared_windows(1.0),
-            sd,
-            "full charge",
-            words,
-            rest_voltage_v=rest_v,
-            by_voltage=self._in_declared_windows(inside),
-        )
+        return InitialState(full, sd, "full charge", words, rest_voltage_v=rest_v, by_voltage=inside)
 
     def _limits_doubt(self, ocv_v: float) -> str:
         """A clause where state of charge 1 of the cell's file is no charge to its cut-off; empty elsewhere.

@@ -795,6 +795,26 @@ def test_a_third_of_the_uncertainty_was_told_without_a_word_where_the_potentials
     assert "potentials" not in told[READING_V]
 
 
+@pytest.mark.parametrize(
+    "effect",
+    [
+        CATALOGUE["lithium_inventory_loss"].activate(loss=0.15),
+        CATALOGUE["active_material_loss_positive"].activate(loss=0.2),
+        CATALOGUE["active_material_loss_negative"].activate(loss=0.2, lost_at_soc=0.0),
+    ],
+    ids=lambda effect: effect.id,
+)
+@pytest.mark.parametrize("rest_s", [0.0, 600.0])
+@pytest.mark.parametrize("soc", [0.3, 0.9])
+def test_a_sentence_told_the_state_of_an_aged_cell_in_windows_that_soc0_is_not_of(effect, rest_s, soc):
+    """Of a cell whose positive electrode had lost a fifth it said 0.3875, and given that, a simulation starts there."""
+    time = np.arange(0.0, rest_s + 300.0, 5.0)
+    run = simulate(LG_M50, time, np.where(time < rest_s, 0.0, 2.0), soc, [effect], hold="backward")
+    found = initial_state(LG_M50, record(time, run.current_a, run.voltage_v), effects=[effect])
+    told = float(re.search(r"state of charge ([\d.]+) ", found.sentence)[1])
+    assert told == pytest.approx(found.soc, abs=5.1e-4)
+
+
 def _reading(fault):
     return Effect("fault", "instrument", "A fault of the voltmeter.", on_reading=fault).activate()
 
