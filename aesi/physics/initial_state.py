@@ -28,6 +28,7 @@ import numpy as np
 
 from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.errors import DataError
+from aesi.numerics.typing import Array
 from aesi.physics.arguments import check_cell, check_choice, check_measurement, checked_effects, checked_soc
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
@@ -42,7 +43,7 @@ from aesi.physics.rest.open_circuit import (
 )
 from aesi.physics.rest.voltage import first_rows_v, freed_of_instruments, freed_of_series
 from aesi.physics.simulation import ModelName, model_with
-from aesi.physics.start.charge import charge_admits, truncated_by_charge
+from aesi.physics.start.charge import start_bounds, truncated_by_charge
 from aesi.physics.start.load import DROP_ERROR, FLOWED_S, LoadedStart
 from aesi.physics.start.relaxing import Rest, resting_rows, settled_voltage
 from aesi.physics.start.state import Basis, InitialState
@@ -131,9 +132,8 @@ def initial_state(
     allowed = OTHER_STATE if read.basis in ("rest", "full charge") else OTHER_STATE_LOADED
     if read.off(soc0) <= allowed:
         return _given_beside_reading(record, soc0, read)
-    given_admitted, read_admitted = (
-        charge_admits(soc, seen, hold, cell.capacity_ah) for soc in (soc0, read.soc)
-    )
+    least, most = start.bounds
+    given_admitted, read_admitted = (least <= soc <= most for soc in (soc0, read.soc))
     if shared and (read_admitted or not given_admitted):
         return _read_instead(read, soc0)
     return replace(_given(record, soc0, read), doubt=abs(read.soc - soc0))
@@ -207,11 +207,20 @@ class _StartReading:
         """The state read from the voltage and, under load, also from the charge that the record moves."""
         read = self._read_rest() if self._begins_at_rest() else self._read_load()
         # The reading of a rest is its likeliest state, not a mean that what is cut off would move.
-        return (
-            read
-            if read.basis != "load"
-            else truncated_by_charge(read, self.record, self.hold, self.declared.capacity_ah)
-        )
+        return read if read.basis != "load" else truncated_by_charge(read, self._moved, self.bounds)
+
+    @property
+    def _moved(self) -> Array:
+        """(n,) discharged since the first row, as a share of the capacity of the cell with its effects."""
+        return self.record.discharged_ah(self.hold) / self.cell.capacity_ah
+
+    @property
+    def bounds(self) -> Array:
+        """(2,) least and largest state of charge at the first row, in the declared windows, by the charge that the
+        record moves."""
+        own = start_bounds(self._moved)
+        inside = np.clip(own, 0.0, 1.0)  # windows have no rest voltage as far beyond them as a record may go
+        return np.array([self._in_declared_windows(end) for end in inside.tolist()]) + (own - inside)
 
     def _begins_at_rest(self) -> bool:
         return abs(self.current_a) <= REST_C_RATE * self.cell.capacity_ah
