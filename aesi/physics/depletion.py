@@ -44,7 +44,7 @@ def depletion_sentence(
     amperes = abs(asked_a)
     driest = float(np.min([run.c_e0[at], run.c_el[at]])) / cell.electrolyte.c0_mol_m3
     if what == SALT or (what == NO_SOLUTION and driest < DRY_SHARE):
-        cause = _salt_clause(model, kelvin, amperes, where)
+        cause = _salt_clause(model, kelvin, asked_a, where)
     elif what == NO_SOLUTION:
         cause = (
             f"no reaction was found that carries {amperes:.3g} A at {kelvin - ZERO_CELSIUS_K:.3g} degC, {where}; check "
@@ -55,16 +55,16 @@ def depletion_sentence(
     return f"{head}{cause}{RUN_ON}"
 
 
-def _salt_clause(model: EspmModel, kelvin: float, amperes: float, where: str) -> str:
+def _salt_clause(model: EspmModel, kelvin: float, asked_a: float, where: str) -> str:
     """A clause: the electrolyte ran out of salt, and whether that is for the cold.
 
-    kelvin : temperature at the fault, K.  amperes : magnitude of the current there.  where : its time, in words.
+    kelvin : temperature at the fault, K.  asked_a : current there, A, discharge positive.  where : its time, in words.
     """
     reference_k = model.cell.reference_temperature_k
-    here, there = (limiting_current_a(model, t) for t in (kelvin, reference_k))
+    here, there = (limiting_current_a(model, t, charging=asked_a < 0.0) for t in (kelvin, reference_k))
     cause = (
         f"the electrolyte ran out of salt {where}: at {kelvin - ZERO_CELSIUS_K:.3g} degC it carries {here:.3g} A for "
-        f"long, and the record asks for {amperes:.3g} A"
+        f"long, and the record asks for {abs(asked_a):.3g} A"
     )
     if here < 0.9 * there:
         return (
@@ -85,7 +85,8 @@ def _surface_clause(
 ) -> str:
     """A clause: a surface is empty or full, by the charge of the record or by a current too large for solid diffusion.
 
-    rows : (7, n), `SolvedRows`.  at : the faulty row.  what : 1 or 2, the electrode.  Others as `_salt_clause`.
+    rows : (7, n), `SolvedRows`.  at : the faulty row.  what : 1 or 2, the electrode.  amperes : magnitude of the
+    current there.  Others as `_salt_clause`.
     """
     cell, electrode, row = model.cell, (model.cell.negative, model.cell.positive)[what - 1], rows[:, at]
     every = cell.soc_of(SolvedRows(*rows).mean_n)
@@ -134,9 +135,10 @@ def ran_out(name: str, at_s: Mapping[str, float]) -> str:
     )
 
 
-def limiting_current_a(model: EspmModel, kelvin: float) -> float:
-    """Limiting current of the electrolyte, A: the steady current at which the mean salt in one electrode is zero, with
-    the diffusivity at the rest concentration."""
+def limiting_current_a(model: EspmModel, kelvin: float, charging: bool) -> float:
+    """Limiting current of the electrolyte, A, >= 0: the steady current at which the mean salt is zero in the electrode
+    that it leaves (the positive one on discharge, the negative one on charge), with the diffusivity at the rest
+    concentration."""
     cell, stack = model.cell, stack_of(model)
     e = cell.electrolyte
     faster = rate_factor(e.diffusivity_ea_j_mol, kelvin, cell.reference_temperature_k)
@@ -148,8 +150,8 @@ def limiting_current_a(model: EspmModel, kelvin: float) -> float:
     )
     at_points = stack.gauss[: 6 * regions] @ moved
     weights = np.tile([5.0, 8.0, 5.0], regions) / 18.0 / regions
-    means = [float(weights @ part) for part in np.split(at_points, 2)]
-    return e.c0_mol_m3 / max(abs(m) for m in means)
+    gained_n, gained_p = (float(weights @ part) for part in np.split(at_points, 2))  # by 1 A of discharge
+    return e.c0_mol_m3 / (gained_n if charging else -gained_p)
 
 
 def _cut_off_clause(model: EspmModel, time_s: Array, voltage_v: Array, at: int, charging: bool) -> str:

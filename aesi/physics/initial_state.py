@@ -28,6 +28,7 @@ import numpy as np
 
 from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.errors import DataError
+from aesi.numerics.typing import Array
 from aesi.physics.arguments import check_cell, check_choice, check_measurement, checked_effects, checked_soc
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
@@ -42,7 +43,7 @@ from aesi.physics.rest.open_circuit import (
 )
 from aesi.physics.rest.voltage import first_rows_v, freed_of_instruments, freed_of_series
 from aesi.physics.simulation import ModelName, model_with
-from aesi.physics.start.charge import charge_admits, truncated_by_charge
+from aesi.physics.start.charge import start_bounds, truncated_by_charge
 from aesi.physics.start.load import DROP_ERROR, FLOWED_S, LoadedStart
 from aesi.physics.start.relaxing import Rest, resting_rows, settled_voltage
 from aesi.physics.start.state import Basis, InitialState
@@ -131,9 +132,8 @@ def initial_state(
     allowed = OTHER_STATE if read.basis in ("rest", "full charge") else OTHER_STATE_LOADED
     if read.off(soc0) <= allowed:
         return _given_beside_reading(record, soc0, read)
-    given_admitted, read_admitted = (
-        charge_admits(soc, seen, hold, cell.capacity_ah) for soc in (soc0, read.soc)
-    )
+    least, most = start.bounds
+    given_admitted, read_admitted = (least <= soc <= most for soc in (soc0, read.soc))
     if shared and (read_admitted or not given_admitted):
         return _read_instead(read, soc0)
     return replace(_given(record, soc0, read), doubt=abs(read.soc - soc0))
@@ -207,11 +207,20 @@ class _StartReading:
         """The state read from the voltage and, under load, also from the charge that the record moves."""
         read = self._read_rest() if self._begins_at_rest() else self._read_load()
         # The reading of a rest is its likeliest state, not a mean that what is cut off would move.
-        return (
-            read
-            if read.basis != "load"
-            else truncated_by_charge(read, self.record, self.hold, self.declared.capacity_ah)
-        )
+        return read if read.basis != "load" else truncated_by_charge(read, self._moved, self.bounds)
+
+    @property
+    def _moved(self) -> Array:
+        """(n,) discharged since the first row, as a share of the capacity of the cell with its effects."""
+        return self.record.discharged_ah(self.hold) / self.cell.capacity_ah
+
+    @property
+    def bounds(self) -> Array:
+        """(2,) least and largest state of charge at the first row, in the declared windows, by the charge that the
+        record moves."""
+        own = start_bounds(self._moved)
+        inside = np.clip(own, 0.0, 1.0)  # windows have no rest voltage as far beyond them as a record may go
+        return np.array([self._in_declared_windows(end) for end in inside.tolist()]) + (own - inside)
 
     def _begins_at_rest(self) -> bool:
         return abs(self.current_a) <= REST_C_RATE * self.cell.capacity_ah
@@ -221,11 +230,11 @@ class _StartReading:
         capacity_ah = self.cell.capacity_ah
         rest = resting_rows(self.record, REST_C_RATE * capacity_ah, ONE_STATE * capacity_ah, self.hold)
         begins_v = first_rows_v(rest.rows.voltage_v)
-        terminal_v = freed_of_instruments(self.model, self.effects, begins_v)
+        terminal_v = self._freed_of_instruments(begins_v)
         if self.open_circuit.charged(terminal_v):
             return self._full_charge(terminal_v, f"rests at {begins_v:.3f} V", begins_v)
         settled_v, settled_sd_v = settled_voltage(self.open_circuit, rest.rows, self.model_name)
-        ocv_v = self._freed_of_series(freed_of_instruments(self.model, self.effects, settled_v))
+        ocv_v = self._freed_of_series(self._freed_of_instruments(settled_v))
         # Before what these rows move, the cell was as much fuller and higher.
         moved = float(rest.rows.discharged_ah(self.hold)[-1]) / capacity_ah
         ocv_rise_before_v = self._rise_v(ocv_v, moved)
@@ -247,11 +256,12 @@ class _StartReading:
             if by_minutes.sd < sd:
                 return by_minutes
         low, high = self.open_circuit.ends(ocv_v, spread_v)
+        begun = self._in_declared_windows(soc + moved)
         return InitialState(
-            self._in_declared_windows(soc + moved),
+            begun,
             sd,
             "rest",
-            self._rest_words(begins_v, settled_v, settled_sd_v, soc + moved, sd, step_v if coarse else None),
+            self._rest_words(begins_v, settled_v, settled_sd_v, begun, sd, step_v if coarse else None),
             rest_voltage_v=settled_v + ocv_rise_before_v,
             ends=(self._in_declared_windows(low + moved), self._in_declared_windows(high + moved)),
         )
@@ -294,7 +304,7 @@ class _StartReading:
 
     def _first_voltages(self) -> tuple[float, float]:
         """(first voltage without instrument faults, the same without effects in series either), V."""
-        terminal = freed_of_instruments(self.model, self.effects, float(self.record.voltage_v[0]))
+        terminal = self._freed_of_instruments(float(self.record.voltage_v[0]), self.current_a)
         return terminal, self._freed_of_series(terminal, self.current_a)
 
     def _read_load(self) -> InitialState:
@@ -314,13 +324,14 @@ class _StartReading:
 
         first_v : V, the first voltage, without what effects add in series and instruments do.
         """
-        soc, sd, began_there = self.load.state_of_charge(first_v)
+        own_soc, sd, began_there = self.load.state_of_charge(first_v)
+        soc = self._in_declared_windows(own_soc)
         likelier = "as if the current began there" if began_there else "as if it had flowed before"
         words = (
             f"{self.record.name} {said}, {likelier}: "
             f"state of charge {soc:.3f} +/- {sd:.3f}; give --soc0 if it is known."
         )
-        return InitialState(self._in_declared_windows(soc), sd, "load", words)
+        return InitialState(soc, sd, "load", words)
 
     def _charge_ended_before(self, begun_v: float, drop_v: float) -> bool:
         """Has a charge ended before this load, also where the model drops by two of its deviations too much?
@@ -330,6 +341,9 @@ class _StartReading:
         least_v = begun_v - DOUBTED_SDS * DROP_ERROR * drop_v
         as_read_v = begun_v - drop_v
         return self.current_a > 0.0 and self.open_circuit.charged(least_v, least_v - as_read_v)
+
+    def _freed_of_instruments(self, reading_v: float, current_a: float = 0.0) -> float:
+        return freed_of_instruments(self.open_circuit, self.model, self.effects, reading_v, current_a)
 
     def _freed_of_series(self, terminal_v: float, current_a: float = 0.0) -> float:
         return freed_of_series(self.open_circuit, self.model, self.effects, terminal_v, current_a)
@@ -343,7 +357,7 @@ class _StartReading:
         drop_v : part of true_v that the model adds to the voltage as it was read, V.
         """
         ocv_v = self._freed_of_series(true_v)
-        inside = self.open_circuit.soc_at(ocv_v)
+        full, inside = map(self._in_declared_windows, (1.0, self.open_circuit.soc_at(ocv_v)))
         sd = self.open_circuit.full_sd(ocv_v, DROP_ERROR * drop_v)
         above_v = true_v - self.cell.upper_voltage_v
         near, doubt = f"within {MV_PER_V * CHARGED_V:.0f} mV of", ""
@@ -357,17 +371,10 @@ class _StartReading:
         doubt = self._limits_doubt(ocv_v - drop_v) or doubt
         words = (
             f"{self.record.name} {how}, {near} the upper cut-off "
-            f"({self.cell.upper_voltage_v:g} V): a full charge, state of charge 1 +/- {sd:.4f} "
+            f"({self.cell.upper_voltage_v:g} V): a full charge, state of charge {full:.4g} +/- {sd:.4f} "
             f"(by the open-circuit voltage {inside:.4f}){doubt}."
         )
-        return InitialState(
-            self._in_declared_windows(1.0),
-            sd,
-            "full charge",
-            words,
-            rest_voltage_v=rest_v,
-            by_voltage=self._in_declared_windows(inside),
-        )
+        return InitialState(full, sd, "full charge", words, rest_voltage_v=rest_v, by_voltage=inside)
 
     def _limits_doubt(self, ocv_v: float) -> str:
         """A clause where state of charge 1 of the cell's file is no charge to its cut-off; empty elsewhere.

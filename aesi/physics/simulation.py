@@ -357,8 +357,8 @@ def _soc_from_rest(
     """State of charge from the rest voltage at the first temperature, without the part that effects add to it."""
     if rest_voltage_v is None:
         raise DataError("give soc0, or rest_voltage_v measured at rest before the record.")
-    terminal_v = freed_of_instruments(model, effects, rest_voltage_v)
     open_circuit = OpenCircuit(model.cell, None if kelvin is None else float(kelvin[0]))
+    terminal_v = freed_of_instruments(open_circuit, model, effects, rest_voltage_v)
     return open_circuit.soc_at_rest(terminal_v, freed_of_series(open_circuit, model, effects, terminal_v))
 
 

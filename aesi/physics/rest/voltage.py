@@ -18,7 +18,10 @@ MOVING_V = 4e-3
 30 mV."""
 
 ROUNDS = 4
-"""Fixed-point iterations of a voltage in series, which depends little on the state of charge."""
+"""Fixed-point iterations of a voltage in series, which depends little on the state of charge, and of a reading, which
+is nearly the voltage."""
+ROUND_OFF_V = 1e-12
+"""Difference of two voltages that is round-off: a reading is reproduced within it."""
 
 
 def first_rows_v(rest_v: Array) -> float:
@@ -29,14 +32,32 @@ def first_rows_v(rest_v: Array) -> float:
     return float((calm[-part:] if abs(moved) > MOVING_V else calm).mean())
 
 
-def freed_of_instruments(model: EspmModel, effects: Sequence[ActiveEffect], voltage_v: float) -> float:
-    """A voltage without what instrument faults added to its reading."""
-    true, one = np.array([voltage_v]), np.zeros(1)
-    for active in effects:
-        if active.effect.on_reading is not None:
-            trace = Trace(model, one, one, np.array([voltage_v]), {})
-            true = true - (active.act(active.effect.on_reading, trace) - voltage_v)
-    return float(true[0])
+def freed_of_instruments(
+    open_circuit: OpenCircuit,
+    model: EspmModel,
+    effects: Sequence[ActiveEffect],
+    reading_v: float,
+    current_a: float = 0.0,
+) -> float:
+    """The terminal voltage in the first row, V, of which instrument faults make `reading_v`.
+
+    Arguments as of `freed_of_series`.
+    """
+    faulty = any(active.effect.on_reading is not None for active in effects)
+    terminal_v = reading_v
+    for _ in range(ROUNDS if faulty else 0):
+        cell_v = freed_of_series(open_circuit, model, effects, terminal_v, current_a)
+        _, states = _with_series(open_circuit, model, effects, cell_v, current_a)
+        read = np.array([terminal_v])
+        for active in effects:
+            if active.effect.on_reading is not None:
+                trace = Trace(model, np.zeros(1), np.array([current_a]), read, states)
+                read = active.act(active.effect.on_reading, trace)
+        off_v = float(read[0]) - reading_v
+        if abs(off_v) < ROUND_OFF_V:
+            break
+        terminal_v -= off_v
+    return terminal_v
 
 
 def freed_of_series(
@@ -50,24 +71,24 @@ def freed_of_series(
 
     open_circuit : of the model's cell.  current_a : in this row, A.
     """
-    series = [active for active in effects if active.effect.on_voltage is not None]
+    series = any(active.effect.on_voltage is not None for active in effects)
     cell_v = terminal_v
     for _ in range(ROUNDS if series else 0):
-        soc = open_circuit.soc_at(cell_v)
-        cell_v = terminal_v - _in_series_v(open_circuit, model, series, cell_v, soc, current_a)
+        with_series_v, _ = _with_series(open_circuit, model, effects, cell_v, current_a)
+        cell_v = terminal_v - (with_series_v - cell_v)
     return cell_v
 
 
-def _in_series_v(
+def _with_series(
     open_circuit: OpenCircuit,
     model: EspmModel,
     effects: Sequence[ActiveEffect],
     cell_v: float,
-    soc: float,
     current_a: float,
-) -> float:
-    """Voltage that the effects add to `cell_v` at the start of a record, V.  soc : in the windows of the model."""
-    cell = model.cell
+) -> tuple[float, dict[str, Array]]:
+    """(voltage of the cell, at `cell_v` by itself, with what effects in series add at the start of a record, V; its
+    states and theirs, (1,) each)."""
+    cell, soc = model.cell, open_circuit.soc_at(cell_v)
     theta_n, theta_p = cell.stoichiometries(soc)
     states = {
         "c_sp": theta_p * cell.positive.c_max_mol_m3,
@@ -80,9 +101,9 @@ def _in_series_v(
     row, voltage = np.zeros(1), np.array([cell_v])
     series = {name: np.array([value]) for name, value in states.items()}
     for active in effects:
-        assert active.effect.on_voltage is not None
-        trace = Trace(model, row, np.array([current_a]), voltage, series)
-        added = active.act(active.effect.on_voltage, trace)
-        voltage = voltage + added.voltage_v
-        series.update(added.series)
-    return float(voltage[0]) - cell_v
+        if active.effect.on_voltage is not None:
+            trace = Trace(model, row, np.array([current_a]), voltage, series)
+            added = active.act(active.effect.on_voltage, trace)
+            voltage = voltage + added.voltage_v
+            series.update(added.series)
+    return float(voltage[0]), series

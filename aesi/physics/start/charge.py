@@ -27,17 +27,14 @@ MOVED_SDS = 0.1
 """Smallest correction by the bounds that is applied, in standard deviations of the reading."""
 
 
-def truncated_by_charge(
-    read: InitialState, record: Measurement, hold: Hold, capacity_ah: float
-) -> InitialState:
-    """The state read under load, truncated to the states that the charge of the record admits (`charge_admits`);
-    unchanged where these bounds move it by less than `MOVED_SDS`, and where they contradict it.
+def truncated_by_charge(read: InitialState, moved: Array, bounds: Array) -> InitialState:
+    """The state read under load, truncated to the states that the charge of the record admits; unchanged where these
+    bounds move it by less than `MOVED_SDS`, and where they contradict it.
 
-    capacity_ah : of the declared cell, Ah.
+    moved : (n,) discharged since the first row, as a share of the capacity.  bounds : (2,) as `start_bounds` has them,
+    in the windows of the state.
     """
-    moved = record.discharged_ah(hold) / capacity_ah
-    ends = _start_bounds(moved)
-    low, high = ((ends - read.soc) / read.sd).tolist()
+    low, high = ((bounds - read.soc) / read.sd).tolist()
     share = ndtr(high) - ndtr(low)
     if share < CONTRADICTED:
         return read
@@ -49,12 +46,6 @@ def truncated_by_charge(
         return read
     words = f"{read.sentence[:-1]}; as the record moves {np.ptp(moved):.3f} of the capacity, {soc:.3f} +/- {sd:.3f}."
     return replace(read, soc=soc, sd=sd, sentence=words, ends=None)
-
-
-def charge_admits(soc: float, record: Measurement, hold: Hold, capacity_ah: float) -> bool:
-    """Whether a record that begins at this state of charge stays within `SOC_MARGIN` of empty and full in every row."""
-    low, high = _start_bounds(record.discharged_ah(hold) / capacity_ah)
-    return bool(low <= soc <= high)
 
 
 def check_charge(cell: Cell, record: Measurement, soc0: float, hold: Hold) -> None:
@@ -73,7 +64,7 @@ def check_charge(cell: Cell, record: Measurement, soc0: float, hold: Hold) -> No
         )
 
 
-def _start_bounds(moved: Array) -> Array:
+def start_bounds(moved: Array) -> Array:
     """(2,) least and largest state of charge at the first row, within which no row is beyond `SOC_MARGIN`.
 
     moved : (n,) discharged since the first row, as a share of the capacity.

@@ -231,7 +231,7 @@ class InverseProblem:
         supposed_effects = [active for active in effects if active not in self.fixed]
         seen_v, current_a = float(record.data.voltage_v[0]), float(record.data.current_a[0])
         supposed = declared.with_potentials(model.cell)
-        terminal_v = freed_of_instruments(model, supposed_effects, seen_v)
+        terminal_v = freed_of_instruments(supposed, model, supposed_effects, seen_v, current_a)
         cell_v = freed_of_series(supposed, model, supposed_effects, terminal_v, current_a)
         if supposed is declared and cell_v == seen_v:
             return as_declared

@@ -8,9 +8,12 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from aesi.constants import FARADAY_C_MOL
 from aesi.errors import InputError, SimulationError
 from aesi.physics import Cell, simulate
+from aesi.physics.depletion import limiting_current_a
 from aesi.physics.effects import CATALOGUE
+from aesi.physics.model import EspmModel
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
 RATED_C = {
@@ -185,3 +188,32 @@ def test_the_salt_of_a_drive_in_the_cold_stays_near_that_of_a_porous_electrode()
     )
     assert single.series["c_eL"].min() < 0.0 < porous.series["c_eL"].min()
     assert np.abs(single.voltage_v - porous.voltage_v).max() < 0.12
+
+
+def steady_salt(cell: Cell) -> tuple[float, float]:
+    """Mean salt in the negative and the positive electrode over rest, mol/m3, under a steady discharge of 1 A that
+    reacts evenly, by quadrature of the flux (1 - t) I/F = -D B dc/dx."""
+    layers, e = (cell.negative, cell.separator, cell.positive), cell.electrolyte
+    thickness = np.array([layer.thickness_m for layer in layers])
+    cells = 2000
+    dx = np.repeat(thickness / cells, cells)
+    across = (np.arange(cells) + 0.5) / cells
+    ionic_a = np.concatenate([across, np.ones(cells), 1.0 - across]) / cell.total_area_m2
+    efficiency = np.repeat([layer.transport_efficiency for layer in layers], cells)
+    diffusivity = float(e.diffusivity(np.array([e.c0_mol_m3]))[0])
+    slope = -(1.0 - e.transference) * ionic_a / (FARADAY_C_MOL * diffusivity * efficiency)
+    salt = np.cumsum(slope * dx) - 0.5 * slope * dx
+    porosity = np.repeat([layer.porosity for layer in layers], cells)
+    salt -= (salt * porosity * dx).sum() / (porosity * dx).sum()
+    return float(salt[:cells].mean()), float(salt[-cells:].mean())
+
+
+@pytest.mark.parametrize("name", ["lg_m50_chen2020", "lfp_prada2013", "nmc_30ah"])
+def test_the_salt_of_a_discharge_was_told_to_last_for_the_current_of_a_charge(name):
+    """Of an LFP cell, whose thinner positive electrode loses less: 42 A, which it carries on charge, for 86."""
+    cell = cell_of(name)
+    of_negative, of_positive = steady_salt(cell)
+    rest = cell.electrolyte.c0_mol_m3
+    for charging, lost in ((False, -of_positive), (True, of_negative)):
+        told = limiting_current_a(EspmModel(cell), cell.reference_temperature_k, charging)
+        assert told == pytest.approx(rest / lost, rel=1e-4)
