@@ -210,3 +210,18 @@ def test_no_other_value_below_a_lower_bound_that_stands_for_zero_is_taken():
         CATALOGUE["self_heating"].activate(heat_transfer_w_k=1e-4)
     with pytest.raises(ParameterError, match="heat_capacity_factor = 0 "):
         CATALOGUE["self_heating"].activate(heat_capacity_factor=0.0)
+
+
+def test_what_a_drive_loses_within_the_rows_that_it_is_thinned_to_was_lost():
+    """At 10 Hz with a new current every half second a fit to rows of a second found 0.52 of the heat capacity."""
+    rng = np.random.default_rng(2)
+    time = np.arange(0.0, 2400.0, 0.1)
+    current = np.repeat(rng.normal(15.0, 60.0, len(time) // 5), 5)
+    effect = CATALOGUE["self_heating"].activate(heat_transfer_w_k=TRUE_W_K, heat_capacity_factor=TRUE_FACTOR)
+    run = simulate(NMC, time, current, 0.9, [effect], hold="backward")
+    drive = Measurement(time, current, run.voltage_v, run.series["temperature_k"] - 273.15, "drive")
+    seen = seen_by(NMC, drive)
+    assert len(seen[0].time_s) < 0.2 * len(time)
+    found = fit_heat(NMC, seen, NMC.heat_capacity_j_k)
+    assert found.heat_capacity_j_k == pytest.approx(TRUE_FACTOR * NMC.heat_capacity_j_k, rel=0.02)
+    assert found.conductance_w_k == pytest.approx(TRUE_W_K, rel=0.05)
