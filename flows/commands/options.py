@@ -171,7 +171,15 @@ ModelOption = Annotated[
 MaxEffects = Annotated[
     int, typer.Option("--max-effects", min=0, max=10, help="Largest number of effects that are added.")
 ]
-Seed = Annotated[int, typer.Option("--seed", min=0, max=LARGEST_SEED, help="Random seed.")]
+Seed = Annotated[
+    int,
+    typer.Option(
+        "--seed",
+        min=0,
+        max=LARGEST_SEED,
+        help="Random seed of the intervals of what a record gains; verdict and sizes are the same with any.",
+    ),
+]
 StoreUri = Annotated[
     str | None,
     typer.Option(
