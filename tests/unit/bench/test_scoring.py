@@ -1,5 +1,6 @@
 """Judging an answer by hand-worked cases, rates with their intervals, and the limit on processor time."""
 
+import signal
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -114,6 +115,22 @@ def test_work_without_end_is_stopped():
         time.sleep(0.5)  # waiting costs no processor time
     with processor_limit(None):
         pass
+
+
+def test_an_alarm_while_a_limit_ended_left_its_timer_running(monkeypatch):
+    set_timer = signal.setitimer
+
+    def ringing_first(which, seconds, interval=0.0):
+        if seconds == 0.0:
+            signal.raise_signal(signal.SIGPROF)
+        return set_timer(which, seconds, interval)
+
+    monkeypatch.setattr(signal, "setitimer", ringing_first)
+    before = signal.getsignal(signal.SIGPROF)
+    with processor_limit(1000.0):
+        pass
+    assert signal.getitimer(signal.ITIMER_PROF) == (0.0, 0.0)
+    assert signal.getsignal(signal.SIGPROF) is before
 
 
 def test_a_case_without_an_answer_says_why():
