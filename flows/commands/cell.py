@@ -13,7 +13,30 @@ from aesi.pipeline.written import calibration_files, discovery_files
 from flows.commands import options, outputs, record_options
 
 BESIDE_AN_EXPERIMENT = ("experiment", "out", "overrides", "prefect")
-"""Arguments of `aesi discover` that may be given with an experiment file. All others are keys of that file."""
+"""Arguments of `aesi discover` that may be given with an experiment file."""
+KEYS_OF_DISCOVERY = {
+    "cell": "cell.bpx",
+    "data": "discover.fit",
+    "test": "discover.test",
+    "good": "discover.good",
+    "soc0": "cell.soc0",
+    "soh": "cell.soh",
+    "holdout": "discover.holdout",
+    "max_effects": "discover.max_effects",
+    "seed": "seed",
+    "effect_file": "cell.effect_files",
+    "hold": "discover.hold",
+    "model": "cell.model",
+    "column": "data.columns",
+    "unit": "data.units",
+    "sign": "data.sign",
+    "state": "data.columns",
+    "state_word": "data.state_words",
+    "from_s": "data.from_s",
+    "to_s": "data.to_s",
+    "duplicates": "data.duplicates",
+}
+"""Argument of `aesi discover` -> the key of an experiment file with the same meaning. Others have no such key."""
 
 
 @record_options.reads_files
@@ -384,7 +407,7 @@ def discover(
         read = [*([cell] if cell else []), *(data or []), *(test or []), *(good or []), *(effect_file or [])]
         outputs.check_folder(out, read, discovery_files(out))
     if experiment is not None:
-        options.check_unsaid(context, BESIDE_AN_EXPERIMENT)
+        options.check_unsaid(context, BESIDE_AN_EXPERIMENT, KEYS_OF_DISCOVERY)
         _discover_experiment(experiment, list(overrides or []), out, prefect)
         return
     if cell is None or not data or out is None:
