@@ -20,7 +20,6 @@ from aesi.pipeline.experiment.judging.evaluate import EvaluatedModels, evaluate_
 from aesi.pipeline.experiment.judging.validation import validation_mser
 from aesi.pipeline.experiment.load import Loaded, load
 from aesi.pipeline.experiment.outputs import Result, write_outputs
-from aesi.pipeline.notes import together
 from aesi.pipeline.written import COMPARISON, REPORT, TABLES
 from aesi.records.failed import candidates_failed
 from aesi.sparse import Problem
@@ -63,8 +62,8 @@ class ExperimentJob:
         return folder
 
     def _load(self) -> Loaded:
-        loaded = self.run("data and physics", lambda: load(self.config), retries=2)
-        for note in together(loaded.notes):
+        loaded = self.run("data and physics", lambda: load(self.config, self.request.sources), retries=2)
+        for note in loaded.notes:
             self.console.say(f"  {note}")
         return loaded
 

@@ -47,6 +47,7 @@ from aesi.pipeline.notes import (
     soh_sentences,
     temperature_range_sentences,
     temperature_sentence,
+    together,
 )
 from aesi.pipeline.product.contents import contents
 from aesi.pipeline.product.declared import declared_model
@@ -181,7 +182,7 @@ def _load(config: ExperimentConfig) -> Loaded:
             for name, record in records.items()
         },
         digests={name: measurement.digest for name, measurement in sources.records.items()},
-        notes=tuple(notes),
+        notes=together(notes, [measurement.name for measurement in sources.records.values()]),
         config=config,
         model=given.model,
         files=_cell_files_digest(path, config),
