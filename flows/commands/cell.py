@@ -9,7 +9,7 @@ import typer
 
 from aesi.constants import LARGEST_SEED, MILLI
 from aesi.errors import InputError
-from aesi.pipeline.written import calibration_files, discovery_files
+from aesi.pipeline.written import calibration_files, discovery_files, discovery_marks
 from flows.commands import options, outputs, record_options
 
 BESIDE_AN_EXPERIMENT = ("experiment", "out", "overrides", "prefect")
@@ -246,6 +246,8 @@ def calibrate(
     """
     read = [cell, *data, *(impedance or []), *(fit_impedance or [])]
     outputs.check_json(out, read, calibration_files(out))
+    data_of_report, *others = calibration_files(out)[1:]
+    outputs.check_own(out, others, [data_of_report])
     record_options.check_once("--data", data)
     temperatures = record_options.numbers_by_record("--temperature", temperature, data)
     days, as_of_day = record_options.dates_by_record(dates, data), options.day("--as-of", as_of)
@@ -406,6 +408,8 @@ def discover(
     if out is not None:
         read = [*([cell] if cell else []), *(data or []), *(test or []), *(good or []), *(effect_file or [])]
         outputs.check_folder(out, read, discovery_files(out))
+        if experiment is None:
+            outputs.check_own(out, discovery_files(out), discovery_marks(out))
     if experiment is not None:
         options.check_unsaid(context, BESIDE_AN_EXPERIMENT, KEYS_OF_DISCOVERY)
         _discover_experiment(experiment, list(overrides or []), out, prefect)
@@ -456,6 +460,7 @@ def _discover_experiment(experiment: Path, overrides: list[str], out: Path | Non
     place = out or finding_folder(request.config)
     read = [experiment, *named_files(request.config).values()]
     outputs.check_folder(place, read, discovery_files(place))
+    outputs.check_own(place, discovery_files(place), discovery_marks(place))
     discover_experiment(request, out, prefect)
 
 
