@@ -26,6 +26,7 @@ from aesi.sparse import Problem
 from flows.base import environment
 from flows.base.console import Console
 from flows.base.stage_cache import Cache
+from flows.jobs.run_request import RunRequest
 from flows.jobs.stages import Stages
 from flows.search.study import StudyResult, run_study
 from flows.tracking.experiment_log import UNFITTED, CandidateTracker, result_line, track_result, track_start
@@ -39,12 +40,17 @@ class ExperimentJob:
     anew : whether it takes nothing that another run has stored.  started : `time.monotonic()` then.
     """
 
-    config: ExperimentConfig
+    request: RunRequest
     tracker: Tracker
     anew: bool
     run: Stages
     console: Console
     started: float
+
+    @property
+    def config(self) -> ExperimentConfig:
+        """What was asked, before a fallback."""
+        return self.request.config
 
     def results(self) -> Path:
         """Every stage in its order; the folder of the results."""
