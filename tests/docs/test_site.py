@@ -297,7 +297,9 @@ def test_the_newest_of_labelled_runs_comes_first_and_all_of_them_stand_side_by_s
     assert "| | before, seed 3, commit `0123456` | after, seed 3, commit `abcdef0` |" in every
     # 23 of 38 are 60.53 %, which a line holds as 60.5 and which stood here as 60 % beside the 61 % of the prose.
     assert "| effects named exactly | 23 of 38: 61 % [43, 76] | – |" in every
-    assert "| largest relative error of a parameter, median | 0.82 % | – |" in every
+    assert (
+        "| largest error of a parameter relative to its value, median (earlier runs) | 0.82 % | – |" in every
+    )
 
 
 SCRIPTS = ("record", "picture", "finding", "ship", "notebooks", "constant")

@@ -234,7 +234,11 @@ IN_COLUMNS = {
         ("false_name_beside_unknown", "wrong names beside `unknown`"),
         ("fitted_called_found", "right and fitted to the noise, called `found`"),
         ("after_over_noise_median", "error on unseen data over the noise, median"),
-        ("parameter_error_median", "largest relative error of a parameter, median"),
+        (
+            "parameter_error_median",
+            "largest error of a parameter relative to its value, median (earlier runs)",
+        ),
+        ("size_error_median", "largest error of a size over its distance from no effect, median"),
         ("parameters_covered", "parameters inside their 90 % interval"),
         ("processor_s_median", "processor seconds a case, median"),
     ),
