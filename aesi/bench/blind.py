@@ -18,7 +18,16 @@ from typing import Any
 from aesi.bench import some_chosen
 from aesi.bench.detectable import SEEN_NATS, Detectability, detectability
 from aesi.bench.limit import LOST, NO_ANSWER, NO_TIME, NoAnswer, Stopwatch, answer_of, timed
-from aesi.bench.scoring import TO_THE_NOISE, answer_words, calibration, judge, median_of, rate
+from aesi.bench.scoring import (
+    TO_THE_NOISE,
+    answer_words,
+    calibration,
+    judge,
+    median_of,
+    neutral_value,
+    rate,
+    size_error,
+)
 from aesi.constants import MV_PER_V
 from aesi.data.blind import FULL, BlindCase, CaseSpec, cells_in, generate, label_of, plan, small_plan
 from aesi.data.virtual import INSTRUMENT
@@ -142,16 +151,16 @@ def _scored(case: BlindCase, content: Mapping[str, Any]) -> dict[str, Any]:
         "fitted": judgement.named == 1.0
         and after_over_noise is not None
         and after_over_noise <= TO_THE_NOISE,
-        "parameter_error": max(errors) if errors else None,
+        "size_error": max(errors) if errors else None,
         "parameters_covered": covered,
     }
 
 
 def _parameters(case: BlindCase, content: Mapping[str, Any]) -> tuple[list[float], list[bool]]:
-    """Relative errors of the named effects' parameters, and whether the 90 % interval of each contains the true value.
+    """`size_error` of the named effects' parameters, and whether the 90 % interval of each contains the true value.
 
-    Only parameters are compared whose true value is known under the same name and is not zero. A parameter without an
-    interval counts as not covered.
+    Only parameters are compared whose true value is known (`Recipe.as_named`) and is not that without an effect. A
+    parameter without an interval counts as not covered.
     """
     errors, covered = [], []
     for candidate in content["candidates"]:
@@ -159,8 +168,11 @@ def _parameters(case: BlindCase, content: Mapping[str, Any]) -> tuple[list[float
             continue
         for name, estimate in candidate["parameters"].items():
             truth = case.truth.get(f"{candidate['effect']}.{name}")
-            if truth and estimate.get("value") is not None:
-                errors.append(abs(estimate["value"] - truth) / abs(truth))
+            if truth is None or estimate.get("value") is None:
+                continue
+            neutral = neutral_value(candidate["effect"], name)
+            if truth != neutral:
+                errors.append(size_error(estimate["value"], truth, neutral))
                 interval = estimate.get("low"), estimate.get("high")
                 covered.append(None not in interval and bool(interval[0] <= truth <= interval[1]))
     return errors, covered
@@ -214,7 +226,7 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
         **rate([r for r in claimed if r["exact"]], "contradicted").named("exact_contradicted"),
         **rate([r for r in claimed if not r["exact"]], "contradicted").named("wrong_contradicted"),
         "after_over_noise_median": median_of(named, "after_over_noise"),
-        "parameter_error_median": median_of(named, "parameter_error"),
+        "size_error_median": median_of(named, "size_error"),
         **rate(covered, "covered").named("parameters_covered"),
         "calibration": calibration(answered),
         "processor_s_median": median_of(timed(rows), "processor_s"),

@@ -40,13 +40,19 @@ def processor_limit(seconds: float | None) -> Iterator[None]:
         yield
         return
 
+    over = False
+
     def stop(number: int, frame: FrameType | None) -> None:
-        raise OutOfTime
+        if not over:  # raised while the block is left, it would leave the timer running
+            raise OutOfTime
 
     before = signal.signal(signal.SIGPROF, stop)
-    signal.setitimer(signal.ITIMER_PROF, seconds, 5.0)
     try:
-        yield
+        try:
+            signal.setitimer(signal.ITIMER_PROF, seconds, 5.0)
+            yield
+        finally:
+            over = True
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         signal.signal(signal.SIGPROF, before)

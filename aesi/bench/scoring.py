@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from aesi.physics.effects import CATALOGUE
+
 LARGEST_GROUP = 3
 """Most members of a group of look-alikes that counts as a name. A convention: a larger group says too little."""
 NOTHING = "reaction_nonuniformity"
@@ -149,6 +151,17 @@ def proportion(hits: int, cases: int) -> Rate:
     interval = binomtest(hits, cases).proportion_ci(CERTAIN, method="exact")
     low, high = (round(100.0 * float(end), 1) for end in (interval.low, interval.high))
     return Rate(round(100.0 * hits / cases, 1), (low, high), cases)
+
+
+def neutral_value(effect: str, parameter: str) -> float:
+    """Value of a parameter at which its effect of the catalogue vanishes; 0 if it declares none."""
+    return CATALOGUE[effect].parameters[parameter].neutral or 0.0
+
+
+def size_error(value: float, true: float, neutral: float) -> float:
+    """Error of an estimated size over the distance of the true one from the value without an effect: 1 where all of it
+    is missed.  All in one unit; true and neutral differ."""
+    return abs(value - true) / abs(true - neutral)
 
 
 def median_of(rows: Sequence[Mapping[str, Any]], key: str) -> float | None:

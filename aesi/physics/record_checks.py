@@ -38,7 +38,7 @@ from aesi.numerics.typing import Array, IntArray
 from aesi.over_time import stamp
 from aesi.physics.cell import Cell
 from aesi.records import Measurement
-from aesi.records.checked import row_words
+from aesi.records.checked import check_plain_volts, row_words
 
 VOLTAGE_MARGIN_V = 0.3
 """How far a record may go beyond the voltage limits of the file, V: fast pulses and old cells do."""
@@ -131,7 +131,9 @@ class CapacityBounds:
 
 
 def check_voltage(cell: Cell, data: Measurement) -> None:
-    """Raises DataError where the voltage leaves the range of the cell file by more than `VOLTAGE_MARGIN_V`."""
+    """Raises DataError where the voltage is in mV, or leaves the range of the cell file by more than
+    `VOLTAGE_MARGIN_V`."""
+    check_plain_volts(data.voltage_v, lambda row: f"{data.name}, row {row + 1}, column voltage_v")
     low, high = cell.lower_voltage_v - VOLTAGE_MARGIN_V, cell.upper_voltage_v + VOLTAGE_MARGIN_V
     outside = np.flatnonzero((data.voltage_v < low) | (data.voltage_v > high))
     if len(outside):

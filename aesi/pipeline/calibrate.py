@@ -306,7 +306,7 @@ def calibration_content(
         "impedance": [_spectrum_row(s) for s in spectra],
         "at_bounds": list(found.at_bounds),
         "warnings": list(found.warnings),
-        "notes": list(together(told)),
+        "notes": list(together(told, [e.name for e in found.errors])),
         "seconds": round(found.seconds, 2),
     }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from datetime import date
 from numbers import Real
 
@@ -26,7 +26,7 @@ from aesi.records import LABORATORY, Hold, Measurement, Run, at_its_temperature,
 
 SEPARATOR = ": "
 MERE_NAMES = re.compile(r"[^\s,]+(, [^\s,]+)*")
-"""Pattern by which notes of several records are joined: a record's name without a space. Other notes stay separate."""
+"""Pattern by which notes of several records are joined, where the names of these are not known: without a space."""
 OTHER_TEMPERATURE = {LABORATORY: "", "": "; for another one give its temperature_degc"}
 """Source of a record that is no file -> how it is given another temperature: one of the virtual laboratory, which makes
 it at the file's, is not; one that was made in memory takes it as an argument."""
@@ -35,13 +35,16 @@ TELLING_K = 5.0
 sixth. A convention."""
 
 
-def together(notes: Iterable[str]) -> tuple[str, ...]:
+def together(notes: Iterable[str], names: Collection[str] = ()) -> tuple[str, ...]:
     """`a: text`, `b: text` as `a, b: text`, in the order of the first of them; what is no mere name before the colon
-    says something by itself, and stays a line of its own."""
+    says something by itself, and stays a line of its own.
+
+    names : of the records, by which one with a space (`25degC drive`) is known for a name.
+    """
     subjects: dict[str, list[str]] = {}
     for note in notes:
         subject, separator, text = note.partition(SEPARATOR)
-        if separator and not MERE_NAMES.fullmatch(subject):
+        if separator and subject not in names and not MERE_NAMES.fullmatch(subject):
             subjects.setdefault(note, [])
         else:
             subjects.setdefault(text if separator else "", []).append(subject if separator else note)

@@ -48,15 +48,29 @@ def calibration_files(out: Path) -> tuple[Path, Path, Path, Path]:
 
 def discovery_files(out: Path) -> tuple[Path, ...]:
     """The files that a discovery writes below `out`; of the model's files those that are there."""
-    there = sorted(path for path in (out / MODEL).glob("*") if path.suffix in OF_MODEL)
-    return out / FINDING, out / REPORT, out / ARCHIVE, *there
+    return out / FINDING, out / REPORT, out / ARCHIVE, *_model_files(out)
+
+
+def _model_files(out: Path) -> list[Path]:
+    return sorted(path for path in (out / MODEL).glob("*") if path.suffix in OF_MODEL)
+
+
+def discovery_marks(out: Path) -> tuple[Path, ...]:
+    """The files of which every discovery below `out` leaves one, one that was interrupted too."""
+    return out / FINDING, out / ARCHIVE
+
+
+def cell_files(folder: Path) -> tuple[Path, ...]:
+    """The files that a batch writes to the folder of a cell."""
+    return folder / ROW, *discovery_files(folder), *calibration_files(folder / CALIBRATED)
+
+
+def candidate_files(out: Path) -> tuple[Path, ...]:
+    """The files that a rebuilt candidate writes below `out`; of the model's files those that are there."""
+    return out / CANDIDATE, *_model_files(out)
 
 
 def batch_files(out: Path, names: Iterable[str]) -> tuple[Path, ...]:
     """The files that a batch of cells of these names writes below `out`."""
-    of_cells = (
-        file
-        for folder in (out / name for name in names)
-        for file in (folder / ROW, *discovery_files(folder), *calibration_files(folder / CALIBRATED))
-    )
+    of_cells = (file for name in names for file in cell_files(out / name))
     return *(out / name for name in BATCH_SUMMARIES), *of_cells

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from numbers import Real
 from typing import TypeGuard
 
@@ -14,6 +15,9 @@ from aesi.over_time import stamp
 
 LONGEST_STEP_S = 365 * 24 * SECONDS_PER_HOUR
 """Between two rows: a year. A convention: no test stands still for longer, and times in nanoseconds do."""
+
+HIGHEST_PLAIN_VOLT = 1000.0
+"""A median voltage above this is in millivolts."""
 
 
 def numbers(values: object, name: str) -> Array:
@@ -89,6 +93,20 @@ def check_times(time_s: Array, name: str) -> None:
         raise DataError(
             f"{name} has a step of {steps[row - 1]:.4g} s before {row_words(row)}, longer than a year "
             f"({LONGEST_STEP_S:.4g} s); time has to be in seconds."
+        )
+
+
+def check_plain_volts(voltage_v: Array, place: Callable[[int], str]) -> None:
+    """Raises DataError, with the first row, for voltages that are plainly in millivolts.
+
+    voltage_v : (n,) V, NaN where it is unknown.  place : row from 0 -> how the sentence calls it.
+    """
+    known = voltage_v[np.isfinite(voltage_v)]
+    if known.size and np.median(known) > HIGHEST_PLAIN_VOLT:
+        row = int(np.argmax(voltage_v > HIGHEST_PLAIN_VOLT))
+        raise DataError(
+            f"{place(row)}: {voltage_v[row]:.6g} V is plainly in mV; "
+            "give it in V, or declare it: --unit voltage_v=mV."
         )
 
 

@@ -131,7 +131,8 @@ def _hook(name: str) -> dict[str, Any]:
 def _history() -> list[Any]:
     from flows.benchmarks.history import read_history
 
-    return read_history(ROOT / "docs" / "benchmarks.json")
+    by_one_less = _hook("recorded")["by_one_less"]
+    return [by_one_less(entry) for entry in read_history(ROOT / "docs" / "benchmarks.json")]
 
 
 def command_line() -> str:

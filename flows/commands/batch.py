@@ -9,7 +9,14 @@ import typer
 
 from aesi.errors import InputError
 from aesi.logins import without_login
-from aesi.pipeline.written import batch_files
+from aesi.pipeline.written import (
+    BATCH_SUMMARIES,
+    ROW,
+    SUMMARY,
+    batch_files,
+    cell_files,
+    discovery_marks,
+)
 from flows.commands import options, outputs, record_options
 
 
@@ -80,6 +87,14 @@ def batch(
     jobs = read_plan(source, cell, health)
     read = [file for job in jobs for file in job.files]
     outputs.check_folder(out, [source, *read], batch_files(out, [job.name for job in jobs]))
+    folders = [out / job.name for job in jobs]
+    outputs.check_own(
+        out,
+        [out / name for name in BATCH_SUMMARIES],
+        [out / SUMMARY, *(folder / ROW for folder in folders)],
+    )
+    for folder in folders:
+        outputs.check_own(out, cell_files(folder), [folder / ROW, *discovery_marks(folder)])
     run(
         source,
         out,

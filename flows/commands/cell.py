@@ -9,11 +9,34 @@ import typer
 
 from aesi.constants import LARGEST_SEED, MILLI
 from aesi.errors import InputError
-from aesi.pipeline.written import calibration_files, discovery_files
+from aesi.pipeline.written import calibration_files, discovery_files, discovery_marks
 from flows.commands import options, outputs, record_options
 
 BESIDE_AN_EXPERIMENT = ("experiment", "out", "overrides", "prefect")
-"""Arguments of `aesi discover` that may be given with an experiment file. All others are keys of that file."""
+"""Arguments of `aesi discover` that may be given with an experiment file."""
+KEYS_OF_DISCOVERY = {
+    "cell": "cell.bpx",
+    "data": "discover.fit",
+    "test": "discover.test",
+    "good": "discover.good",
+    "soc0": "cell.soc0",
+    "soh": "cell.soh",
+    "holdout": "discover.holdout",
+    "max_effects": "discover.max_effects",
+    "seed": "seed",
+    "effect_file": "cell.effect_files",
+    "hold": "discover.hold",
+    "model": "cell.model",
+    "column": "data.columns",
+    "unit": "data.units",
+    "sign": "data.sign",
+    "state": "data.columns",
+    "state_word": "data.state_words",
+    "from_s": "data.from_s",
+    "to_s": "data.to_s",
+    "duplicates": "data.duplicates",
+}
+"""Argument of `aesi discover` -> the key of an experiment file with the same meaning. Others have no such key."""
 
 
 @record_options.reads_files
@@ -223,6 +246,8 @@ def calibrate(
     """
     read = [cell, *data, *(impedance or []), *(fit_impedance or [])]
     outputs.check_json(out, read, calibration_files(out))
+    data_of_report, *others = calibration_files(out)[1:]
+    outputs.check_own(out, others, [data_of_report])
     record_options.check_once("--data", data)
     temperatures = record_options.numbers_by_record("--temperature", temperature, data)
     days, as_of_day = record_options.dates_by_record(dates, data), options.day("--as-of", as_of)
@@ -383,8 +408,10 @@ def discover(
     if out is not None:
         read = [*([cell] if cell else []), *(data or []), *(test or []), *(good or []), *(effect_file or [])]
         outputs.check_folder(out, read, discovery_files(out))
+        if experiment is None:
+            outputs.check_own(out, discovery_files(out), discovery_marks(out))
     if experiment is not None:
-        options.check_unsaid(context, BESIDE_AN_EXPERIMENT)
+        options.check_unsaid(context, BESIDE_AN_EXPERIMENT, KEYS_OF_DISCOVERY)
         _discover_experiment(experiment, list(overrides or []), out, prefect)
         return
     if cell is None or not data or out is None:
@@ -433,6 +460,7 @@ def _discover_experiment(experiment: Path, overrides: list[str], out: Path | Non
     place = out or finding_folder(request.config)
     read = [experiment, *named_files(request.config).values()]
     outputs.check_folder(place, read, discovery_files(place))
+    outputs.check_own(place, discovery_files(place), discovery_marks(place))
     discover_experiment(request, out, prefect)
 
 

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 from aesi.errors import InputError
+from aesi.pipeline.written import CANDIDATE, candidate_files
 from flows.commands import options, outputs
 
 Experiment = Annotated[Path, typer.Argument(help="Experiment file (YAML), such as experiments/smoke.yaml.")]
@@ -151,6 +152,7 @@ def candidate(
     """Rebuild a candidate of a search, and its model, from the tracking store alone. The exit code is 1 if its figures
     differ from the tracked ones."""
     outputs.check_folder(out)
+    outputs.check_own(out, candidate_files(out), [out / CANDIDATE])
     from flows.base.console import Console
     from flows.base.folder_lock import alone_in
     from flows.results.candidate import Differs, rebuild, rebuilt_line, save

@@ -4,7 +4,7 @@ into values. Those about record files are in `flows.commands.record_options`."""
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from datetime import date
 from math import inf, isfinite
 from pathlib import Path
@@ -199,18 +199,22 @@ PrefectOption = Annotated[
 ]
 
 
-def check_unsaid(context: typer.Context, admissible: Iterable[str]) -> None:
+def check_unsaid(context: typer.Context, admissible: Iterable[str], keys: Mapping[str, str]) -> None:
     """Raises InputError if an option is given beside an experiment file and would be ignored.
 
-    admissible : names of the parameters that may be given.
+    admissible : names of the parameters that may be given.  keys : name of any other parameter -> the key of an
+    experiment file with the same meaning, for those that have one.
     """
     for name in context.params:
         source = context.get_parameter_source(name)
         if source is not None and source.name == "COMMANDLINE" and name not in admissible:
-            option = "--" + name.replace("_", "-")
-            raise InputError(
-                f"{option} is not read beside an experiment file; say it there, or with --set KEY=VALUE."
+            option, key = "--" + name.replace("_", "-"), keys.get(name)
+            advice = (
+                f"give {key} there, or --set {key}=VALUE"
+                if key
+                else f"no key of such a file means the same: give {option} beside --cell and --data instead of the file"
             )
+            raise InputError(f"{option} is not read beside an experiment file; {advice}.")
 
 
 def priors(pairs: list[str] | None) -> dict[str, tuple[float, float]]:

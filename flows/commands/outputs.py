@@ -83,7 +83,8 @@ def check_folder(
 ) -> None:
     """Check that `out` can be a folder to write to, and that no written file is one of those that are read.
 
-    An existing folder is kept, and its files may be replaced; a folder with the results of a run is refused.
+    An existing folder is kept; a folder with the results of a run is refused. `check_own` tells which of its files may
+    be replaced.
     inputs, written, option : as in `check_file`.
     Raises InputError if one of the checks fails.
     """
@@ -103,6 +104,20 @@ def check_folder(
                 "folder."
             )
         check_writable(out / MODEL)
+
+
+def check_own(out: Path, written: Iterable[Path], marks: Iterable[Path], option: str = "--out") -> None:
+    """Raises InputError for a file that would be replaced and that the same command did not write before.
+
+    written : the files that are written.  marks : files of which each run of the command leaves at least one; where one
+    is there, an earlier run of it wrote the others, and they may be replaced.
+    """
+    there = next((file for file in written if file.exists()), None)
+    if there is not None and not any(mark.is_file() for mark in marks):
+        raise InputError(
+            f"{option} {out}: {there} is there, was not written by this command, and would be lost; name another "
+            "place, or move it."
+        )
 
 
 def check_beside(out: Path, source: Path) -> None:

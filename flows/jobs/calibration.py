@@ -24,8 +24,9 @@ def calibrate(
     """Calibrate and say what came of it; returns the report."""
     environment.prepare_process()
     console = Console()
-    console.say(f"Fitting the model's own parameters to {', '.join(m.name for m in measurements)} ...")
-    read = together(note for m in measurements for note in m.notes)
+    names = [m.name for m in measurements]
+    console.say(f"Fitting the model's own parameters to {', '.join(names)} ...")
+    read = together((note for m in measurements for note in m.notes), names)
     for note in read:
         console.say(note)
     started_s = time.monotonic()

@@ -75,6 +75,7 @@ def run_discovery(
 ) -> dict[str, Any]:
     """The flow itself; `run` runs a stage.  Raises InputError where another process writes to `out` now."""
     from aesi.pipeline.discovery.discover import run_case, write_discovery
+    from aesi.pipeline.notes import together
 
     started = time.monotonic()
     kept = f"What was fitted is kept in {out}; the same command goes on from there."
@@ -90,7 +91,8 @@ def run_discovery(
             content: dict[str, Any] = run("report", lambda: write_discovery(out, case, found, run_id))
             _track_result(tracker, found, content, out)
         run.publish("discovery", _page(content, out, tracker), "What the model lacks")
-        _say_result(console, content, (*case.restrictions, *case.assumed, *found.notes), out, started)
+        notes = together((*case.restrictions, *case.assumed, *found.notes), [m.name for m in case.records])
+        _say_result(console, content, notes, out, started)
     return content
 
 
@@ -241,7 +243,6 @@ def _track_result(tracker: Tracker | None, found: Discovery, content: dict[str, 
 def _say_result(
     console: Console, content: dict[str, Any], notes: Sequence[str], out: Path, started: float
 ) -> None:
-    from aesi.pipeline.notes import together
     from aesi.pipeline.report.words.discoveries import (
         look_alike_finding,
         next_finding,
@@ -266,7 +267,7 @@ def _say_result(
     for part in ("fit", "test"):
         if content["before"].get(part):
             console.say(f"  {part}: {_errors_of(content, part)}")
-    for note in together(notes):
+    for note in notes:
         console.say(f"  {note}")
     console.say(f"Finished in {duration(time.monotonic() - started)}. Report: {out / REPORT}")
 

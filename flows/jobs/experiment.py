@@ -36,7 +36,7 @@ def run_experiment(request: RunRequest, run: Stages, console: Console) -> Path:
         # Seconds, which the first line of a run is not kept for.
         from flows.jobs.experiment_stages import ExperimentJob
 
-        folder = ExperimentJob(config, tracker, record.anew, run, console, started).results()
+        folder = ExperimentJob(request, tracker, record.anew, run, console, started).results()
     console.say(f"Finished in {duration(time.monotonic() - started)}.")
     console.say(f"Report: {_shown(folder / REPORT)}")
     where = _uri_option(config.tracking.uri)

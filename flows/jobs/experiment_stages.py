@@ -20,13 +20,13 @@ from aesi.pipeline.experiment.judging.evaluate import EvaluatedModels, evaluate_
 from aesi.pipeline.experiment.judging.validation import validation_mser
 from aesi.pipeline.experiment.load import Loaded, load
 from aesi.pipeline.experiment.outputs import Result, write_outputs
-from aesi.pipeline.notes import together
 from aesi.pipeline.written import COMPARISON, REPORT, TABLES
 from aesi.records.failed import candidates_failed
 from aesi.sparse import Problem
 from flows.base import environment
 from flows.base.console import Console
 from flows.base.stage_cache import Cache
+from flows.jobs.run_request import RunRequest
 from flows.jobs.stages import Stages
 from flows.search.study import StudyResult, run_study
 from flows.tracking.experiment_log import UNFITTED, CandidateTracker, result_line, track_result, track_start
@@ -40,12 +40,17 @@ class ExperimentJob:
     anew : whether it takes nothing that another run has stored.  started : `time.monotonic()` then.
     """
 
-    config: ExperimentConfig
+    request: RunRequest
     tracker: Tracker
     anew: bool
     run: Stages
     console: Console
     started: float
+
+    @property
+    def config(self) -> ExperimentConfig:
+        """What was asked, before a fallback."""
+        return self.request.config
 
     def results(self) -> Path:
         """Every stage in its order; the folder of the results."""
@@ -63,8 +68,8 @@ class ExperimentJob:
         return folder
 
     def _load(self) -> Loaded:
-        loaded = self.run("data and physics", lambda: load(self.config), retries=2)
-        for note in together(loaded.notes):
+        loaded = self.run("data and physics", lambda: load(self.config, self.request.sources), retries=2)
+        for note in loaded.notes:
             self.console.say(f"  {note}")
         return loaded
 

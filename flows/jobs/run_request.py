@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from aesi.errors import InputError
 from aesi.logins import without_login, without_logins
@@ -16,6 +16,9 @@ from aesi.pipeline.experiment.config import (
     overridden_key,
     read_experiment,
 )
+
+if TYPE_CHECKING:
+    from aesi.pipeline.experiment.sources import Sources
 
 UNTOLD = ("name", "seed", *NO_PART)
 """Sections that a title need not tell what was laid over: it does already, or they have no part in the result."""
@@ -52,6 +55,16 @@ class RunRequest:
         address = (self.address or config.runner.address) if kind == "dask" else None
         runner = config.runner.model_copy(update={"kind": kind, "address": address})
         return config.model_copy(update={"runner": runner})
+
+    @cached_property
+    def sources(self) -> Sources | None:
+        """The records of the user's files, read once and found to be different tests; None where there are no files.
+
+        Raises DataError for records that cannot be used.
+        """
+        from aesi.pipeline.experiment.sources import cell_path, sources_of
+
+        return sources_of(self.config, cell_path(self.config)) if self.config.data.kind == "files" else None
 
     @property
     def title(self) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
@@ -41,6 +42,7 @@ def start(
 ) -> Path:
     """Run an experiment; the folder of its results. Raises AesiError where it cannot be done."""
     environment.prepare_process()
+    from aesi.pipeline.experiment.load import check_declared
     from aesi.pipeline.experiment.sources import check_roles, check_there
     from flows.evaluation.in_reach import check_in_reach
     from flows.tracking.store import check_reached
@@ -51,6 +53,9 @@ def start(
     check_there(config)
     check_in_reach(config.runner)
     check_reached(config.tracking.uri)
+    check_declared(config)
+    with suppress(OSError):  # of a disk, which the stage tries again
+        _ = request.sources
 
     def under_prefect() -> Path:
         from flows.jobs.prefect_flows import experiment

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -57,11 +58,12 @@ class Outbox:
         self._sending = False
         self.refused = False
         folder.mkdir(parents=True, exist_ok=True)
-        waiting = self._waiting()
-        self.left: tuple[Item, ...] = tuple(json.loads(path.read_bytes()) for path in waiting)
-        self._old = {path.name for path in waiting}
+        # One process writes here, so that the folder is listed once: very many may wait for a store that is away.
+        self._waiting = deque(sorted(folder.glob("[0-9]*.json")))
+        self.left: tuple[Item, ...] = tuple(json.loads(path.read_bytes()) for path in self._waiting)
+        self._old = {path.name for path in self._waiting}
         aside = (folder / REFUSED).glob("[0-9]*.json")  # whose numbers are taken, too
-        self._next = 1 + max((int(path.stem) for path in (*waiting, *aside)), default=0)
+        self._next = 1 + max((int(path.stem) for path in (*self._waiting, *aside)), default=0)
         self._thread = threading.Thread(target=self._run, name="aesi-outbox", daemon=True)
         self._thread.start()
 
@@ -71,12 +73,13 @@ class Outbox:
             path = self._folder / f"{self._next:08d}.json"
             self._next += 1
             write_whole(path, json.dumps(item))
+            self._waiting.append(path)
             self._wake.notify_all()
 
     @property
     def pending(self) -> int:
         """Number of items that are not delivered yet."""
-        return len(self._waiting())
+        return len(self._waiting)
 
     def flush(self, timeout_s: float) -> int:
         """Wait for delivery, at most `timeout_s` after the store was last seen to work; the number left.
@@ -105,26 +108,28 @@ class Outbox:
         """Whether an item is on its way to a store that has not failed since the last one."""
         return self._sending and self._failing_since is None and not self._tries
 
-    def _waiting(self) -> list[Path]:
-        return sorted(self._folder.glob("[0-9]*.json"))
-
     def _run(self) -> None:
         attempt = 0
         while True:
             with self._wake:
-                waiting = self._waiting()
                 if self._closing:
                     return
-                if not waiting:
+                if not self._waiting:
                     self._wake.wait()
+                    continue
+                first = self._waiting[0]
+                if not first.exists():  # somebody took it away
+                    self._waiting.popleft()
                     continue
             self._sending = True
             try:
-                attempt = 0 if self._send(waiting[0]) else attempt + 1
+                attempt = 0 if self._send(first) else attempt + 1
+                if not attempt:
+                    self._waiting.popleft()
             except OSError as error:  # of the disk: the item could not be crossed off
                 attempt += 1
-                self._old.add(waiting[0].name)
-                self._complain(f"{waiting[0]} is delivered and cannot be removed ({first_line(error)})")
+                self._old.add(first.name)
+                self._complain(f"{first} is delivered and cannot be removed ({first_line(error)})")
             finally:
                 self._sending = False
             if attempt:

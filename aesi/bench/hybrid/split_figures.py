@@ -106,7 +106,8 @@ def _band_figures(models: Sequence[Mapping[str, Any]]) -> dict[str, float]:
 
 def _gains(name: str, tests: Sequence[Mapping[str, Any]]) -> list[float]:
     """Reduction of the recalibrated model's squared error by a model, per cent, for each test with both models."""
-    return [against(test[name], test[RECALIBRATED]) for test in tests if RECALIBRATED in test]
+    both = [test for test in tests if name in test and RECALIBRATED in test]
+    return [against(test[name], test[RECALIBRATED]) for test in both]
 
 
 def _mean_and_worst(name: str, values: Sequence[float], failed: Sequence[float] = ()) -> dict[str, float]:
@@ -135,7 +136,8 @@ def table(rows: Sequence[CaseRow]) -> list[str]:
     A field of the first table is `mean / worst split`, each split with its mean over the seeds. Columns named after a
     model are the reduction of the declared model's squared error by it, per cent. `validation minus test` is the
     absolute difference of these two reductions by AESI I, `median / worst`. `coverage` is over all rows, then that of
-    the worst drive. Failed runs count as in `summary`, and are listed between the two tables.
+    the worst drive. Fields of a band are empty if a run has none. Failed runs count as in `summary`, and are listed
+    between the two tables.
     rows : each with the figures of all of IN_TABLE, or with an `error`.
     """
     ran = [row for row in rows if row.get("verdict") != NOT_RUN]
@@ -191,7 +193,9 @@ def _mean_figures(models: Sequence[Mapping[str, Any]], share: float = 1.0) -> di
     reductions are multiplied by it, since a failed run counts as a reduction of 0 at the cell's own temperature."""
     out = {
         name: {
-            key: float(np.mean([m[name][key] for m in models])) for key in FIGURES if key in models[0][name]
+            key: float(np.mean([m[name][key] for m in models]))
+            for key in FIGURES
+            if all(key in m[name] for m in models)
         }
         for name in models[0]
     }
@@ -234,10 +238,7 @@ def _cell_row(
         values = [*(m[name][key] for m in models), *[0.0] * failed]
         return f"{np.mean(values):.1f} / {min(values):.1f}"
 
-    def pooled(name: str, key: str) -> float:
-        return float(np.average([m[name][key] for m in models], weights=[m[name]["rows"] for m in models]))
-
-    worst = min(m[BEST]["worst_drive_coverage_pct"] for m in models)
+    bands = {name: _band_figures([m[name] for m in models]) for name in (RECALIBRATED, BEST)}
     cells = (
         title,
         str(len(splits) + failed),
@@ -246,10 +247,17 @@ def _cell_row(
         spread(BEST, "mser_pct"),
         spread(BEST, "against"),
         gap,
-        f"{pooled(BEST, 'coverage_pct'):.1f} / {worst:.1f}",
-        f"{pooled(RECALIBRATED, 'winkler_mv'):.1f} / {pooled(BEST, 'winkler_mv'):.1f}",
+        _fields((bands[BEST], "coverage_pct"), (bands[BEST], "worst_drive_coverage_pct")),
+        _fields((bands[RECALIBRATED], "winkler_mv"), (bands[BEST], "winkler_mv")),
     )
     return f"| {' | '.join(cells)} |"
+
+
+def _fields(*of_bands: tuple[Mapping[str, float], str]) -> str:
+    """Figures of bands beside each other, with one decimal; empty if a band is missing."""
+    if not all(key in figures for figures, key in of_bands):
+        return ""
+    return " / ".join(f"{figures[key]:.1f}" for figures, key in of_bands)
 
 
 def _split_lines(split: Mapping[str, Any]) -> Iterator[str]:
@@ -267,8 +275,8 @@ def _split_row(split: str, where: str, models: Mapping[str, Any], validation: st
         where,
         *(f"{value:.1f}" for value in figures),
         validation,
-        f"{best['coverage_pct']:.1f}",
-        f"{best['worst_drive_coverage_pct']:.1f}",
-        f"{physics['winkler_mv']:.1f} / {best['winkler_mv']:.1f}",
+        _fields((best, "coverage_pct")),
+        _fields((best, "worst_drive_coverage_pct")),
+        _fields((physics, "winkler_mv"), (best, "winkler_mv")),
     )
     return f"| {' | '.join(cells)} |"

@@ -6,11 +6,12 @@ genome. The bands are calibrated as in an experiment: on the errors that models 
 row per layout, horizon and design, with means over the cells, and then the same over all layouts.
 
 A single drive has few independent errors, so that its coverage scatters: `coverage_sd_pct` is the standard deviation
-over the cells, `coverage_se_pct` the standard error of the mean. The standard error is over cells only; the cells of a
-layout share their schedules. `score_ratio` is the interval score over that of the best constant width in hindsight,
-which is set on the test errors themselves (geometric mean over the cells). The true error of these cells is a function
-of the states, and the same in all repeats. A whole repeat that is left out therefore has larger errors than a test
-repeat, which lies between two training repeats; the bands of the layout `repeats` are wider than necessary.
+over the cells, `coverage_se_pct` the standard error of the mean, both null for one cell. The standard error is over
+cells only; the cells of a layout share their schedules. `score_ratio` is the interval score over that of the best
+constant width in hindsight, which is set on the test errors themselves (geometric mean over the cells). The true error
+of these cells is a function of the states, and the same in all repeats. A whole repeat that is left out therefore has
+larger errors than a test repeat, which lies between two training repeats; the bands of the layout `repeats` are wider
+than necessary.
 """
 
 from __future__ import annotations
@@ -198,15 +199,17 @@ def _judged(test: OutOfSampleErrors, widths: HalfWidths, horizon: float) -> tupl
 
 def _line(layout: str, design: str, horizon: float, seed: int, figures: Array) -> dict[str, Any]:
     coverage, width, score, worst, ratio = figures.T
+    cells = len(figures)
+    sd_pct = 100 * float(coverage.std(ddof=1)) if cells > 1 else None
     return {
         "layout": layout,
         "method": design,
         "horizon_s": horizon if isfinite(horizon) else None,
-        "cells": len(figures),
+        "cells": cells,
         "seed": seed,
         "coverage_pct": round(100 * float(coverage.mean()), 2),
-        "coverage_sd_pct": round(100 * float(coverage.std()), 2),
-        "coverage_se_pct": round(100 * float(coverage.std()) / len(coverage) ** 0.5, 2),
+        "coverage_sd_pct": None if sd_pct is None else round(sd_pct, 2),
+        "coverage_se_pct": None if sd_pct is None else round(sd_pct / cells**0.5, 2),
         "width_mv": round(MV_PER_V * float(width.mean()), 3),
         "interval_score_mv": round(MV_PER_V * float(score.mean()), 3),
         "worst_bin_coverage_pct": round(100 * float(np.nanmean(worst)), 2),

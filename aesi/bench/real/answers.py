@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from aesi.physics.effects import CATALOGUE
+from aesi.bench.scoring import neutral_value, size_error
 from aesi.tracer.case.free_parameter import STATE_OF_CHARGE
 from aesi.tracer.report.outcome import STATES
 
@@ -52,7 +52,7 @@ def _size(truth: Mapping[str, float], content: Mapping[str, Any]) -> dict[str, A
             if key not in truth or estimate["value"] is None:
                 continue
             true, value = truth[key], float(estimate["value"])
-            neutral = CATALOGUE[candidate["effect"]].parameters[name].neutral or 0.0
+            neutral = neutral_value(candidate["effect"], name)
             interval = estimate["low"], estimate["high"]
             return {
                 "parameter": key,
@@ -61,7 +61,7 @@ def _size(truth: Mapping[str, float], content: Mapping[str, Any]) -> dict[str, A
                 "size_low": estimate["low"],
                 "size_high": estimate["high"],
                 "size_neutral": neutral,
-                "size_error": abs(value - true) / abs(true - neutral),
+                "size_error": size_error(value, true, neutral),
                 "size_covered": None not in interval and bool(interval[0] <= true <= interval[1]),
             }
     return {}
@@ -81,5 +81,5 @@ def initial_state_row(given: float, true: float, content: Mapping[str, Any]) -> 
         "size_true": true - given,
         "size_found": moved - given,
         "size_neutral": 0.0,
-        "size_error": abs(moved - true) / abs(true - given),
+        "size_error": size_error(moved, true, given),
     }

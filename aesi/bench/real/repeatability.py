@@ -1,7 +1,7 @@
 """How similar are the model errors on two records of one cell? Measures what the tracer assumes beside good records.
 
-Of every two development records of a cell one is taken as known to be good. Each effect is fitted to first order to the
-other record, as a difference between the two. No fault was added, so that the fitted sizes over their standard
+Of every two such records of a cell (ALIKE) one is taken as known to be good. Each effect is fitted to first order to
+the other record, as a difference between the two. No fault was added, so that the fitted sizes over their standard
 deviations should scatter with a standard deviation of one; they do if the model error has the right size.
 
     python -m aesi.bench.real.repeatability
@@ -38,8 +38,10 @@ ALIKE: dict[str, tuple[str, ...]] = {
     PANASONIC: ("25degC_cycle_1", "25degC_cycle_2", "25degC_cycle_3", "25degC_la92"),
     NMC: ("drive_cycle", "C2", "1C"),
 }
-"""Data set -> records of development cases at one temperature. Test cases use some of these records as well: all faults
-of a cell are added to the same drive, in sizes for development and in sizes for the test."""
+"""Data set -> records at one temperature to which nothing is added. Development cases use all of them but two: the
+HG2's `25degC_mixed1`, which its cell file was fitted to, is in no case, and the NMC cell's `C2` is the control of a
+test case. Test cases use some of the others as well: all faults of a cell are added to the same drive, in sizes for
+development and in sizes for the test."""
 BEYOND_SDS = 2.58
 """Number of standard deviations that hold 99 % of a normal distribution."""
 CELL_FILES = "experiments/cells"

@@ -54,7 +54,8 @@ class Recipe:
     warm : True where it concerns the temperature, which is then in no column.  radial_points : of the two runs whose
     difference is used; their mesh error cancels.
     between : simulated rows per row, for an instrument that reads between rows.
-    as_named : converts the values to the package's parameters of those names, by the declared cell file.
+    as_named : converts the values to the package's parameters, by the declared cell file; a value without a parameter
+    of the same meaning keeps its own name, and is not compared.
     """
 
     label: str
@@ -86,6 +87,22 @@ def _over_windows(values: Values, declared: Path) -> Values:
         name: value * stoichiometry_span(declared, electrodes[name]) if name in electrodes else value
         for name, value in values.items()
     }
+
+
+def _called(**names: str) -> Callable[[Values, Path], Values]:
+    """Conversion to the package's names (name in the laboratory -> there) of the same quantities, in the same units."""
+    return lambda values, declared: {names.get(name, name): value for name, value in values.items()}
+
+
+def _of_both_electrodes(values: Values, declared: Path) -> Values:
+    """The double layers of the two electrodes, which the laboratory gives one capacity."""
+    return {f"{side}_f_m2": values["capacity_f_m2"] for side in ("negative", "positive")}
+
+
+def _of_the_cell(values: Values, declared: Path) -> Values:
+    """Half the gap between the branches of the cell: one electrode is delithiated while the other one is lithiated, so
+    that theirs add. The laboratory's rate of change is of another charge than the package's."""
+    return {"magnitude_v": values["negative_v"] + values.get("positive_v", 0.0)}
 
 
 def _algebraic() -> Applied:
@@ -144,12 +161,23 @@ RECIPES: dict[str, Recipe] = {
         "series_resistance",
         also=("electrolyte_transport",),
     ),
-    "film_growth": Recipe("film_growth", lambda m, q, s: {"growth_ohm_ah": m * 0.03 / q**2}, "film_growth"),
+    "film_growth": Recipe(
+        "film_growth",
+        lambda m, q, s: {"growth_ohm_ah": m * 0.03 / q**2},
+        "film_growth",
+        as_named=_called(growth_ohm_ah="per_throughput_ohm_ah"),
+    ),
     "ocv_hysteresis": Recipe(
-        "ocv_hysteresis", lambda m, q, s: {"negative_v": 8e-3 * m, "decay": 50.0}, "ocv_hysteresis"
+        "ocv_hysteresis",
+        lambda m, q, s: {"negative_v": 8e-3 * m, "decay": 50.0},
+        "ocv_hysteresis",
+        as_named=_of_the_cell,
     ),
     "positive_hysteresis": Recipe(
-        "ocv_hysteresis", lambda m, q, s: {"negative_v": 0.0, "positive_v": 8e-3 * m}, "ocv_hysteresis"
+        "ocv_hysteresis",
+        lambda m, q, s: {"negative_v": 0.0, "positive_v": 8e-3 * m},
+        "ocv_hysteresis",
+        as_named=_of_the_cell,
     ),
     "positive_ocp": Recipe(
         "ocp_shape",
@@ -174,6 +202,7 @@ RECIPES: dict[str, Recipe] = {
         most=25.0,
         also=("clock_skew",),
         radial_points=25,
+        as_named=_of_both_electrodes,
     ),
     "negative_sloped_diffusivity": Recipe(
         "concentration_dependent_diffusivity",
@@ -213,6 +242,7 @@ RECIPES: dict[str, Recipe] = {
         most=3.0,
         also=("solid_diffusivity", "concentration_dependent_diffusivity"),
         radial_points=25,
+        as_named=_called(negative_spread="negative_sd", positive_spread="positive_sd"),
     ),
     "poor_electrolyte": Recipe(
         "electrolyte_transport",
@@ -250,17 +280,20 @@ RECIPES: dict[str, Recipe] = {
         "active_material_loss_negative",
         lambda m, q, s: {"share": 1 - 0.92**m},
         "active_material_loss_negative",
+        as_named=_called(share="loss"),
     ),
     "active_material_loss_positive": Recipe(
         "active_material_loss_positive",
         lambda m, q, s: {"share": 1 - 0.95**m},
         "active_material_loss_positive",
+        as_named=_called(share="loss"),
     ),
     "leakage_current": Recipe(
         "leakage_current",
         lambda m, q, s: {"leak_a": 0.006 * m * q},
         "leakage_current",
         also=("current_sensor_offset",),
+        as_named=_called(leak_a="leakage_a"),
     ),
     "lithium_plating": Recipe(
         "lithium_plating",

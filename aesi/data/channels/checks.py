@@ -8,19 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
 from aesi.constants import COLDEST_DEGC, SECONDS_PER_HOUR, WARMEST_DEGC
 from aesi.errors import DataError
 from aesi.numerics.typing import Array, BoolArray
+from aesi.records.checked import check_plain_volts
 
 HIGHEST_VOLTAGE_V = 6.0
 """No lithium cell reaches it, and two in series exceed it."""
 LOWEST_TYPICAL_V = 0.5
 """Lowest median voltage of one cell: lithium titanate cells rest at 2 V, and no cell below 1 V is sold."""
-HIGHEST_PLAIN_VOLT = 1000.0
-"""A median voltage above this is in millivolts."""
 HIGHEST_CURRENT_A = 20_000.0
 """More than any single cell takes; a smaller current in mA is found by `check_scale`."""
 ENOUGH_ROWS = 10
@@ -204,12 +204,7 @@ def check_ranges(columns: Columns, context: Context) -> None:
     """Refuse voltages, currents and temperatures that one cell cannot have in V, A and degC."""
     voltage, current = columns["voltage_v"], columns["current_a"]
     typical = float(np.median(voltage))
-    if typical > HIGHEST_PLAIN_VOLT:
-        row = int(np.argmax(voltage > HIGHEST_PLAIN_VOLT))
-        raise DataError(
-            f"{context.at('voltage_v', row)}: {voltage[row]:.6g} V is plainly in mV; "
-            "give it in V, or declare it: --unit voltage_v=mV."
-        )
+    check_plain_volts(voltage, partial(context.at, "voltage_v"))
     bad: BoolArray = (voltage <= 0) | (voltage > HIGHEST_VOLTAGE_V)
     if np.any(bad):
         row = int(np.argmax(bad))

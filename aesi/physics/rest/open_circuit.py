@@ -13,6 +13,7 @@ from aesi.physics.balance import aged_range
 from aesi.physics.cell import Cell
 from aesi.physics.espm.plain import shifted_ocp
 from aesi.records import Measurement
+from aesi.records.checked import check_plain_volts
 
 GIVEN_SD = 0.0005
 """Standard deviation of a state of charge that the user gives, and the smallest of any."""
@@ -149,6 +150,7 @@ class OpenCircuit:
         voltage_v : V.  spread_v : its standard deviation, V.  Raises DataError where `admits` does not hold.
         """
         if not self.admits(voltage_v, spread_v):
+            check_plain_volts(np.array([voltage_v]), lambda _: self.name or "the rest voltage")
             low, high = np.interp([0.0, 1.0], self.soc, self.ocv)
             of_record = f"{self.name}: " if self.name else ""
             raise DataError(

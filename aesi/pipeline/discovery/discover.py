@@ -274,7 +274,7 @@ def discovery_content(
         "step_resistance": _step_resistance(found),
         "experiments": [{"effects": list(g), "experiment": text} for g, text in found.experiments],
         "not_adopted": found.not_adopted,
-        "notes": list(together((*asked, *found.notes))),
+        "notes": list(together((*asked, *found.notes), [one.name for one in found.files])),
         "contradicted": found.contradicted,
         "other_temperature": list(found.other_temperature),
         "good": list(found.good),

@@ -47,6 +47,7 @@ from aesi.pipeline.notes import (
     soh_sentences,
     temperature_range_sentences,
     temperature_sentence,
+    together,
 )
 from aesi.pipeline.product.contents import contents
 from aesi.pipeline.product.declared import declared_model
@@ -108,8 +109,10 @@ class Loaded:
         return hashlib.sha256(f"{self.config.setting}{data}|{self.files}".encode()).hexdigest()[:16]
 
 
-def load(config: ExperimentConfig) -> Loaded:
+def load(config: ExperimentConfig, sources: Sources | None = None) -> Loaded:
     """The data of an experiment: measured minus simulated voltage of each record, by role.
+
+    sources : its records, where they are read already.
 
     If the data are not available and the experiment has a `fallback` section, this is used instead; a note says so, and
     the experiment's own note, which is about the named data, is left out. Faults of available data are raised.
@@ -131,9 +134,23 @@ def load(config: ExperimentConfig) -> Loaded:
             f"The data set {config.data.set} cannot be had ({why}), so this is the same job on "
             f"{_data_words(fallback)}; it says nothing about the measured cell."
         )
-        loaded = _load(fallback)
+        loaded = _load(fallback, None)
         return replace(loaded, notes=(reason, *loaded.notes), fallback=reason)
-    return _load(config)
+    return _load(config, sources)
+
+
+def check_declared(config: ExperimentConfig) -> None:
+    """Raises ConfigError or CellError, before anything is started, for a cell file of the user, or effects of its, that
+    cannot be used. A missing file is for `check_there`, or for the fallback."""
+    path = config.path(config.cell.bpx)
+    if config.cell.bpx != "catalogue" and path.exists():
+        _given(config, declared_model(path))
+
+
+def _given(config: ExperimentConfig, declared: HybridModel) -> HybridModel:
+    """The declared model with what the experiment adds to it: effects, state of health, kind of physics."""
+    file = declared.with_soh(config.cell.soh)
+    return replace(file, effects=(*file.effects, *_effects(config)), model=config.cell.model or file.model)
 
 
 def _data_words(config: ExperimentConfig) -> str:
@@ -146,12 +163,11 @@ def _data_words(config: ExperimentConfig) -> str:
     return f"a virtual cell ({virtual.model} of {Path(config.cell.bpx).name} with {mix})"
 
 
-def _load(config: ExperimentConfig) -> Loaded:
+def _load(config: ExperimentConfig, sources: Sources | None) -> Loaded:
     path = cell_path(config)
     declared = declared_model(path)
-    file = declared.with_soh(config.cell.soh)
-    given = replace(file, effects=(*file.effects, *_effects(config)), model=config.cell.model or file.model)
-    sources = sources_of(config, path)
+    given = _given(config, declared)
+    sources = sources or sources_of(config, path)
     records, starts, grid_notes = _on_grid(config, given, sources)
     training = _training(config, given, records, sources.roles)
     physics, left_out = _physics(given, training)
@@ -181,7 +197,7 @@ def _load(config: ExperimentConfig) -> Loaded:
             for name, record in records.items()
         },
         digests={name: measurement.digest for name, measurement in sources.records.items()},
-        notes=tuple(notes),
+        notes=together(notes, [measurement.name for measurement in sources.records.values()]),
         config=config,
         model=given.model,
         files=_cell_files_digest(path, config),

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import textwrap
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from math import sqrt
 from typing import Any
 
 from flows.benchmarks.history import Entry, case_fields, case_of, latest, watched_figures
@@ -15,6 +17,10 @@ LONG = 12
 LAYOUTS = ("all", "repeats", "schedules", "beyond")
 DESIGN = "scaled"
 """Of bands, the one that is the default."""
+DEVIATIONS = ("coverage_sd_pct", "coverage_se_pct")
+"""Deviations between the cells of a line of bands."""
+BY_CELLS_UNTIL = "2026-11-30"
+"""Date of the last entries whose DEVIATIONS divide the sum of squares by the number of cells, not by one less."""
 BAND_FIGURES = {
     "deviation": ("coverage_sd_pct", 1),
     "worst bin, %": ("worst_bin_coverage_pct", 1),
@@ -23,6 +29,21 @@ BAND_FIGURES = {
     "score": ("score_ratio", 2),
 }
 """Head of a column -> figure of a line, and its digits."""
+
+
+def by_one_less(entry: Entry) -> Entry:
+    """The entry, with the deviations of bands over n - 1 of its n cells where they were recorded over n: larger by the
+    square root of n / (n - 1)."""
+    if entry.date > BY_CELLS_UNTIL:
+        return entry
+
+    def converted(line: Line) -> Line:
+        if line["bench"] != "bands" or line["cells"] == 1:
+            return line
+        factor = sqrt(line["cells"] / (line["cells"] - 1))
+        return line | {name: round(factor * line[name], 2) for name in DEVIATIONS}
+
+    return replace(entry, lines=tuple(map(converted, entry.lines)))
 
 
 def table_of(bench: str, entries: Sequence[Entry]) -> str:
@@ -67,8 +88,8 @@ def bands(entries: Sequence[Entry]) -> str:
             line["layout"],
             line["method"],
             "whole drive" if line["horizon_s"] is None else f"{line['horizon_s']:g} s",
-            f"{line['coverage_pct']:.1f} ± {line['coverage_se_pct']:.1f}",
-            *(f"{line[key]:.{digits}f}" for key, digits in BAND_FIGURES.values()),
+            f"{line['coverage_pct']:.1f} ± {_rounded(line['coverage_se_pct'], 1)}",
+            *(_rounded(line[key], digits) for key, digits in BAND_FIGURES.values()),
         ]
         for line in shown
     ]
@@ -78,6 +99,10 @@ def bands(entries: Sequence[Entry]) -> str:
     )
     align = "|" + "---|" * 3 + "---:|" * (1 + len(BAND_FIGURES))
     return "\n".join([*(f"{text}\n" for text in origins), head, align, *body, ""])
+
+
+def _rounded(value: float | None, digits: int) -> str:
+    return "–" if value is None else f"{value:.{digits}f}"
 
 
 def _is_shown(line: Line) -> bool:
@@ -209,7 +234,11 @@ IN_COLUMNS = {
         ("false_name_beside_unknown", "wrong names beside `unknown`"),
         ("fitted_called_found", "right and fitted to the noise, called `found`"),
         ("after_over_noise_median", "error on unseen data over the noise, median"),
-        ("parameter_error_median", "largest relative error of a parameter, median"),
+        (
+            "parameter_error_median",
+            "largest error of a parameter relative to its value, median (earlier runs)",
+        ),
+        ("size_error_median", "largest error of a size over its distance from no effect, median"),
         ("parameters_covered", "parameters inside their 90 % interval"),
         ("processor_s_median", "processor seconds a case, median"),
     ),

@@ -66,8 +66,12 @@ def test_usage_errors_are_exit_code_2(call, arguments):
         (["predict", "--cell", "none", "--current", LG_M50, "--out", "o.csv"], "read"),
         (["simulate", "--cell", "no.json", "--current", "no.csv", "--out", "o.csv"], "no.csv"),
         (["tables", "nothing"], "no experiment 'nothing' is tracked"),
-        (["discover", "e.yaml", "--max-effects", "1"], "--max-effects is not read beside an experiment file"),
-        (["discover", "e.yaml", "--unit", "current_a=mA"], "--unit is not read beside an experiment file"),
+        (["discover", "e.yaml", "--max-effects", "1"], "there, or --set discover.max_effects=VALUE"),
+        (
+            ["discover", "e.yaml", "--unit", "current_a=mA"],
+            "--unit is not read beside an experiment file; give data.units there",
+        ),
+        (["discover", "e.yaml", "--only", "leakage_current"], "give --only beside --cell and --data instead"),
         (
             ["discover", "--cell", "c.json", "--data", "d.csv", "--out", "found", "--set", "seed=1"],
             "--set changes a key of an experiment file, and none is given",

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 from lead_effect import OWN
 
-from aesi.pipeline.written import batch_files, calibration_files, discovery_files
+from aesi.pipeline.written import batch_files, calibration_files, discovery_files, discovery_marks
+from flows.commands.outputs import check_own
 
 
 @pytest.fixture
@@ -159,3 +160,38 @@ def test_the_files_of_a_batch_are_those_of_its_cells_and_its_own(tmp_path):
         *files
     }
     assert {path.name for path in files if path.parent.name == "model"} == {"model.json", "arrays.npz"}
+
+
+@pytest.mark.parametrize(
+    ("words", "name"),
+    [
+        ("discover --cell CELL --data i.csv --out d", "d/report.html"),
+        ("discover --cell CELL --data i.csv --out d", "d/model/mine.json"),
+        ("discover mine.yaml --out d", "d/report.html"),
+        ("discover mine.yaml", "runs/mine/discovery/report.html"),
+        ("candidate 0123abcd --out d", "d/model/model.json"),
+        ("batch cells --cell CELL --out d", "d/index.html"),
+        ("batch cells --cell CELL --out d", "d/summary.csv"),
+        ("batch cells --cell CELL --out d", "d/a/report.html"),
+        ("batch cells --cell CELL --out d", "d/a/calibrated.bpx.json"),
+        ("calibrate --cell CELL --data i.csv --out new.json", "new.report.html"),
+    ],
+)
+def test_a_file_that_no_earlier_run_had_written_was_replaced(call, cell, kept, tmp_path, words, name):
+    kept(name, "cells/a/i.csv")
+    (tmp_path / "mine.yaml").write_text(
+        f"name: mine\ndata: {{kind: files}}\ncell: {{bpx: {cell}}}\ndiscover: {{fit: [i.csv]}}\n"
+    )
+    code, _, err = call(*(str(cell) if word == "CELL" else word for word in words.split()))
+    assert code == 2
+    assert f"{name} is there, was not written by this command, and would be lost" in err.replace("\n", " ")
+    assert kept()
+
+
+def test_what_an_earlier_run_left_may_be_replaced_and_gone_on_with(tmp_path):
+    for folder, mark in (("whole", "discovery.json"), ("stopped", "hypotheses.jsonl")):
+        out = tmp_path / folder
+        out.mkdir()
+        for name in ("report.html", mark):
+            (out / name).write_text("")
+        check_own(out, discovery_files(out), discovery_marks(out))

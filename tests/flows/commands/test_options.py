@@ -4,10 +4,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.main import get_command
 
 from aesi.data.reading import Reading
 from aesi.errors import InputError
+from aesi.pipeline.experiment.config import ExperimentConfig
+from aesi.pipeline.experiment.sections import CellConfig, DataConfig, DiscoverConfig
+from flows.cli import app
 from flows.commands import record_options
+from flows.commands.cell import BESIDE_AN_EXPERIMENT, KEYS_OF_DISCOVERY
 
 
 @pytest.fixture
@@ -78,3 +83,13 @@ def test_a_day_is_that_of_its_file(files):
     assert list(record_options.dates_by_record(["W8_0.2C.csv=2019-05-31"], [Path(f) for f in files])) == [
         "W8_0.2C"
     ]
+
+
+def test_every_option_that_is_refused_beside_an_experiment_file_has_its_key_named_or_none():
+    command = get_command(app).commands["discover"]
+    refused = {option.name for option in command.params} - {*BESIDE_AN_EXPERIMENT, "help"}
+    assert refused - set(KEYS_OF_DISCOVERY) == {"only", "without", "cycle", "step"}
+    sections = {"cell": CellConfig, "data": DataConfig, "discover": DiscoverConfig, "": ExperimentConfig}
+    for key in KEYS_OF_DISCOVERY.values():
+        section, _, name = key.rpartition(".")
+        assert name in sections[section].model_fields, key

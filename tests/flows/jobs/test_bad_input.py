@@ -22,7 +22,8 @@ def statuses(name):
     from flows.tracking.store import Store
 
     store = Store()
-    return [run.info.status for run in store.runs(store.find_experiment(name), "")]
+    experiment = store.find_experiment(name)
+    return [] if experiment is None else [run.info.status for run in store.runs(experiment, "")]
 
 
 def test_an_invalid_data_file_leaves_no_failed_run(tracked):
@@ -104,6 +105,57 @@ def test_a_record_too_short_to_decide_was_told_after_a_server_had_been_started(c
     assert "Prefect" not in err
     assert not (workspace / "found").exists()
     assert not (workspace / "mlflow.db").exists()
+
+
+@pytest.mark.parametrize(
+    ("cell", "words"),
+    [
+        ("{bpx: CELL}", "bad and good hold the same rows and are both among the data and the tests"),
+        ("{bpx: CELL, effects: {self_heatin: {}}}", "did you mean 'self_heating'?"),
+        ("good.csv", "good.csv"),
+    ],
+)
+def test_records_and_a_cell_that_cannot_be_used_were_told_after_a_server_had_been_started(
+    call, workspace, cell, words
+):
+    rows = "".join(f"{k},{1 + k % 2},{3.9 - 0.001 * k - 0.02 * (k % 2)}\n" for k in range(100))
+    for name in ("bad", "good"):
+        (workspace / f"{name}.csv").write_text(f"time_s,current_a,voltage_v\n{rows}")
+    text = EXPERIMENT.replace("{bpx: CELL}", cell).replace("CELL", str(CELL))
+    (workspace / "refused.yaml").write_text(text)
+    code, _, err = call("run", "refused.yaml", "--prefect")
+    assert code == 2
+    assert words in err.replace("\n", " ")
+    assert "Prefect" not in err
+    assert not (workspace / "mlflow.db").exists()
+
+
+def test_the_records_of_a_run_are_read_once(workspace, monkeypatch):
+    from aesi.pipeline.experiment import sources
+    from flows.jobs import start as module
+
+    class Loading(Exception):
+        """The data are at hand."""
+
+    def loads(config, found):
+        assert [record.name for record in found.records.values()] == ["bad", "good"]
+        raise Loading
+
+    reading, names = sources.read, []
+
+    def counted(path, *given):
+        names.append(path.name)
+        return reading(path, *given)
+
+    monkeypatch.setattr(sources, "read", counted)
+    monkeypatch.setattr("flows.jobs.experiment_stages.load", loads)
+    for name, slope in (("bad", 1e-3), ("good", 2e-4)):
+        lines = "".join(f"{k},1,{3.9 - slope * k:.4f}\n" for k in range(120))
+        (workspace / f"{name}.csv").write_text(f"time_s,current_a,voltage_v\n{lines}")
+    (workspace / "refused.yaml").write_text(EXPERIMENT.replace("CELL", str(CELL)))
+    with pytest.raises(Loading):
+        module.start(workspace / "refused.yaml", use_prefect=False)
+    assert names == ["bad.csv", "good.csv"]
 
 
 @pytest.mark.parametrize(

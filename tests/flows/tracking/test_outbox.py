@@ -181,3 +181,19 @@ def test_a_refused_item_that_could_not_be_put_aside_was_called_delivered(tmp_pat
     assert "refused an item" in line
     assert "delivered" not in line
     assert box.pending == 1
+
+
+def test_every_item_had_the_whole_folder_listed(tmp_path, store, said, monkeypatch):
+    listed, glob = [], Path.glob
+
+    def counted(path, pattern):
+        listed.append(path)
+        return glob(path, pattern)
+
+    box = opened(tmp_path, store, said)
+    monkeypatch.setattr(Path, "glob", counted)
+    for n in range(20):
+        box.put({"n": n})
+    assert box.flush(5) == 0
+    assert store.items == list(range(20))
+    assert not listed

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from aesi.bench.intervals.bands import DESIGNS, HORIZONS_S, run
+from aesi.bench.intervals.bands import DESIGNS, HORIZONS_S, _line, run
 from aesi.bench.virtual_drives import virtual_splits
 from aesi.errors import FitError
 from aesi.physics import Cell
@@ -22,6 +22,14 @@ def test_every_horizon_and_design_has_a_line(cell) -> None:
     for line in lines:
         assert 0 < line["coverage_pct"] <= 100
         assert line["interval_score_mv"] >= line["width_mv"] > 0
+        assert line["coverage_sd_pct"] is line["coverage_se_pct"] is None  # one cell tells no deviation
+
+
+def test_the_standard_error_of_few_cells_was_too_small() -> None:
+    # By hand: 0.8, 0.9 and 1 deviate by 0.1 from their mean, with two degrees of freedom.
+    figures = np.array([[coverage, 1e-3, 1e-3, 0.5, 1.0] for coverage in (0.8, 0.9, 1.0)])
+    line = _line("repeats", "scaled", 1.0, 0, figures)
+    assert (line["coverage_sd_pct"], line["coverage_se_pct"]) == (10.0, 5.77)
 
 
 def test_a_layout_without_any_model_ended_in_a_division_by_zero(cell, monkeypatch) -> None:

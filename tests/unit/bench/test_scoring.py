@@ -1,5 +1,6 @@
 """Judging an answer by hand-worked cases, rates with their intervals, and the limit on processor time."""
 
+import signal
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -114,6 +115,22 @@ def test_work_without_end_is_stopped():
         time.sleep(0.5)  # waiting costs no processor time
     with processor_limit(None):
         pass
+
+
+def test_an_alarm_while_a_limit_ended_left_its_timer_running(monkeypatch):
+    set_timer = signal.setitimer
+
+    def ringing_first(which, seconds, interval=0.0):
+        if seconds == 0.0:
+            signal.raise_signal(signal.SIGPROF)
+        return set_timer(which, seconds, interval)
+
+    monkeypatch.setattr(signal, "setitimer", ringing_first)
+    before = signal.getsignal(signal.SIGPROF)
+    with processor_limit(1000.0):
+        pass
+    assert signal.getitimer(signal.ITIMER_PROF) == (0.0, 0.0)
+    assert signal.getsignal(signal.SIGPROF) is before
 
 
 def test_a_case_without_an_answer_says_why():
@@ -236,7 +253,7 @@ def test_misses_that_say_as_much_as_the_label_are_counted():
         "effects": ["ocp_shape"],
     }
     right = kept | {"exact": True, "grouped": True, "right": True, "fitted": False, "effects": ["clock_skew"]}
-    right |= {"ahead_nats": None, "after_over_noise": 1.0, "parameter_error": None}
+    right |= {"ahead_nats": None, "after_over_noise": 1.0, "size_error": None}
     rows = [
         right,
         wrong | {"ahead_nats": -0.4},
@@ -271,6 +288,20 @@ def test_a_case_without_an_answer_counted_as_one_without_a_false_name():
 
 def test_a_size_without_an_interval_was_left_out_of_how_many_intervals_hold_the_truth():
     size = {"value": 2.0, "low": None, "high": None}
-    case = BlindCase(None, (), "gain", (), (), 0.5, CELLS, {"gain.gain": 2.0})
-    found = {"effects": ["gain"], "candidates": [{"effect": "gain", "parameters": {"gain": size}}]}
-    assert blind._parameters(case, found) == ([0.0], [False])
+    assert blind._parameters(*of_gain(2.0, size)) == ([0.0], [False])
+
+
+def of_gain(true, size):
+    """A case that lacks a gain of the current sensor, and the answer that names it."""
+    label = "current_sensor_gain"
+    case = BlindCase(None, (), label, (), (), 0.5, CELLS, {f"{label}.gain": true})
+    found = {"effects": [label], "candidates": [{"effect": label, "parameters": {"gain": size}}]}
+    return case, found
+
+
+def test_a_gain_that_was_missed_entirely_counted_as_three_per_cent_off():
+    size = {"value": 1.0, "low": 0.99, "high": 1.01}
+    errors, covered = blind._parameters(*of_gain(1.03, size))
+    assert errors == [pytest.approx(1.0)]
+    assert covered == [False]
+    assert blind._parameters(*of_gain(1.0, size)) == ([], [])  # no distance to be off by

@@ -203,3 +203,20 @@ def test_other_temperatures_were_in_the_mean_of_what_the_correction_takes_off():
     figures = summary([there])["all"]["hg2"]["AESI I"]
     assert figures["mser_recalibrated_pct_mean"] == pytest.approx(20.0)
     assert figures["abroad_mser_recalibrated_pct_mean"] == pytest.approx(0.0)
+
+
+def test_a_model_that_one_run_lacks_ended_the_summary():
+    rows = [row("nmc 1+2", "nmc", seed, 80.0) for seed in range(2)]
+    del rows[1]["models"]["AESI II"]
+    figures = summary(rows)["all"]["nmc"]
+    assert figures["AESI II"]["mser_recalibrated_pct_mean"] == pytest.approx(20.0)
+
+
+def test_a_model_without_a_band_ended_the_table():
+    rows = [row("nmc 1+2", "nmc", seed, 80.0) for seed in range(2)]
+    for name in ("coverage_pct", "worst_drive_coverage_pct", "winkler_mv", "rows"):
+        del rows[1]["models"]["AESI I"][name]
+    lines = table(rows)
+    head = "| NMC pouch, parts of a drive | 1 | 2 | 75.0 / 75.0 | 80.0 / 80.0 | 20.0 / 20.0 | 10.0 / 10.0 |  |  |"
+    assert head in lines
+    assert "    | nmc 1+2 | the others | 75.0 | 80.0 | 80.0 | 20.0 | 70.0 |  |  |  |" in lines

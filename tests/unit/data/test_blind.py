@@ -10,9 +10,10 @@ from aesi.data.blind import CELLS, FULL, CaseSpec, case, cells_in, generate, pla
 from aesi.data.blind.recipes import RECIPES, Written
 from aesi.data.blind.spread import DIFFERENCES, SPREADS, parametrisation, published_differences
 from aesi.data.blind.strangers import STRANGERS
+from aesi.data.laboratory.changes import CHANGES
 from aesi.data.laboratory.simulator import TrueRun
 from aesi.errors import DataError
-from aesi.physics import Cell
+from aesi.physics import Cell, Record, Trace
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.model import EspmModel
 
@@ -174,7 +175,7 @@ def test_pairs_carry_both_labels_and_strangers_are_unknown(short_duty, cells):
     )
     assert pair.label == "series_resistance+film_growth"
     assert pair.effects == ("series_resistance", "film_growth")
-    assert {"series_resistance.resistance_ohm", "film_growth.growth_ohm_ah"} <= set(pair.truth)
+    assert {"series_resistance.resistance_ohm", "film_growth.per_throughput_ohm_ah"} <= set(pair.truth)
     strange = generate(CaseSpec("c", "nmc", ("wandering",), 4.0, soc0=0.6, seed=1), cells_in(cells))
     assert (strange.label, strange.effects) == ("unknown", ())
     assert strange.truth["rms_mv"] == pytest.approx(4.0, rel=1e-6)
@@ -278,3 +279,63 @@ def test_no_recipe_goes_beyond_what_its_effect_takes_for_physical(cells):
                     assert low <= value <= high * (1 + 1e-9), (name, cell, key)
                     compared.add(recipe.label)
     assert {"current_sensor_gain", "series_resistance", "electrolyte_transport"} <= compared
+
+
+OTHER_MEANING = {
+    "self_heating": {"cooling_w_m2_k"},
+    "ocp_shape": {"positive_v", "negative_v", "centre_soc", "width_soc"},
+    "concentration_dependent_diffusivity": {"centre_soc"},
+    "lithium_inventory_loss": {"negative_stoichiometry"},
+}
+"""Label -> values of the laboratory that no parameter of the effect has the meaning of."""
+
+
+@pytest.mark.parametrize("name", RECIPES)
+def test_the_sizes_of_ten_labels_were_compared_with_nothing(name, request):
+    recipe = RECIPES[name]
+    parameters = CATALOGUE[recipe.label].parameters
+    declared = request.config.rootpath / "experiments" / "cells" / "nmc_30ah.bpx.json"
+    named = recipe.as_named(recipe.values(1.0, 5.0, 0.8), declared)
+    assert set(named) - set(parameters) <= OTHER_MEANING.get(recipe.label, set())
+    for key in set(named) & set(parameters):
+        parameters[key].check(key, named[key])
+
+
+def test_a_leakage_and_a_film_are_those_of_the_package():
+    time_s, current_a = np.arange(0.0, 7200.0, 10.0), np.full(720, 2.0)
+    leak = RECIPES["leakage_current"].values(1.0, 5.0, 0.8)
+    named = RECIPES["leakage_current"].as_named(leak, None)
+    seen = CATALOGUE["leakage_current"].on_record(Record(time_s, current_a, None), **named)
+    flowing = CHANGES["leakage_current"].cell_current(time_s, current_a, leak)
+    np.testing.assert_allclose(flowing, seen.current_a)
+    film = RECIPES["film_growth"].values(1.0, 5.0, 0.8)
+    named = RECIPES["film_growth"].as_named(film, None) | {"per_root_time_ohm": 0.0}
+    trace = Trace(None, time_s, current_a, np.zeros(720), {}, True)
+    added = CATALOGUE["film_growth"].on_voltage(trace, **named).voltage_v
+    there = CHANGES["film_growth"].terminal_voltage(
+        time_s, current_a, np.zeros(720), film | {"growth_ohm_h": 0.0}
+    )
+    np.testing.assert_allclose(there, added, atol=1e-12)
+    assert added[-1] < -1e-3
+
+
+@pytest.mark.parametrize("name", ["ocv_hysteresis", "positive_hysteresis"])
+def test_both_hystereses_lower_the_voltage_of_a_long_discharge_by_their_magnitude(name):
+    recipe, base = (
+        RECIPES[name],
+        {f"{e} electrode OCP [V]": lambda sto: 1.0 for e in ("Negative", "Positive")},
+    )
+
+    class Parameters(dict):
+        def update(self, new, check_already_exists):
+            super().update(new)
+
+    values = recipe.values(1.0, 5.0, 0.8)
+    change = CHANGES["ocv_hysteresis"]
+    changed = Parameters(base)
+    change.alter(changed, change.defaults | values)
+    discharged_v = changed["Positive electrode lithiation OCP [V]"](0.5)
+    discharged_v -= changed["Negative electrode delithiation OCP [V]"](0.5)
+    magnitude_v = recipe.as_named(values, None)["magnitude_v"]
+    assert discharged_v == pytest.approx(-magnitude_v)  # the middle of both electrodes is 1 V
+    assert magnitude_v > 0.0  # of the package's, on a long discharge: h = -1, V = V_cell - magnitude

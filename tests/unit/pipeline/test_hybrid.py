@@ -66,6 +66,14 @@ def test_a_voltage_without_a_value_was_told_by_a_time_that_all_rows_share(model)
         model.predict(time, np.zeros(len(time)), voltage_v=voltage)
 
 
+def test_a_voltage_in_millivolts_was_taken_for_that_of_another_cell(model, data):
+    said = r"the record, row 1, column voltage_v: \d+.* V is plainly in mV; give it in V"
+    with pytest.raises(DataError, match=said):
+        model.predict(data.time_s, data.current_a, voltage_v=1e3 * data.voltage_v)
+    with pytest.raises(DataError, match="the rest voltage: 4100 V is plainly in mV"):
+        aesi.simulate(model.cell, data.time_s, data.current_a, rest_voltage_v=4100.0)
+
+
 def test_the_band_of_a_free_run_is_wider_by_what_the_start_is_uncertain_by(model, data):
     sure, unsure = (model.predict_record(data, SOC0, soc0_sd=sd) for sd in (0.0, 0.02))
     moved = [model.predict_record(data, SOC0 + off).physics_v - sure.physics_v for off in (-0.02, 0.02)]

@@ -36,6 +36,13 @@ def test_records_with_the_same_note_share_it():
     assert together(notes) == ("a, b: resampled to 1 s", "b: 3 rows dropped: no voltage")
 
 
+def test_records_of_one_name_in_several_folders_had_each_its_own_line():
+    names = ("train drive", "test drive")
+    assert together([f"{name}: no temperature column" for name in names], names) == (
+        "train drive, test drive: no temperature column",
+    )
+
+
 def test_records_that_start_full_were_told_in_one_sentence_that_ran_on():
     starts = [f"{name} rests at {v:.3f} V: a full charge." for name, v in (("C20", 4.194), ("1C", 4.193))]
     assert together([*starts, starts[0], "a, b: x", "c: x"]) == (*starts, "a, b, c: x")
