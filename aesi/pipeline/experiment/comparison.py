@@ -55,7 +55,7 @@ def _intervals(tests: list[RecordTrace], name: str, seed: int) -> dict[str, list
     """Bootstrap intervals [low, high] of a model's test figures: RMSE, mV, and reduction of the declared model's mean
     squared error, per cent. The records are resampled in about `INTERVAL_BLOCKS` blocks, of which none reaches over two
     records. The same blocks are drawn for the model and for the declared physics, so that what both have in common
-    cancels in the reduction."""
+    cancels in the reduction. A single block, of a test of one row, has no interval: empty."""
     spans = spans_of([len(trace.time_s) for trace in tests])
     starts = np.array([start for start, _ in pieces(spans, max(1, spans[-1][1] // INTERVAL_BLOCKS))])
 
@@ -65,6 +65,8 @@ def _intervals(tests: list[RecordTrace], name: str, seed: int) -> dict[str, list
     squares = block_sums(lambda trace: _free_run_error_v(trace, name) ** 2)
     bare = block_sums(lambda trace: _free_run_error_v(trace, DECLARED) ** 2)
     rows = np.diff(starts, append=spans[-1][1])
+    if len(rows) < 2:
+        return {}
     drawn = np.random.default_rng([seed, 7]).integers(len(rows), size=(DRAWS, len(rows)))
     total = squares[drawn].sum(axis=1)
     rmse = MV_PER_V * np.sqrt(total / rows[drawn].sum(axis=1))

@@ -60,3 +60,11 @@ def test_the_range_of_an_rmse_holds_it_where_errors_are_correlated_over_minutes(
         low, high = _intervals(drives, "ESPM", 0)["test_rmse_mv"]
         within.append(low <= 10.0 <= high)
     assert 0.84 < np.mean(within) < 0.96
+
+
+def test_a_test_of_a_single_row_has_no_range():
+    row = np.full(1, 3.7)
+    trace = RecordTrace(
+        "drive", "test", np.zeros(1), np.ones(1), np.ones(1), row + 0.01, row, {}, {"ESPM": row}
+    )
+    assert _intervals([trace], "ESPM", 0) == {}
