@@ -405,15 +405,14 @@ def discover(
 
     Example: aesi discover --cell cell.bpx.json --data drive.csv --out found
     """
-    if out is not None:
-        read = [*([cell] if cell else []), *(data or []), *(test or []), *(good or []), *(effect_file or [])]
-        outputs.check_folder(out, read, discovery_files(out))
-        if experiment is None:
-            outputs.check_own(out, discovery_files(out), discovery_marks(out))
     if experiment is not None:
         options.check_unsaid(context, BESIDE_AN_EXPERIMENT, KEYS_OF_DISCOVERY)
         _discover_experiment(experiment, list(overrides or []), out, prefect)
         return
+    if out is not None:
+        read = [*([cell] if cell else []), *(data or []), *(test or []), *(good or []), *(effect_file or [])]
+        outputs.check_folder(out, read, discovery_files(out))
+        outputs.check_own(out, discovery_files(out), discovery_marks(out))
     if cell is None or not data or out is None:
         needed = {"--cell": cell, "--data": data, "--out": out}
         lacking = " and ".join(option for option, value in needed.items() if not value)
