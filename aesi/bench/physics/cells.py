@@ -35,7 +35,7 @@ from typing import Any
 import numpy as np
 
 from aesi.bench import some_chosen
-from aesi.bench.physics.archive import ARCHIVE
+from aesi.bench.physics.archive import ARCHIVE, for_development
 from aesi.bench.physics.cells_table import tested_mv
 from aesi.bench.physics.tested import soh_on_its_day
 from aesi.constants import MV_PER_V
@@ -168,12 +168,13 @@ def run(
 
 
 def _of_archive(development: bool | None) -> list[MeasuredRecord]:
-    """The records of the archives: of each cell every second one, beginning with the first, for development, or the
-    others; None takes all."""
-    places = (
-        (place, MeasuredRecord(data, name)) for data in ARCHIVE for place, name in enumerate(ARCHIVE[data])
-    )
-    return [one for place, one in places if development is None or (place % 2 == 0) == development]
+    """The records of the archives: those for development, or the others; None takes all."""
+    return [
+        MeasuredRecord(data, name)
+        for data, days in ARCHIVE.items()
+        for name in days
+        if development is None or for_development(data, name) == development
+    ]
 
 
 def _geometric_means(rows: Sequence[dict[str, Any]]) -> dict[str, float]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from aesi.bench import some_chosen
-from aesi.bench.physics.archive import ARCHIVE
+from aesi.bench.physics.archive import ARCHIVE, for_development
 from aesi.bench.real.case import Fault, RealCase, Take
 from aesi.bench.real.faults import FaultKind
 from aesi.bench.real.good import beside_good
@@ -107,6 +107,7 @@ def plan(archive: bool = False) -> tuple[RealCase, ...]:
     """All cases, in a fixed order. Every second case of a group, beginning with the first, is for development.
 
     archive : take the cases on the published archives instead: other drives of the same cells, at other temperatures.
+    Those on a record that constants of the cell files were chosen on are for development, too.
     """
     if archive:
         cases = list(_archived())
@@ -119,7 +120,8 @@ def plan(archive: bool = False) -> tuple[RealCase, ...]:
     for case in cases:
         number = seen[case.group] = seen.get(case.group, -1) + 1
         matched = case.matched if case.matched in there else None
-        out.append(replace(case, development=number % 2 == 0, matched=matched))
+        chose = number % 2 == 0 or for_development(case.take.set, case.take.file)
+        out.append(replace(case, development=chose, matched=matched))
     return tuple(c for c in out if c.group != "control" or (c.take.set, c.take.file) not in FITTED)
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from aesi.bench.detectable import seen_on_measured
 from aesi.bench.limit import NO_TIME
+from aesi.bench.physics.cells import _of_archive
 from aesi.bench.real import chosen, judged, plan, summary, table, write_report
 from aesi.bench.real.answers import answer_scores, initial_state_row
 from aesi.bench.real.faults import declared_with_fault, soc0_with_fault, with_fault
@@ -51,9 +52,16 @@ def test_of_the_archives_a_temperature_is_withheld_wherever_it_is_given_beside_i
     assert not names & {case.name for case in plan()}
     for group in ("withheld", "control"):
         ours = [case for case in cases if case.group == group]
-        assert [case.development for case in ours[:4]] == [True, False, True, False]
+        assert all(case.development for case in ours[::2])
         assert all(case.take.temperature == (group == "control") for case in ours)
         assert not any(case.take.file.startswith("25degC") for case in ours)
+
+
+def test_drives_that_the_energies_of_the_files_were_chosen_on_stood_as_unseen():
+    chose = {(record.data, record.name) for record in _of_archive(development=True)}
+    unseen = [case for case in chosen(archive=True, development=False) if case.group == "withheld"]
+    assert len(unseen) == 10
+    assert not chose & {(case.take.set, case.take.file) for case in unseen}
 
 
 def test_cases_are_chosen_by_group_and_by_what_they_are_for():
