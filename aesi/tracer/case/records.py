@@ -178,7 +178,7 @@ def _equivalent_white_v(
 
     Rows that share one value of the noise carry the information of a single row: rows over which a channel is smooth,
     and rows that were rounded to one value, which share the rounding error `noise.resolution_v`.
-    resolution_v : V, least step of the fit part's voltage.
+    resolution_v : V, of the fit part (`quantum_v`).
     """
     share = np.maximum(noise.rows / record.rows, 1.0) if record.rows is not None else float(thin_noise.rows)
     if not noise.resolution_v:

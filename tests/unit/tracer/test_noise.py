@@ -7,7 +7,7 @@ import pytest
 
 from aesi.physics import simulate
 from aesi.records import Measurement
-from aesi.tracer.case.noise import noise_floor_v, noise_of
+from aesi.tracer.case.noise import noise_floor_v, noise_of, quantum_v
 from aesi.tracer.case.records import prepare_all
 
 
@@ -74,3 +74,22 @@ def test_a_few_rows_that_are_off_make_no_noise():
     voltage = 3.7 + 1e-3 * rng.normal(size=20_000)
     voltage[rng.choice(len(voltage), 200, replace=False)] += 0.03
     assert noise_floor_v(voltage, np.full(len(voltage), 2.0)) == pytest.approx(1e-3, rel=0.05)
+
+
+@pytest.mark.parametrize("noise_v", [0.0, 2e-4, 1e-3])
+def test_the_resolution_is_the_least_move_between_neighbours_where_two_grids_are_offset(rng, noise_v):
+    voltage = 3.7 + 1e-4 * np.cumsum(rng.normal(size=20_000)) + noise_v * rng.normal(size=20_000)
+    grid_v = 6.4e-4 * np.round(voltage / 6.4e-4)
+    grid_v[12_000:] += 1.5e-4
+    assert quantum_v(np.round(grid_v, 5)) == pytest.approx(6.4e-4, abs=1.1e-5)
+
+
+@pytest.mark.parametrize("rows", [150, 400])
+def test_the_few_rows_of_a_slow_discharge_were_given_the_resolution_of_their_closest_values(rng, rows):
+    voltage = np.linspace(4.1, 2.9, rows) + 1e-4 * rng.normal(size=rows)
+    assert noise_floor_v(np.round(voltage, 5), np.ones(rows)) == pytest.approx(1e-4, rel=0.25)
+
+
+def test_a_channel_that_holds_its_values_has_no_resolution_by_that(rng):
+    voltage = 3.7 + 1e-3 * np.repeat(rng.normal(size=2_000), 5)
+    assert quantum_v(voltage) < 1e-4
