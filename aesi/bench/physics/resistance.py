@@ -81,10 +81,9 @@ def _measured(start: Cell) -> Iterator[dict[str, Any]]:
             continue
         found = calibrate(start, [records[name] for name in fitted])
         for name in pulses:
-            soc, ohm = measured_pulses(
-                records[name], initial_state(found.cell, records[name]).soc, found.cell.capacity_ah
-            )
-            degc = _mean_degc(found.cell, records[name])
+            record = records[name]
+            soc, ohm = measured_pulses(found.cell, record, initial_state(found.cell, record).soc)
+            degc = _mean_degc(found.cell, record)
             told = pulse_resistance(found, degc, soc)
             row = {"cell": cell, "record": name, "degc": round(degc, 1), "fitted": name in fitted}
             yield row | _figures(told.ohm[0], told.low_ohm[0], told.high_ohm[0], ohm)

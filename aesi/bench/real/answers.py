@@ -67,15 +67,16 @@ def _size(truth: Mapping[str, float], content: Mapping[str, Any]) -> dict[str, A
     return {}
 
 
-def initial_state_row(given: float, true: float, content: Mapping[str, Any]) -> dict[str, Any]:
+def initial_state_row(record: str, given: float, true: float, content: Mapping[str, Any]) -> dict[str, Any]:
     """The `size_*` entries of a wrongly given initial state of charge: its true error, and how much of it the fit of
-    the written model corrected on the first record (nothing if the written model is the declared one).
+    the written model corrected on that record (nothing if the written model is the declared one).
 
-    given : the state of charge that the tracer had, 0 to 1.  true : the right one.  content : the answer as in
-    `discovery.json`.
+    record : name of the record that it was given for; good records beside it have states of their own.  given : the
+    state of charge that the tracer had, 0 to 1.  true : the right one.  content : the answer as in `discovery.json`.
     """
     rows = content["own_parameters"]["after"]
-    moved = next((row["value"] for row in rows if row["effect"] == STATE_OF_CHARGE), given)
+    own = (row for row in rows if (row["effect"], row["parameter"]) == (STATE_OF_CHARGE, record))
+    moved = next((row["value"] for row in own), given)
     return {
         "parameter": "initial state of charge",
         "size_true": true - given,

@@ -159,7 +159,7 @@ def _scored_row(
     if truth.spectra:
         row |= resistance_row(found, declared, truth.spectra)
     if case.fault and case.fault.kind == "wrong_soc0" and given_soc0 is not None and case.soc0 is not None:
-        row |= initial_state_row(given_soc0, case.soc0, content)
+        row |= initial_state_row(data.name, given_soc0, case.soc0, content)
     return row
 
 

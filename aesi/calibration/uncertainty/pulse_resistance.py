@@ -1,6 +1,6 @@
 """The resistance that a calibrated file predicts over temperature and charge, with what the records leave open of it.
 
-    R = (V(0) - V(10 s)) / I        I of 1C, a discharge from rest                       (1)
+    R = (V(0) - V(10 s)) / I        I of 1C, of the nominal capacity, a discharge from rest                (1)
 
 An interval is of the logarithm of R. Its variance is that of the parameters, by linear propagation of the fit's
 covariance and, where the records' temperatures are too close together for a fit to move activation energies, of the
@@ -96,10 +96,10 @@ def pulse_resistance(
 def _fitted_pulses(found: Calibration, record: Prepared) -> Iterator[MeasuredPulse]:
     """The pulses in a fitted record, as its rows were measured."""
     degc = kelvin_taken(found.declared, record) - ZERO_CELSIUS_K
-    capacity_ah = found.cell.capacity_ah * found.capacities[record.name]
-    socs, ohm = measured_pulses(record.data, found.starts[record.name], capacity_ah)
+    name = record.name
+    socs, ohm = measured_pulses(found.cell, record.data, found.starts[name], found.capacities[name])
     for soc, resistance_ohm in zip(socs.tolist(), ohm.tolist(), strict=True):
-        yield MeasuredPulse(record.name, degc, soc, resistance_ohm)
+        yield MeasuredPulse(name, degc, soc, resistance_ohm)
 
 
 def _model_error(found: Calibration, measured: Sequence[MeasuredPulse]) -> float | None:
@@ -143,13 +143,15 @@ def log_resistance(cell: Cell, temperature_degc: Array, soc: Array, model_name: 
     return out
 
 
-def measured_pulses(record: Measurement, soc0: float, capacity_ah: float) -> tuple[Array, Array]:
+def measured_pulses(cell: Cell, record: Measurement, soc0: float, share: float = 1.0) -> tuple[Array, Array]:
     """(states of charge (n,), resistances (1) in ohm (n,)) of the 1C discharges of 10 s and more from rest in a record.
 
-    soc0 : state of charge at its first row.  capacity_ah : of the cell at that time, Ah.
+    soc0 : state of charge at its first row.  share : capacity of the cell at that time over that of its file. A rate is
+    of the nominal capacity all the same: a cycler's schedule does not follow the ageing of the cell.
     """
-    time_s, voltage_v, c_rate = record.time_s, record.voltage_v, record.current_a / capacity_ah
-    soc = soc0 - record.discharged_ah(record.hold_taken) / capacity_ah
+    time_s, voltage_v, nominal_ah = record.time_s, record.voltage_v, cell.nominal_capacity_ah
+    c_rate = record.current_a / nominal_ah
+    soc = soc0 - record.discharged_ah(record.hold_taken) / (share * cell.capacity_ah)
     near_1c, between_s = np.abs(c_rate - 1.0) < NEAR_1C, 0.5 * (time_s[1:] + time_s[:-1])
     found = []
     for k in np.flatnonzero((np.abs(c_rate[:-1]) < STEADY_C) & near_1c[1:]):
@@ -158,7 +160,7 @@ def measured_pulses(record: Measurement, soc0: float, capacity_ah: float) -> tup
         last -= not near_1c[last]  # where a pulse ends after 10 s, that row may show the rest already
         pulse = c_rate[k + 1 : last + 1]
         if until_s <= time_s[-1] and len(pulse) > 1 and np.ptp(pulse[1:]) < STEADY_C:
-            current_a = capacity_ah * float(np.mean(pulse))
+            current_a = nominal_ah * float(np.mean(pulse))
             found.append((soc[k], (voltage_v[k] - voltage_v[last]) / current_a))
     socs, ohm = np.array(found, dtype=float).reshape(-1, 2).T
     return socs, ohm

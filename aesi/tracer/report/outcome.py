@@ -51,6 +51,8 @@ class Errors:
 class FileOutcome:
     """The models on one part of one file.
 
+    soc : (n,) state of charge in the written model or, where it cannot be simulated here, in the first that can be; NaN
+    where none can.
     voltages : state -> (n,) V, NaN where that model cannot be simulated on this part.  unsimulated : state -> why it
     cannot.  noise_v : standard deviation of the measured voltage's noise, V.  gain_v : RMSE of `recalibrated` minus
     that of `after`, with its 95 % block-bootstrap interval, V; NaN where one of them has no voltage.  emptied_s : state
@@ -175,7 +177,7 @@ def _outcome(
         for state, run in runs.items()
         if np.any(empty := run.empty[rows])
     }
-    told: State = "before" if "after" in unsimulated else "after"
+    told: State = next((state for state in ("after", *STATES) if state not in unsimulated), "after")
     return FileOutcome(
         record.name,
         part,

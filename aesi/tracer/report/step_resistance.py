@@ -67,8 +67,8 @@ class CurrentSteps:
     ) -> CurrentSteps | None:
         """The changes in one record; None where its rows are too long or too few, or its current is constant.
 
-        time_s, current_a, soc : (n,) s, A (discharge positive), 0 to 1.  voltages_v : name -> (n,) V, NaN where a model
-        cannot be simulated.
+        time_s, current_a, soc : (n,) s, A (discharge positive), 0 to 1.  voltages_v : name -> (n,) V. They are NaN
+        where a model cannot be simulated, and so is the state of charge where none can.
         """
         time, table = _averaged(time_s, np.column_stack([current_a, soc, *voltages_v.values()]))
         rows_s = np.diff(time)
@@ -115,7 +115,7 @@ class CurrentSteps:
 
     def _in_bins(self, x: Array, edges: Array) -> StepResistance:
         number = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(edges) - 2)
-        bins = [number == k for k in range(len(edges) - 1)]
+        bins = [(number == k) & np.isfinite(x) for k in range(len(edges) - 1)]
         filled = [inside for inside in bins if np.count_nonzero(inside & self.is_step) >= LEAST_STEPS]
         return StepResistance(
             np.array([np.mean(x[inside & self.is_step]) for inside in filled]),

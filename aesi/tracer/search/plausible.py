@@ -47,9 +47,10 @@ def plausibility(fit: FittedHypothesis, competing: int) -> float:
     """Log marginal likelihood minus log(competing) for each named effect, nats: the log posterior probability of the
     hypothesis, up to a constant, if any effect is as likely as any other.
 
-    competing : number of effects that could be named.
+    competing : number of effects that could be named, 0 where there is none.
     """
-    return fit.score.evidence - len(fit.hypothesis) * float(np.log(competing))
+    penalty = float(np.log(competing)) if fit.hypothesis else 0.0
+    return fit.score.evidence - len(fit.hypothesis) * penalty
 
 
 def most_plausible(fits: Sequence[FittedHypothesis], competing: int) -> FittedHypothesis | None:

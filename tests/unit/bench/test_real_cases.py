@@ -280,10 +280,18 @@ def gain_rows():
 
 def test_half_of_a_wrong_initial_state_taken_back():
     moved = {"effect": "soc0", "parameter": "x", "value": 0.975}
-    row = initial_state_row(0.95, 1.0, {"own_parameters": {"after": [moved]}})
+    row = initial_state_row("x", 0.95, 1.0, {"own_parameters": {"after": [moved]}})
     assert row["size_true"] == pytest.approx(0.05)
     assert row["size_error"] == pytest.approx(0.5)
-    assert initial_state_row(0.95, 1.0, {"own_parameters": {"after": []}})["size_error"] == pytest.approx(1.0)
+    unmoved = initial_state_row("x", 0.95, 1.0, {"own_parameters": {"after": []}})
+    assert unmoved["size_error"] == pytest.approx(1.0)
+
+
+def test_the_state_of_a_good_record_that_moved_further_was_taken_for_that_of_the_case():
+    good, moved = ({"effect": "soc0", "parameter": n, "value": v} for n, v in (("good", 0.9), ("x", 0.99)))
+    row = initial_state_row("x", 0.95, 1.0, {"own_parameters": {"after": [good, moved]}})
+    assert row["size_found"] == pytest.approx(0.04)
+    assert row["size_error"] == pytest.approx(0.2)
 
 
 def control(name, *effects):

@@ -70,16 +70,25 @@ def test_a_state_that_cannot_give_the_pulse_has_no_resistance(truth):
 def test_the_pulses_of_a_record_show_the_resistance_of_its_cell(truth, hold):
     """Two at 1C; one that is too short, one at 2C and a charge do not count."""
     record = pulse_test(truth, hold)
-    soc, ohm = measured_pulses(record, 0.6, truth.capacity_ah)
+    soc, ohm = measured_pulses(truth, record, 0.6)
     charged_ah = (30.0 + 5.0 + 60.0 - 30.0) / 3600.0 * truth.nominal_capacity_ah
     assert soc == pytest.approx([0.6, 0.6 - charged_ah / truth.capacity_ah], abs=3e-4)
     assert ohm == pytest.approx(np.exp(log_resistance(truth, np.array([25.0]), soc))[0], rel=0.008)
 
 
+def test_the_pulses_of_an_aged_cell_are_of_its_nominal_capacity(truth):
+    """With a rate of what it has left, its 1C pulses were of 1.16C and did not count."""
+    aged, share = truth.with_material(0.86), 0.86
+    soc, ohm = measured_pulses(truth, pulse_test(aged), 0.6, share)
+    drawn_ah = (30.0 + 5.0 + 60.0 - 30.0) / 3600.0 * truth.nominal_capacity_ah
+    assert soc == pytest.approx([0.6, 0.6 - drawn_ah / (share * truth.capacity_ah)], abs=3e-4)
+    assert ohm == pytest.approx(np.exp(log_resistance(aged, np.array([25.0]), soc))[0], rel=0.008)
+
+
 def test_a_record_without_pulses_shows_none(truth):
     time_s = np.arange(0.0, 600.0)
     flat = Measurement(time_s, np.zeros(600), np.full(600, 3.7))
-    assert [len(found) for found in measured_pulses(flat, 0.5, truth.capacity_ah)] == [0, 0]
+    assert [len(found) for found in measured_pulses(truth, flat, 0.5)] == [0, 0]
 
 
 def test_intervals_are_as_wide_as_the_file_is_off_at_measured_pulses(at_25, start, records, truth):

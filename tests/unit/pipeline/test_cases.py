@@ -13,6 +13,8 @@ import aesi
 from aesi.calibration import Conditions
 from aesi.data import read_measurement
 from aesi.errors import CellError, ConfigError, DataError, InputError
+from aesi.physics import Cell
+from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.calibrate import Request, calibrate_files
 from aesi.pipeline.discovery import discover as tracing
 from aesi.pipeline.discovery.cases import case_of_experiment, case_of_files
@@ -142,6 +144,20 @@ def test_effects_of_the_cell_and_files_with_effects_were_passed_over_in_silence(
     ]
     with pytest.raises(InputError, match=f"there is no effect file {EXPERIMENTS / 'mine.py'}"):
         case_of_experiment(read_experiment(EXPERIMENTS / "measured_nmc.yaml", overrides))
+
+
+def test_a_search_for_what_the_declared_model_has_is_refused(tmp_path):
+    """It was a verdict `none`, of a search that had tried nothing."""
+    record, model = write_record(tmp_path), tmp_path / "model"
+    has = tuple(CATALOGUE[name].activate() for name in ("self_heating", "series_resistance"))
+    HybridModel(Cell.from_bpx(BPX), has).save(model)
+    with pytest.raises(InputError, match="the declared model has self_heating already, so that none is left"):
+        case_of_files(model, [record], only=["self_heating"])
+    with pytest.raises(InputError, match="every effect is left out, so that none is left to try"):
+        case_of_files(BPX, [record], without=[*CATALOGUE])
+    assert case_of_files(model, [record], only=["self_heating"], max_effects=0).kept_back > 0.0
+    # A parameter that was corrected once may still be off.
+    assert "series_resistance" in case_of_files(model, [record], only=["series_resistance"]).tried()
 
 
 def test_what_was_not_tried_is_said_so_that_no_verdict_is_read_as_one_about_it(tmp_path):

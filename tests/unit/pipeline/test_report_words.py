@@ -1,5 +1,6 @@
 """Findings in plain words: they say what the numbers say, also when that is unwelcome."""
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -664,6 +665,10 @@ def test_the_range_that_the_data_cover_is_told(views):
     assert "currents of 0 to 12.6 A" in discoveries.span_finding(idle)
     still = replace(view, traces=(replace(t, soc=soc[:1], current_a=np.full(1, 5.0)),))
     assert " h, 90 % state of charge and currents of 5 A (" in discoveries.span_finding(still)
+    unknown = replace(t, soc=np.full(3601, np.nan), current_a=current_a)
+    with warnings.catch_warnings(action="error"):
+        text = discoveries.span_finding(replace(view, traces=(unknown, replace(t, soc=soc))))
+    assert "20 to 90 % state of charge" in text
     assert discoveries.span_finding(replace(view, traces=())) == ""
 
 

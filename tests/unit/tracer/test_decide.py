@@ -61,6 +61,7 @@ from aesi.tracer.search.forward import forward_search
 from aesi.tracer.search.hypothesis_fits import base_of, fitted_hypothesis, values_without
 from aesi.tracer.search.one_cause import with_one_effect
 from aesi.tracer.search.path import Path, Step
+from aesi.tracer.search.plausible import most_plausible, plausibility
 from aesi.tracer.search.wrong_parameters import beyond_spread, with_wrong_parameters, wrong_sds
 
 CELLS = FilePath(__file__).resolve().parents[3] / "experiments" / "cells"
@@ -587,6 +588,16 @@ def test_of_three_names_that_one_cause_stands_for_the_third_was_lost(monkeypatch
     monkeypatch.setattr("aesi.tracer.search.one_cause.fitted_hypothesis", lambda *given: one)
     monkeypatch.setattr("aesi.tracer.search.one_cause.most_plausible", lambda fits, many: fits[1])
     assert with_one_effect(path, None)[1] == (cause.id, *names)
+
+
+def test_without_an_effect_to_name_no_hypothesis_was_more_plausible_than_another():
+    """The penalty of no names was 0 times the logarithm of 0."""
+    less, more = (
+        SimpleNamespace(hypothesis=(), score=SimpleNamespace(evidence=nats, total=0.0))
+        for nats in (-2.0, 1.0)
+    )
+    assert plausibility(more, 0) == 1.0
+    assert most_plausible([less, more], 0) is more
 
 
 def test_an_effect_that_is_a_dataclass_with_other_code_is_another_effect(tmp_path):

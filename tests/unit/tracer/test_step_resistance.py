@@ -79,6 +79,21 @@ def test_an_uncertain_resistance_and_a_model_that_stopped_are_nan():
     assert np.isnan(found.ohm["noisy"]).all()
 
 
+def test_a_record_of_unknown_charge_was_in_the_bin_near_full():
+    """Where no model can be simulated on one of several parts, a search that had ended could not be written."""
+    time, current, soc = drive()
+    volts = voltage(time, current, soc)
+    known, unknown = (
+        CurrentSteps.of(time, current, soc_known, {"measured": volts})
+        for soc_known in (soc, np.full(len(time), np.nan))
+    )
+    alone, both = known.by_soc(), CurrentSteps.together([known, unknown]).by_soc()
+    np.testing.assert_array_equal(both.x, alone.x)
+    np.testing.assert_array_equal(both.ohm["measured"], alone.ohm["measured"])
+    assert unknown.by_soc().x.size == 0
+    assert unknown.by_current().x.size > 0
+
+
 def test_rows_across_a_gap_are_left_out():
     time, current, soc = drive()
     volts = voltage(time, current, soc) - np.where(time < 3000.0, 0.0, 1.0)

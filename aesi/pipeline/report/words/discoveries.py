@@ -280,8 +280,9 @@ def span_finding(view: DiscoveryView) -> str:
 
 
 def _range(columns: Iterable[Array]) -> tuple[float, float]:
-    parts = list(columns)
-    return min(float(np.nanmin(part)) for part in parts), max(float(np.nanmax(part)) for part in parts)
+    """(least, largest) of all columns, without what is not known (NaN): parts on which no model can be simulated."""
+    values = np.concatenate(list(columns))
+    return float(np.nanmin(values)), float(np.nanmax(values))
 
 
 def _named(view: DiscoveryView, effects: Sequence[str]) -> str:

@@ -5,6 +5,10 @@ without it. The error on that fold then estimates the error on unseen rows: on a
 somewhat less where drives are cut into several, since the rest of the same drive stays. The validation loss that a
 search reports of its own pick is optimistic, since the pick is the best of many (selection bias).
 Varma & Simon, BMC Bioinformatics 7 (2006) 91, doi:10.1186/1471-2105-7-91.
+
+The choice is of one candidate, by the squared error on the other folds alone. A search weighs that beside the error out
+of bag. Where corrections do not fade it averages its fittest candidates (`average.py`), and the error is then that of
+another model: a mean of candidates has errors that no sums of each tell.
 """
 
 from __future__ import annotations
