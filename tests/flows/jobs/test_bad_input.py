@@ -137,7 +137,7 @@ def test_the_records_of_a_run_are_read_once_and_it_is_said_before(workspace, mon
     class Loading(Exception):
         """The data are at hand."""
 
-    def loads(config, found):
+    def loads(config, found, begins):
         assert [record.name for record in found.records.values()] == ["bad", "good"]
         raise Loading
 
