@@ -88,13 +88,14 @@ def not_written(path: object, error: OSError) -> str:
 
 
 def nearest_name(name: str, known: Iterable[str]) -> str | None:
-    """The known name that a name begins, as `temp` does, or else the one with a similar spelling; the most similar of
-    several, None of none."""
+    """The known name that a name begins, as `temp` does, also where it begins others in its turn; or else the one with
+    a similar spelling; the most similar of several, None of none."""
     from difflib import get_close_matches
 
     every = list(known)
     begun = [each for each in every if each.startswith(name)] if name else []
-    near = begun if len(begun) == 1 else get_close_matches(name, begun or every, n=1)
+    of_all = [each for each in begun if all(other.startswith(each) for other in begun)]
+    near = of_all or get_close_matches(name, begun or every, n=1)
     return near[0] if near else None
 
 

@@ -47,7 +47,7 @@ from aesi.physics.model import EspmModel, SolvedRows, of_record
 from aesi.physics.rest.open_circuit import OpenCircuit
 from aesi.physics.rest.voltage import freed_of_instruments, freed_of_series
 from aesi.records import Hold, Run
-from aesi.records.checked import check_row, check_times, numbers
+from aesi.records.checked import check_row, check_times, numbers, of_columns
 
 ModelName = Literal["espm", "dfn"]
 """Name of the model that is solved. The argument is `model` in public functions, and `model_name` in functions where
@@ -65,6 +65,7 @@ which lithium or salt has run out, -1 for none.  fault : which one, as `depletio
 """
 
 
+@of_columns
 def simulate(
     cell: Cell,
     time_s: Numbers,

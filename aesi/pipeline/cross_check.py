@@ -26,7 +26,7 @@ from aesi.over_time import extent, over_time
 from aesi.physics import Cell, ModelName, simulate
 from aesi.physics.arguments import check_cell, check_choice
 from aesi.pipeline.export import own_fields_of, pybamm_contacts, without_own_fields
-from aesi.records.checked import numbers
+from aesi.records.checked import numbers, of_columns
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -97,6 +97,7 @@ class CrossCheck:
         return MV_PER_V * float(np.abs(self.ours_v - self.pybamm_v).max())
 
 
+@of_columns
 def cross_check(
     cell: Cell, time_s: Numbers, current_a: Numbers, soc0: float, model: PybammModel = "SPMe"
 ) -> CrossCheck:

@@ -38,6 +38,8 @@ CANDIDATE = "candidate.json"
 EXPERIMENT, COMPARISON, COEFFICIENTS = "experiment.json", "comparison.json", "coefficients.json"
 """Files in the tracking store alone: the settings of a run, what `aesi compare` draws of it, the terms of a
 candidate."""
+COMPARISON_MARK = '<meta name="generator" content="aesi compare">'
+"""Line of a page by which `aesi compare` knows its own."""
 
 
 def calibration_files(out: Path) -> tuple[Path, Path, Path, Path]:

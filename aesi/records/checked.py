@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import wraps
+from inspect import signature
 from numbers import Real
-from typing import TypeGuard
+from typing import ParamSpec, TypeGuard, TypeVar
 
 import numpy as np
 
@@ -13,11 +15,44 @@ from aesi.errors import DataError, InputError
 from aesi.numerics.typing import Array, ComplexArray
 from aesi.over_time import stamp
 
+P = ParamSpec("P")
+R = TypeVar("R")
 LONGEST_STEP_S = 365 * 24 * SECONDS_PER_HOUR
 """Between two rows: a year. A convention: no test stands still for longer, and times in nanoseconds do."""
 
 HIGHEST_PLAIN_VOLT = 1000.0
 """A median voltage above this is in millivolts."""
+
+
+def of_columns(function: Callable[P, R]) -> Callable[P, R]:
+    """The function, which raises InputError, with how to call it, where a record or a table stands for its columns and
+    arguments are missing or too many for that."""
+    taken = signature(function)
+    needed = [one.name for one in taken.parameters.values() if one.default is one.empty]
+    first = int(needed[0] == "self")
+    called = function.__qualname__.removesuffix(".__init__")
+    words = ", ".join(
+        f"data.{name}" if name.endswith(("_s", "_a", "_v")) else name for name in needed[first:]
+    )
+
+    @wraps(function)
+    def told(*args: P.args, **named: P.kwargs) -> R:
+        try:
+            taken.bind(*args, **named)
+        except TypeError:
+            given = [
+                one
+                for one in (*args[first:], *named.values())
+                if hasattr(one, "columns") or hasattr(one, "time_s")
+            ]
+            if given:
+                raise InputError(
+                    f"{called} takes columns, not an object of type {type(given[0]).__name__}; give them, as in "
+                    f"{called}({words})."
+                ) from None
+        return function(*args, **named)  # Python has words of its own for what else cannot be bound
+
+    return told
 
 
 def numbers(values: object, name: str) -> Array:

@@ -13,7 +13,7 @@ from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import DataError
 from aesi.numerics.typing import AnyArray, Array, ComplexArray, Numbers
 from aesi.over_time import extent, over_time, range_words, stamp
-from aesi.records.checked import check_row, check_times, complex_numbers, numbers, row_words
+from aesi.records.checked import check_row, check_times, complex_numbers, numbers, of_columns, row_words
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -92,7 +92,7 @@ def _rows(column: AnyArray) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """One continuous test of one cell; lists and pandas columns are converted to arrays of floats.
+    """One continuous test of one cell; lists and pandas columns are converted to arrays of floats, arrays are copied.
 
     time_s, current_a, voltage_v : (n,) s (strictly increasing), A (discharge positive), V (NaN where it is unknown).
     temperature_degc : (n,) degC, or None where it was not measured.
@@ -148,7 +148,7 @@ class Measurement:
                 check_row(column, f"{self.name}: {label}")
             if column.shape != time.shape:
                 raise DataError(f"{self.name}: {label} has {_rows(column)}, time_s has {_rows(time)}.")
-            object.__setattr__(self, label, column)
+            object.__setattr__(self, label, np.array(column))  # its own, whatever becomes of what was given
         check_times(time, f"{self.name}: time_s")
 
     def __len__(self) -> int:
@@ -243,6 +243,9 @@ class Measurement:
         return self.take(slice(int(low), int(high)))
 
 
+Measurement.__init__ = of_columns(Measurement.__init__)  # type: ignore[method-assign]
+
+
 @dataclass(frozen=True, eq=False)
 class Spectrum:
     """One impedance spectrum of a cell at rest; lists and columns of a table are converted to arrays.
@@ -289,7 +292,7 @@ class Spectrum:
                 raise DataError(
                     f"{self.name}: {label} is {size[row]:g} {unit} in {row_words(row)}; it has to be above 0."
                 )
-        object.__setattr__(self, "frequency_hz", frequency)
+        object.__setattr__(self, "frequency_hz", np.array(frequency))
         object.__setattr__(self, "z_ohm", z)
 
     @property

@@ -54,6 +54,10 @@ class Console:
         line = f"  {what}: {done} in {duration(now - started_s)}{f', {note}' if note else ''}"
         self._show(line)
 
+    def begins(self, what: str, part: str) -> None:
+        """What a long piece of work does now, until it says something else."""
+        self._show(f"  {what}: {part} ...")
+
     def _show(self, line: str) -> None:
         """A line in the place of the last one, or below it where nothing can be overwritten."""
         if not self._moving:

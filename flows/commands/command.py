@@ -13,6 +13,8 @@ from aesi.errors import InputError, nearest_name, wanted
 
 MEANT = {"--model": "a saved model is given with --cell"}
 """Option with a list of choices -> end of the sentence on a value that is not one of them."""
+OF_RECORDS = ("current", "data")
+"""Options, without their dashes, by which one command or another takes a record."""
 
 
 class Command(TyperCommand):
@@ -60,14 +62,17 @@ class Command(TyperCommand):
             raise InputError(_sentence(option, faults[0])) from None
 
     def _unknown(self, option: str, command: str) -> str:
-        """A sentence on an option that there is not: the nearest one, where the name of a quantity, which many write as
-        an option, stands for the column that `--column` names."""
-        instead = {known: known for parameter in self.params for known in parameter.opts}
-        if "--column" in instead:
+        """A sentence on an option that there is not: the nearest one, where the name by which another command takes a
+        record stands for this one's, and that of a quantity, which many write as an option, for the column that
+        `--column` names.  Names are compared without their dashes, which would make all of them alike."""
+        named = {known.lstrip("-"): known for parameter in self.params for known in parameter.opts}
+        instead = {name: known if known != name else f"{name} without --" for name, known in named.items()}
+        instead |= {other: named[one] for one in OF_RECORDS if one in named for other in OF_RECORDS}
+        if "column" in named:
             from aesi.data.channels.columns import QUANTITIES
 
-            instead |= {f"--{quantity}": f"--column {quantity}=..." for quantity in QUANTITIES}
-        near = nearest_name(option, instead)
+            instead |= {quantity: f"--column {quantity}=..." for quantity in QUANTITIES}
+        near = nearest_name(option.lstrip("-"), instead)
         meant = "." if near is None else f"; did you mean {instead[near]}?"
         return f"{command} has no option {option}{meant} See {command} -h."
 

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 from aesi.errors import InputError
-from aesi.pipeline.written import CANDIDATE, candidate_files
+from aesi.pipeline.written import CANDIDATE, COMPARISON_MARK, candidate_files
 from flows.commands import options, outputs
 
 Experiment = Annotated[Path, typer.Argument(help="Experiment file (YAML), such as experiments/smoke.yaml.")]
@@ -130,7 +130,7 @@ def compare(
     uri: options.StoreUri = None,
 ) -> None:
     """Compare tracked runs on one HTML page that opens offline: their settings, their figures, maps of their errors."""
-    outputs.check_page(out)
+    outputs.check_page(out, COMPARISON_MARK)
     from aesi.pipeline.report.compare import counted_jobs
     from flows.results.compare import compare as write
 

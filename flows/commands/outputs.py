@@ -70,12 +70,14 @@ def check_json(out: Path, inputs: Iterable[Path], written: Sequence[Path]) -> No
         raise InputError(f"--out {out}: what is written is BPX; give a name that ends in .json.")
 
 
-def check_page(out: Path) -> None:
+def check_page(out: Path, mark: str) -> None:
     """`check_file` for an HTML page; no file is read for it.  Raises InputError also if the name does not end in .html
-    or .htm."""
+    or .htm, and for a page that is there without the line `mark`, which each page of the command holds."""
     check_file(out, ())
     if out.suffix.lower() not in PAGES:
         raise InputError(f"--out {out}: what is written is a page; give a name that ends in .html.")
+    if out.is_file() and mark.encode() not in out.read_bytes():
+        raise _not_own("--out", out, out)
 
 
 def check_folder(
@@ -114,10 +116,14 @@ def check_own(out: Path, written: Iterable[Path], marks: Iterable[Path], option:
     """
     there = next((file for file in written if file.exists()), None)
     if there is not None and not any(mark.is_file() for mark in marks):
-        raise InputError(
-            f"{option} {out}: {there} is there, was not written by this command, and would be lost; name another "
-            "place, or move it."
-        )
+        raise _not_own(option, out, there)
+
+
+def _not_own(option: str, out: Path, there: Path) -> InputError:
+    return InputError(
+        f"{option} {out}: {there} is there, was not written by this command, and would be lost; name another "
+        "place, or move it."
+    )
 
 
 def check_beside(out: Path, source: Path) -> None:

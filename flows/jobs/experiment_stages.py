@@ -9,6 +9,7 @@ import re
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -68,7 +69,9 @@ class ExperimentJob:
         return folder
 
     def _load(self) -> Loaded:
-        loaded = self.run("data and physics", lambda: load(self.config, self.request.sources), retries=2)
+        stage = "data and physics"
+        begins = partial(self.console.begins, stage)
+        loaded = self.run(stage, lambda: load(self.config, self.request.sources, begins), retries=2)
         for note in loaded.notes:
             self.console.say(f"  {note}")
         return loaded

@@ -54,6 +54,8 @@ def start(
     check_in_reach(config.runner)
     check_reached(config.tracking.uri)
     check_declared(config)
+    if config.data.kind == "files":  # long records at 10 Hz take seconds each
+        Console().say(f"Reading {', '.join(Path(name).name for name in config.data.listed)} ...")
     with suppress(OSError):  # of a disk, which the stage tries again
         _ = request.sources
 

@@ -1,5 +1,6 @@
 """What a record says of itself."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -128,3 +129,50 @@ def test_a_part_beyond_a_record_was_an_empty_record_without_a_word(start_s, stop
     with pytest.raises(DataError) as caught:
         record.between(start_s, stop_s)
     assert str(caught.value) == words
+
+
+def test_a_record_and_a_spectrum_changed_with_the_arrays_that_they_were_made_of():
+    time_s, voltage_v, frequency_hz = np.arange(3.0), np.full(3, 3.7), np.array([1.0, 10.0])
+    one = Measurement(time_s, np.zeros(3), voltage_v)
+    spectrum = Spectrum("cell", frequency_hz, [0.03, 0.02])
+    digests = one.digest, spectrum.digest
+    voltage_v += 0.1  # for the next record of a loop
+    frequency_hz *= 2.0
+    assert (one.digest, spectrum.digest) == digests
+
+
+@pytest.mark.parametrize("of", ["record", "table"])
+@pytest.mark.parametrize(
+    ("called", "words"),
+    [
+        (
+            lambda cell, data: aesi.simulate(cell, data, soc0=0.8),
+            "simulate(cell, data.time_s, data.current_a)",
+        ),
+        (
+            lambda cell, data: aesi.cross_check(cell, data, soc0=0.8),
+            "cross_check(cell, data.time_s, data.current_a, soc0)",
+        ),
+        (
+            lambda cell, data: aesi.HybridModel(cell).predict(data),
+            "HybridModel.predict(data.time_s, data.current_a)",
+        ),
+        (
+            lambda cell, data: aesi.Measurement(data),
+            "Measurement(data.time_s, data.current_a, data.voltage_v)",
+        ),
+    ],
+)
+def test_a_record_or_a_table_given_for_columns_ended_in_a_type_error(called, words, of):
+    cell = aesi.Cell.from_bpx(BPX)
+    record = Measurement([0.0, 1.0], [0.0, 0.0], [3.9, 3.9])
+    kind = {"record": "Measurement", "table": "DataFrame"}[of]
+    with pytest.raises(
+        InputError, match=rf"takes columns, not an object of type {kind}; .*{re.escape(words)}\.$"
+    ):
+        called(cell, record if of == "record" else record.to_frame())
+
+
+def test_other_missing_arguments_are_pythons_own():
+    with pytest.raises(TypeError, match=r"simulate\(\) missing 1 required positional argument: 'current_a'"):
+        aesi.simulate(aesi.Cell.from_bpx(BPX), [0.0, 1.0])

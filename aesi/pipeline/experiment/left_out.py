@@ -24,7 +24,7 @@ drive.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -95,13 +95,17 @@ class TrainingDrives:
             records = {name: records[name] for name in self.roles["train"]}
         return training_part(self.config.data, series_under(physics, records, self.config)[0], self.roles)
 
-    def left_out(self, fitted: PhysicsModels) -> tuple[PhysicsModels, LeftOutDrives]:
+    def left_out(
+        self, fitted: PhysicsModels, begins: Callable[[str], None]
+    ) -> tuple[PhysicsModels, LeftOutDrives]:
         """(the physics with its recalibration multiplied by the share (1); the training drives under physics without
         each piece in turn).
 
-        fitted : the physics fitted to all training rows.
+        fitted : the physics fitted to all training rows.  begins : called with what is begun, in words.
         """
         pieces = self.pieces()
+        refits = len(pieces.folds) + len(pieces.drives)
+        begins(f"physics refitted {refits} times without a part of the training drives")
         refitted = [self._refitted(fitted, piece) for piece in pieces.folds]
         slopes = np.array([self._slope(*each) for each in zip(refitted, pieces.folds, strict=True)])
         drives = np.array([piece.drive for piece in pieces.folds])

@@ -7,7 +7,7 @@ therefore has the states that its history gives it.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -109,10 +109,15 @@ class Loaded:
         return hashlib.sha256(f"{self.config.setting}{data}|{self.files}".encode()).hexdigest()[:16]
 
 
-def load(config: ExperimentConfig, sources: Sources | None = None) -> Loaded:
+def load(
+    config: ExperimentConfig,
+    sources: Sources | None = None,
+    begins: Callable[[str], None] = lambda part: None,
+) -> Loaded:
     """The data of an experiment: measured minus simulated voltage of each record, by role.
 
-    sources : its records, where they are read already.
+    sources : its records, where they are read already.  begins : called with what is begun, in words: a part of the
+    work takes minutes where records are long.
 
     If the data are not available and the experiment has a `fallback` section, this is used instead; a note says so, and
     the experiment's own note, which is about the named data, is left out. Faults of available data are raised.
@@ -134,9 +139,9 @@ def load(config: ExperimentConfig, sources: Sources | None = None) -> Loaded:
             f"The data set {config.data.set} cannot be had ({why}), so this is the same job on "
             f"{_data_words(fallback)}; it says nothing about the measured cell."
         )
-        loaded = _load(fallback, None)
+        loaded = _load(fallback, None, begins)
         return replace(loaded, notes=(reason, *loaded.notes), fallback=reason)
-    return _load(config, sources)
+    return _load(config, sources, begins)
 
 
 def check_declared(config: ExperimentConfig) -> None:
@@ -163,14 +168,18 @@ def _data_words(config: ExperimentConfig) -> str:
     return f"a virtual cell ({virtual.model} of {Path(config.cell.bpx).name} with {mix})"
 
 
-def _load(config: ExperimentConfig, sources: Sources | None) -> Loaded:
+def _load(config: ExperimentConfig, sources: Sources | None, begins: Callable[[str], None]) -> Loaded:
     path = cell_path(config)
     declared = declared_model(path)
     given = _given(config, declared)
-    sources = sources or sources_of(config, path)
+    if sources is None:
+        begins("records")
+        sources = sources_of(config, path)
+    begins("initial states of the records")
     records, starts, grid_notes = _on_grid(config, given, sources)
     training = _training(config, given, records, sources.roles)
-    physics, left_out = _physics(given, training)
+    physics, left_out = _physics(given, training, begins)
+    begins("errors of the physics and their slopes")
     series, depletion_notes = _series(physics, training)
     split = by_role(config.data, series, sources.roles)
     notes = [
@@ -297,13 +306,16 @@ def _kept_sentences(physics: PhysicsModels, config: ExperimentConfig) -> list[st
     ]
 
 
-def _physics(given: HybridModel, training: TrainingDrives) -> tuple[PhysicsModels, LeftOutDrives | None]:
+def _physics(
+    given: HybridModel, training: TrainingDrives, begins: Callable[[str], None]
+) -> tuple[PhysicsModels, LeftOutDrives | None]:
     """(the physics models; the training drives under physics that has not seen them). The second is None for a single
     training drive, since no other is left to fit to.
 
     Fits are also made if the declared cell is corrected, because the fitted models stand in the tables beside it.
     """
     config = training.config
+    begins("physics fitted to the training records")
     physics = physics_models(
         given.cell,
         given.effects,
@@ -314,7 +326,7 @@ def _physics(given: HybridModel, training: TrainingDrives) -> tuple[PhysicsModel
         own_charges=training.of_several_records,
     )
     if len(training.drives) > 1:
-        return training.left_out(physics)
+        return training.left_out(physics, begins)
     return physics, None
 
 

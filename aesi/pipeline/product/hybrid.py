@@ -36,7 +36,7 @@ from aesi.pipeline.product.prediction import Prediction
 from aesi.pipeline.product.trained import outside_trained, trained_on
 from aesi.pipeline.written import EFFECTS, HEAD
 from aesi.records import ErrorSeries, FreeRun, Hold, Measurement
-from aesi.records.checked import checked_dt, is_finite_number, numbers, row_words
+from aesi.records.checked import checked_dt, is_finite_number, numbers, of_columns, row_words
 from aesi.records.steps import after_gap, next_stamp
 from aesi.sparse import SparseModel
 from aesi.sparse.bare import Bare
@@ -127,6 +127,7 @@ class HybridModel:
         return trained_on(self.correction, self.bands)
 
     @advises_python
+    @of_columns
     def predict(
         self,
         time_s: Numbers,

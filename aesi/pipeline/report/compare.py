@@ -13,6 +13,7 @@ from aesi.constants import MV_PER_V
 from aesi.over_time import range_words
 from aesi.pipeline.report.page import beside, write_plain_page
 from aesi.pipeline.report.table_formats import ABSENT
+from aesi.pipeline.written import COMPARISON_MARK
 from aesi.sparse.search.genome import GENE_WORDS
 
 FREE_RUN_MV, FREE_RUN_MSER = "free_run/test_rmse_mv", "free_run/test_mser_pct"
@@ -113,6 +114,7 @@ def write_comparison(path: Path, runs: Sequence[ComparedRun]) -> Path:
     return write_plain_page(
         path,
         "compare.html",
+        mark=COMPARISON_MARK,
         payload={"limit": limit, "maps": [content["mean_mv"] for _, content in maps]},
         compare_js=beside("compare.js"),
         title=f"{counted_jobs(runs)} compared",

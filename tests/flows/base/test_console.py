@@ -20,3 +20,8 @@ from flows.base.console import Console
 def test_a_resumed_search_was_about_to_end_at_once(capsys, done, known, told):
     Console(every_s=0.0).progress("candidates", done, 12, time.monotonic() - 10.0, known=known)
     assert capsys.readouterr().err.strip() == told
+
+
+def test_what_a_long_stage_does_now_is_a_line(capsys):
+    Console().begins("data and physics", "records")
+    assert capsys.readouterr().err == "  data and physics: records ...\n"

@@ -175,6 +175,8 @@ def test_the_files_of_a_batch_are_those_of_its_cells_and_its_own(tmp_path):
         ("batch cells --cell CELL --out d", "d/a/report.html"),
         ("batch cells --cell CELL --out d", "d/a/calibrated.bpx.json"),
         ("calibrate --cell CELL --data i.csv --out new.json", "new.report.html"),
+        ("compare mine", "compare.html"),
+        ("compare mine --out report.html", "report.html"),
     ],
 )
 def test_a_file_that_no_earlier_run_had_written_was_replaced(call, cell, kept, tmp_path, words, name):

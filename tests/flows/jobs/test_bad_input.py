@@ -130,20 +130,21 @@ def test_records_and_a_cell_that_cannot_be_used_were_told_after_a_server_had_bee
     assert not (workspace / "mlflow.db").exists()
 
 
-def test_the_records_of_a_run_are_read_once(workspace, monkeypatch):
+def test_the_records_of_a_run_are_read_once_and_it_is_said_before(workspace, monkeypatch, capsys):
     from aesi.pipeline.experiment import sources
     from flows.jobs import start as module
 
     class Loading(Exception):
         """The data are at hand."""
 
-    def loads(config, found):
+    def loads(config, found, begins):
         assert [record.name for record in found.records.values()] == ["bad", "good"]
         raise Loading
 
-    reading, names = sources.read, []
+    reading, names, said = sources.read, [], []
 
     def counted(path, *given):
+        said.append(capsys.readouterr().err)
         names.append(path.name)
         return reading(path, *given)
 
@@ -156,6 +157,7 @@ def test_the_records_of_a_run_are_read_once(workspace, monkeypatch):
     with pytest.raises(Loading):
         module.start(workspace / "refused.yaml", use_prefect=False)
     assert names == ["bad.csv", "good.csv"]
+    assert "Reading bad.csv, good.csv ..." in said[0]
 
 
 @pytest.mark.parametrize(

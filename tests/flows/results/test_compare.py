@@ -167,6 +167,7 @@ def test_runs_and_discoveries_of_one_name_stood_in_one_table(call, tracked, earl
         store.client.set_terminated(run_id)
     code, _, err = call("compare", "both", "--out", tracked / "page.html")
     assert (code, err.strip().endswith("page.html: 2 runs, 1 discovery, 1 benchmark")) == (0, True)
+    assert call("compare", "both", "--out", tracked / "page.html")[0] == 0  # its own page is replaced
     html = (tracked / "page.html").read_text()
     tables = dict(re.findall(r'<section id="([^"]+)">(.*?)</section>', html, re.DOTALL))
     assert list(tables) == [

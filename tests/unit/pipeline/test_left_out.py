@@ -116,3 +116,16 @@ def test_the_records_are_simulated_once_for_each_piece_that_is_left_out(tmp_path
     monkeypatch.setattr(PhysicsModels, "series", lambda *given: counted.append(1) or whole(*given))
     left_out = load(small.model_copy(update={"cell": recalibrated})).left_out
     assert len(counted) == 1 + len(left_out.parts) + len(left_out.drives)
+
+
+def test_minutes_of_fits_to_long_records_passed_without_a_word(tmp_path):
+    begun = []
+    loaded = load(experiment(write_record(tmp_path)), begins=begun.append)
+    refits = len(loaded.left_out.parts) + len(loaded.left_out.drives)
+    assert begun == [
+        "records",
+        "initial states of the records",
+        "physics fitted to the training records",
+        f"physics refitted {refits} times without a part of the training drives",
+        "errors of the physics and their slopes",
+    ]

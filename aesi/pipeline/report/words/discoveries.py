@@ -221,8 +221,9 @@ def reason_finding(discovery: Mapping[str, Any]) -> str:
     if discovery["verdict"] == "found":
         return f"Why: with the finding added, {amount}; up to {allowed:.2f} mV count as explained."
     if left > allowed and not discovery.get("of_another_age"):
-        found = "with the finding added, " if discovery["effects"] else ""
-        why = f"Why: {found}{amount}; only up to {allowed:.2f} mV would count as explained."
+        chosen = "with the hypothesis that the search chose, " if _tried(discovery) else ""
+        under = "with the finding added, " if discovery["effects"] else chosen
+        why = f"Why: {under}{amount}; only up to {allowed:.2f} mV would count as explained."
         return f"{why} {OF_MEASURED}" if _tried(discovery) and not discovery.get("good") else why
     return f"Why: {discovery['reason']}."
 
