@@ -25,7 +25,6 @@ from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
 from aesi.physics.effects.self_heating import PARAMETERS
-from aesi.records import Measurement
 
 LEAST_CHANGE_K = 2.0
 """Least range of the temperatures of a record that is used, K."""
@@ -227,18 +226,10 @@ def _heat_w(model: Model, x: Array, index: int, kelvin: Array) -> Array:
     entropic = cell.positive.entropic(np.asarray(theta_p)) - cell.negative.entropic(np.asarray(theta_n))
     open_circuit = cell.rest_voltage_v(soc) + (kelvin - cell.reference_temperature_k) * entropic
     rows, current_a = model.records[index].rows, model.current_a(index, x)
-    delivered_w = _electric_w(rows) + (current_a - rows.current_a) * rows.voltage_v
+    # Current and voltage swing against each other within a row of a drive: the product of their averages lacks losses.
+    electric_w = rows.power_w if isinstance(rows, Averaged) else rows.current_a * rows.voltage_v
+    delivered_w = electric_w + (current_a - rows.current_a) * rows.voltage_v
     return current_a * (open_circuit - kelvin * entropic) - delivered_w
-
-
-def _electric_w(rows: Measurement) -> Array:
-    """(rows,) W at the terminals, I > 0 on discharge. Of averaged rows it is the average of the products: current and
-    voltage swing against each other within a row of a drive, and the product of their averages is without the losses of
-    that."""
-    if not isinstance(rows, Averaged):
-        return rows.current_a * rows.voltage_v
-    finer = rows.finer
-    return rows.window.record(finer.time_s, finer.current_a * finer.voltage_v)[1][rows.rows]
 
 
 def temperature_k(

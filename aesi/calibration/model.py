@@ -167,6 +167,12 @@ class Model:
         current = record.rows.current_a
         return current - self.zero.at(float(x[self.layout.zero])) * record.flows if record.slow else current
 
+    def load(self, index: int, x: Array) -> Record:
+        """The load of a record's simulation."""
+        record = self.records[index]
+        current = self.current_a(index, x)
+        return Record(record.rows.time_s, current, record.kelvin, unresolved_heat_w=record.unresolved_heat_w)
+
     def aged(self, cell: Cell, material: float, silicon: float) -> Cell:
         """The cell with these shares of its active material and of its silicon."""
         return replace(cell, negative=with_silicon(cell.negative, self.edge, silicon)).with_material(material)
@@ -189,7 +195,7 @@ class Model:
             most_substeps=MOST_STEPS,
         )
         soc = record.start.soc + record.soc_sd * float(x[self.layout.soc(index)])
-        load = Record(record.rows.time_s, self.current_a(index, x), record.kelvin)
+        load = self.load(index, x)
         rows, _, at, _ = solved(solver(self.model_name), model, load, soc, record.hold)
         return SolvedRows(*rows), at
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Protocol, cast
 
 import numpy as np
@@ -150,7 +151,41 @@ class Averaged(Measurement):
     def with_record(self, time_s: Array, current_a: Array) -> Averaged:
         """This record with the averages of another time (s) and current (A) of the finer record."""
         time, current = self.window.record(time_s, current_a)
-        return replace(self, time_s=time[self.rows], current_a=current[self.rows])
+        finer = replace(self.finer, time_s=time_s, current_a=current_a)
+        return replace(self, time_s=time[self.rows], current_a=current[self.rows], finer=finer)
+
+    @cached_property
+    def power_w(self) -> Array:
+        """(m,) W at the terminals, positive on discharge: the averages of the products of current and voltage."""
+        return self._as_current(self.finer.current_a * self.finer.voltage_v)
+
+    def unresolved_heat_w(self, hold: Hold) -> Array:
+        """(m,) W, mean over the step to each row (0 for the first) of the heat that a simulation of these rows lacks.
+
+            -(mean(I V) - mean(I) mean(V))        I > 0 on discharge
+
+        Within a row current and voltage swing against each other, so that more heat is released than by their averages.
+        Straight lines between the rows (`hold`) lose more, since they swing less than the rows; so do, less, those of
+        the finer record.
+        """
+        finer, current, voltage = self.finer, self.current_a, self._as_current(self.finer.voltage_v)
+        lost = current * voltage - self.power_w
+        if hold == "linear":
+            lost[1:] = 0.5 * (lost[1:] + lost[:-1])
+            lost_j = _lost_by_lines_j(self.time_s, current, voltage)
+            if self.window.hold == "linear":
+                lost_j -= np.interp(
+                    self.time_s,
+                    finer.time_s,
+                    _lost_by_lines_j(finer.time_s, finer.current_a, finer.voltage_v),
+                )
+            lost[1:] += np.diff(lost_j) / np.diff(self.time_s)
+        lost[:1] = 0.0
+        return lost
+
+    def _as_current(self, column: Array) -> Array:
+        """(m,) averages of a column (n,) over the times that the current of these rows is averaged over."""
+        return self.window.record(self.finer.time_s, column)[1][self.rows]
 
 
 def averaged_over(data: Measurement, step_s: float) -> Measurement:
@@ -231,6 +266,13 @@ def _averaged(data: Measurement, window: Averages) -> Averaged:
         window=window,
         rows=np.arange(len(time)),
     )
+
+
+def _lost_by_lines_j(time_s: Array, current_a: Array, voltage_v: Array) -> Array:
+    """(n,) J since the first row, by which the heat of a current that is linear between rows is less than that of the
+    mean of its rows."""
+    steps = -np.diff(current_a) * np.diff(voltage_v) * np.diff(time_s) / 6.0
+    return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def _held(time_s: Array, current_a: Array, at_s: Array) -> Array:

@@ -52,16 +52,19 @@ class Record:
 
     read_s : (n,) s, true time at which the voltage of each row was at the terminals; None: that of the current. Before
     the first row the current is that of the first row, after the last that of the last.
+    unresolved_heat_w : (n,) W, heat beyond that of the rows' current, see `simulate`; None for none. No effect acts on
+    it.
     """
 
     time_s: Array
     current_a: Array
     temperature_k: Array | None = None
     read_s: Array | None = None
+    unresolved_heat_w: Array | None = None
 
     def __post_init__(self) -> None:
         """The arrays become read-only views."""
-        _lock(self, "time_s", "current_a", "temperature_k", "read_s")
+        _lock(self, "time_s", "current_a", "temperature_k", "read_s", "unresolved_heat_w")
 
     def current_at(self, time_s: Array, backward: bool) -> Array:
         """(m,) A, current at times (m,) s.  backward : True where a row's current holds since the row before, else
@@ -83,7 +86,12 @@ class Record:
         turns[0] = True
         time = np.union1d(self.time_s[turns & (self.time_s < read.max())], read)
         kelvin = None if self.temperature_k is None else np.interp(time, self.time_s, self.temperature_k)
-        return Record(time, self.current_at(time, backward), kelvin), np.searchsorted(time, read)
+        heat_w = None
+        if self.unresolved_heat_w is not None:
+            held = np.append(0.0, self.unresolved_heat_w[1:])  # the first row ends no step
+            heat_w = np.append(0.0, np.diff(self._integral(held, time)) / np.diff(time))
+        record = Record(time, self.current_at(time, backward), kelvin, unresolved_heat_w=heat_w)
+        return record, np.searchsorted(time, read)
 
     def beside_voltage(self, backward: bool, mean: bool = False) -> Record:
         """The record with one row per reading of the voltage, and the current that flowed there.
@@ -97,7 +105,7 @@ class Record:
         read = self._snapped()
         current = self.current_at(read, backward)
         if backward and len(read) > 1:
-            means = np.diff(self._charge(read)) / np.diff(read)
+            means = np.diff(self._integral(self.current_a, read)) / np.diff(read)
             current[1:] = means if mean else np.where(self._whole_rows(read), current[1:], means)
         kelvin = self.temperature_k
         return Record(read, current, None if kelvin is None else np.interp(read, self.time_s, kelvin))
@@ -123,11 +131,14 @@ class Record:
         """(m,) number of the row that ends at a time or next after it."""
         return np.minimum(np.searchsorted(self.time_s, time_s), len(self.time_s) - 1)
 
-    def _charge(self, time_s: Array) -> Array:
-        """(m,) A s, charge that a held current has moved from the first row to times (m,) s."""
-        since, now = self.time_s, self.current_a
-        moved = np.concatenate([[0.0], np.cumsum(now[1:] * np.diff(since))])
-        outside = now[0] * np.minimum(time_s - since[0], 0.0) + now[-1] * np.maximum(time_s - since[-1], 0.0)
+    def _integral(self, held: Array, time_s: Array) -> Array:
+        """(m,) A s or J, integral from the first row to times (m,) s of a current or heat (n,) held since the row
+        before."""
+        since = self.time_s
+        moved = np.concatenate([[0.0], np.cumsum(held[1:] * np.diff(since))])
+        outside = held[0] * np.minimum(time_s - since[0], 0.0) + held[-1] * np.maximum(
+            time_s - since[-1], 0.0
+        )
         return np.asarray(np.interp(time_s, since, moved) + outside)
 
 

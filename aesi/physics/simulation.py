@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from sys import float_info
 from typing import Literal
@@ -79,6 +79,7 @@ def simulate(
     on_depletion: OnDepletion = "raise",
     model: ModelName = "espm",
     profiles: bool = False,
+    unresolved_heat_w: Numbers | None = None,
 ) -> Run:
     """Terminal voltage and states of `cell` under a current.
 
@@ -100,6 +101,10 @@ def simulate(
     default is "espm" even for a cell whose file was fitted with "dfn" (`Cell.fitted_with`); the commands follow the
     file.
     profiles : "dfn" only: whether to return profiles across the electrodes, see `Run.profiles`.
+    unresolved_heat_w : (n,) W, for rows that are averages: heat that the swing of current and voltage between them
+    releases beyond that of the averages, as a mean over the step to each row (the first ends none; see
+    `aesi.data.thinning.Averaged.unresolved_heat_w`). It adds to the heat of the model where the winding has a heat
+    balance, and does nothing elsewhere.
 
     Returns a Run with series c_sp, c_sn (mol/m3), c_e0, c_eL (mol/m3), soc, temperature_k.
     Raises SimulationError with time and electrode where the cell runs out, or where a clipped simulation has no
@@ -119,6 +124,8 @@ def simulate(
     solve = solver(model, profile_arrays)
     changed = model_with(cell, active)
     record = as_cell_saw(Record(time, current, _kelvin(temperature_degc, time)), active)
+    if unresolved_heat_w is not None:
+        record = replace(record, unresolved_heat_w=_checked_heat(unresolved_heat_w, time))
     if soc0 is None:
         soc0 = _soc_from_rest(changed, active, record.temperature_k, rest_voltage_v)
     else:
@@ -178,8 +185,9 @@ def _with_effect(model: EspmModel, active: ActiveEffect) -> EspmModel:
     return active.act(active.effect.on_model, model)
 
 
-Solver = Callable[[EspmModel, Array, Array, Array | None, float, Hold], Solution]
-"""(model, time, current, temperature or None, soc0, hold) -> the solution, of a model as `of_record` gives it."""
+Solver = Callable[[EspmModel, Array, Array, Array | None, float, Hold, Array | None], Solution]
+"""(model, time, current, temperature or None, soc0, hold, unresolved heat or None) -> the solution, of a model as
+`of_record` gives it."""
 
 
 def solver(model_name: str, profiles: dict[str, Array] | None = None) -> Solver:
@@ -210,7 +218,8 @@ def solved(solve: Solver, model: EspmModel, record: Record, soc0: float, hold: H
         if model.heat is None:
             temperature = None
     warm = None if temperature is None else _writable(temperature)
-    return solve(model, _writable(record.time_s), _writable(record.current_a), warm, soc0, hold)
+    heat_w = None if record.unresolved_heat_w is None else _writable(record.unresolved_heat_w)
+    return solve(model, _writable(record.time_s), _writable(record.current_a), warm, soc0, hold, heat_w)
 
 
 def _writable(row: Array) -> Array:
@@ -228,7 +237,7 @@ class _KeyedRecord:
     @classmethod
     def of(cls, record: Record) -> _KeyedRecord:
         digest = hashlib.blake2b(digest_size=16)
-        for channel in (record.time_s, record.current_a, record.temperature_k):
+        for channel in (record.time_s, record.current_a, record.temperature_k, record.unresolved_heat_w):
             digest.update(b"none" if channel is None else np.ascontiguousarray(channel).data)
         return cls(digest.digest(), record)
 
@@ -254,7 +263,13 @@ def _copied(solution: Solution) -> Solution:
 
 
 def _run_espm(
-    model: EspmModel, time: Array, current: Array, temperature_k: Array | None, soc0: float, hold: Hold
+    model: EspmModel,
+    time: Array,
+    current: Array,
+    temperature_k: Array | None,
+    soc0: float,
+    hold: Hold,
+    unresolved_heat_w: Array | None,
 ) -> Solution:
     if model.is_plain and temperature_k is None:
         rows, fault_at, fault = run_plain(model, time, current, soc0, hold)
@@ -262,7 +277,7 @@ def _run_espm(
         return rows, {"temperature_k": kelvin}, fault_at, fault
     from aesi.physics.espm.extended import run_extended
 
-    return run_extended(model, time, current, temperature_k, soc0, hold)
+    return run_extended(model, time, current, temperature_k, soc0, hold, unresolved_heat_w)
 
 
 def _depleted(fault_at: int, n: int) -> Array:
@@ -350,6 +365,14 @@ def _kelvin(temperature_degc: Numbers | None, time: Array) -> Array | None:
     check_temperature(degc)
     kelvin = degc + ZERO_CELSIUS_K
     return np.ascontiguousarray(np.broadcast_to(kelvin, time.shape))
+
+
+def _checked_heat(unresolved_heat_w: Numbers, time: Array) -> Array:
+    heat = numbers(unresolved_heat_w, "unresolved_heat_w")
+    if heat.shape != time.shape:
+        raise DataError(f"unresolved_heat_w has the shape {heat.shape}; give {len(time)} numbers, one a row.")
+    check_row(heat, "unresolved_heat_w")
+    return heat
 
 
 def _soc_from_rest(

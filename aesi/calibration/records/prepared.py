@@ -34,15 +34,16 @@ class Prepared:
     """One record for a calibration.
 
     data : as measured.  rows, hold : thinned rows for the simulation, and how their current runs.  kelvin : (rows,) K,
-    or None for the cell's own temperature.  start : state of charge at the first row.  soc_sd : its standard deviation
-    in the fit.  slow : see `is_slow`.  flows : (rows,) 1 where a current flows, else 0.
-    trusted : (rows,) see `Thinned`.
+    or None for the cell's own temperature.  unresolved_heat_w : (rows,) W, see `Averaged.unresolved_heat_w`; None for
+    rows as measured.  start : state of charge at the first row.  soc_sd : its standard deviation in the fit.
+    slow : see `is_slow`.  flows : (rows,) 1 where a current flows, else 0.  trusted : (rows,) see `Thinned`.
     """
 
     data: Measurement
     rows: Measurement
     hold: Hold
     kelvin: Array | None
+    unresolved_heat_w: Array | None
     start: InitialState
     soc_sd: float
     slow: bool
@@ -95,12 +96,13 @@ def _prepared(
         sd = max(start.sd, SOC_SD) if slow else 0.0
     else:
         sd = max(start.sd, least)
-    temperature = thin.data.temperature_degc
+    rows, temperature = thin.data, thin.data.temperature_degc
     return Prepared(
         data=data,
-        rows=thin.data,
-        hold=data.hold_taken if thin.data is data else thin.hold,
+        rows=rows,
+        hold=data.hold_taken if rows is data else thin.hold,
         kelvin=None if temperature is None else np.ascontiguousarray(temperature + ZERO_CELSIUS_K),
+        unresolved_heat_w=rows.unresolved_heat_w(thin.hold) if isinstance(rows, Averaged) else None,
         start=start,
         soc_sd=sd,
         slow=slow,

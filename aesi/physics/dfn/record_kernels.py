@@ -22,6 +22,7 @@ from aesi.physics.espm.transport_kernels import (
     renew_factors,
     solid_forcing,
     stepped_temperature,
+    with_unresolved,
 )
 
 SHORTER, SHORTEST = 0.25, 0.25**6
@@ -108,7 +109,8 @@ def step_porous_record(  # type: ignore[no-untyped-def]
                 power = 0.0
                 if steps > 0 and fault_at < 0:
                     power = power_in_range(p, s, e, state, t, half, i1, phi_n, phi_p, t_k)
-                t_k = heated(start_k, mean_heat(watts, power, t.before[0], t.total[0]), dt, e.heat, around_k)
+                mean = with_unresolved(mean_heat(watts, power, t.before[0], t.total[0]), drive, k)
+                t_k = heated(start_k, mean, dt, e.heat, around_k)
                 watts = power
         voltage = voltage_of(s, e, state, t, phi_n, phi_p, t.total[0])
         if k == 0 and e.heat[0] > 0.0:

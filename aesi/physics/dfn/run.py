@@ -28,6 +28,8 @@ def run_porous_electrode(
     temperature_k: Array | None,
     soc0: float,
     hold: Hold,
+    unresolved_heat_w: Array | None = None,
+    *,
     profiles: dict[str, Array] | None = None,
 ) -> tuple[Array, dict[str, Array], int, int]:
     """As `extended.run_extended`: (rows (7, n), further states by name, sample of the first fault, its kind).
@@ -45,7 +47,8 @@ def run_porous_electrode(
     profile = np.zeros((kept, 4, len(electrodes.node_share)))
     salt_profile = np.zeros((kept, len(stack.to_nodes)))
     steps = LONGER_STEPS * model.substep_s, model.most_substeps, model.step_refinement
-    drive = Drive(time, current, kelvin, temperature_k is not None, hold == "backward", *steps)
+    heat_w = np.empty(0) if unresolved_heat_w is None else unresolved_heat_w
+    drive = Drive(time, current, kelvin, temperature_k is not None, hold == "backward", *steps, heat_w)
     theta0 = np.array(model.cell.stoichiometries(soc0))
     fault_at, fault = step_porous_record(
         drive, theta0, particles, stack, electrodes, state, trial, newton, weights, out, profile, salt_profile

@@ -40,11 +40,17 @@ from aesi.records import Hold
 
 
 def run_extended(
-    model: EspmModel, time: Array, current: Array, temperature_k: Array | None, soc0: float, hold: Hold
+    model: EspmModel,
+    time: Array,
+    current: Array,
+    temperature_k: Array | None,
+    soc0: float,
+    hold: Hold,
+    unresolved_heat_w: Array | None = None,
 ) -> tuple[Array, dict[str, Array], int, int]:
     """(rows as of `plain.run_plain`, further states by name, sample of the first fault (-1 for none), its kind).
 
-    model : that of the record, see `of_record`.
+    model : that of the record, see `of_record`.  unresolved_heat_w : (n,) W, see `simulate`.
     """
     from aesi.physics.espm.extended_kernels import step_extended_record
 
@@ -52,7 +58,8 @@ def run_extended(
     theta0 = np.array(model.cell.stoichiometries(soc0))
     kelvin = temperature_k if temperature_k is not None else np.array([model.cell.initial_temperature_k])
     steps = model.substep_s, model.most_substeps, model.step_refinement
-    drive = Drive(time, current, kelvin, temperature_k is not None, hold == "backward", *steps)
+    heat_w = np.empty(0) if unresolved_heat_w is None else unresolved_heat_w
+    drive = Drive(time, current, kelvin, temperature_k is not None, hold == "backward", *steps, heat_w)
     arguments = extended_arguments(model)
     fault_at, fault = step_extended_record(
         drive, theta0, *arguments, *_memory(*arguments[:2], model.regions), out

@@ -33,6 +33,7 @@ from aesi.physics.espm.transport_kernels import (
     renew_weights,
     solid_forcing,
     stepped_temperature,
+    with_unresolved,
 )
 
 GAS_OVER_FARADAY = GAS_CONSTANT_J_MOL_K / FARADAY_C_MOL
@@ -99,7 +100,8 @@ def step_extended_record(  # type: ignore[no-untyped-def]
                 if fault_at < 0 and 0.0 <= theta_n <= 1.0 and 0.0 <= theta_p <= 1.0:
                     power = reaction_heat(t_k, cell, particles, surfaces, memory, modes.means) - i1 * voltage
                 if k > 0:
-                    t_k = heated(start_k, mean_heat(watts, power, i0, i1), dt, heat, around_k)
+                    mean = with_unresolved(mean_heat(watts, power, i0, i1), drive, k)
+                    t_k = heated(start_k, mean, dt, heat, around_k)
                 watts = power
         out[0, k], out[7, k] = voltage, t_k
         what = record_sample(k, particles, memory, modes, dissolved.c, electrolyte.c0, out)

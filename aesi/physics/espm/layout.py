@@ -24,6 +24,7 @@ class Drive(NamedTuple):
     time, current : (n,) s, A.  temperature : K, (n,) where `has_temperature`, else (1,) at the start.
     backward : a row's current holds since the row before.  substep, most : s and count of the steps within a row.
     finer : see `EspmModel.step_refinement`.
+    unresolved_heat : (n,) W, see `aesi.physics.effect.Record`; (0,) for none.
     """
 
     time: Array
@@ -34,6 +35,7 @@ class Drive(NamedTuple):
     substep: float
     most: int
     finer: float
+    unresolved_heat: Array
 
 
 class Units(NamedTuple):

@@ -186,6 +186,14 @@ def mean_heat(start, end, i0, i1):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", fastmath=FASTMATH)
+def with_unresolved(watts, drive, k):  # type: ignore[no-untyped-def]
+    """Heat, W, with the part that the rows do not resolve in the step to sample k."""
+    if drive.unresolved_heat.shape[0] > 0:
+        watts += drive.unresolved_heat[k]
+    return watts
+
+
+@njit(inline="always", fastmath=FASTMATH)
 def heated(t_k, watts, dt, heat, around_k):  # type: ignore[no-untyped-def]
     """Temperature after a step of constant heating; heat : capacity J/K, conductance W/K.  around_k : surroundings."""
     if heat[1] * dt < 1e-9 * heat[0]:
@@ -204,7 +212,7 @@ def stepped_temperature(drive, k, share, start_k, watts, dt, heat):  # type: ign
     if drive.has_temperature:
         around_k = measured[k - 1] + (measured[k] - measured[k - 1]) * share
     if heat[0] > 0.0:
-        t_k = heated(start_k, watts, dt, heat, around_k)
+        t_k = heated(start_k, with_unresolved(watts, drive, k), dt, heat, around_k)
     elif drive.has_temperature:
         t_k = around_k
     else:

@@ -12,6 +12,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from aesi.data.thinning import Averaged
+from aesi.numerics.typing import Array
 from aesi.parameters import Parameter
 from aesi.physics import simulate
 from aesi.physics.cell import Cell
@@ -68,6 +70,12 @@ def stepping(data: Measurement) -> tuple[ActiveEffect, ...]:
     return (EFFECT.activate(substep_s=min(max(typical, DEFAULT_SUBSTEP_S), LONGEST_STEP_S)),)
 
 
+@lru_cache(maxsize=64)
+def unresolved_heat_w(data: Measurement, hold: Hold) -> Array | None:
+    """(n,) W, see `Averaged.unresolved_heat_w`; None for rows as measured."""
+    return data.unresolved_heat_w(hold) if isinstance(data, Averaged) else None
+
+
 def fit_simulation(
     cell: Cell,
     data: Measurement,
@@ -103,4 +111,5 @@ def fit_simulation(
         rest_voltage_v=rest_voltage_v,
         on_depletion="clip",
         model=model,
+        unresolved_heat_w=unresolved_heat_w(data, hold),
     )

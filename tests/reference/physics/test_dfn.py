@@ -170,7 +170,9 @@ VARYING = {"negative_slope": -1.5, "positive_slope": 1.0}
 def test_lithium_is_kept_in_each_electrode_and_salt_in_the_electrolyte(peer, effects):
     active = [CATALOGUE[name].activate(**values) for name, values in effects.items()]
     model, profiles = model_with(peer.cell, active), {}
-    rows = run_porous_electrode(model, peer.time, peer.current, None, peer.soc0, "linear", profiles)[0]
+    rows = run_porous_electrode(model, peer.time, peer.current, None, peer.soc0, "linear", profiles=profiles)[
+        0
+    ]
     passed = float(np.trapezoid(peer.current, peer.time)) / 3600.0
     assert abs(passed) > 0.01 * peer.cell.capacity_ah
     stored = layer_charge_ah(model, profiles["potential_v"])

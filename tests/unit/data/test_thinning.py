@@ -86,3 +86,54 @@ def test_the_rows_on_both_sides_of_a_step_stand_for_themselves():
         (place,) = np.flatnonzero(thin.time_s == at_s)
         assert rows[place] == 1.0
         assert thin.voltage_v[place] == data.voltage_v[int(at_s)]
+
+
+def swinging(hold, *, n=2001, ohm=0.05):
+    """2 A with 1 A up and down from row to row, at 10 Hz, through a resistance."""
+    current = 2.0 + np.where(np.arange(n) % 2 == 0, 1.0, -1.0)
+    return Measurement(0.1 * np.arange(n), current, 4.0 - ohm * current, hold=hold)
+
+
+@pytest.mark.parametrize(("hold", "share"), [("backward", 1.0), ("linear", 1.0 / 3.0)])
+def test_the_heat_that_averages_lose_is_that_of_the_swing_within_them(hold, share):
+    """R times the variance: 0.05 ohm * 1 A2 where a current is held, a third of it in straight lines."""
+    thin = averaged_over(swinging(hold), step_s=1.0)
+    np.testing.assert_allclose(thin.current_a[1:], 2.0)
+    heat_w = thin.unresolved_heat_w("linear")
+    assert heat_w[0] == 0.0
+    np.testing.assert_allclose(heat_w[3:], 0.05 * share, rtol=1e-9)
+    np.testing.assert_allclose(thin.take(slice(0, 50)).unresolved_heat_w("linear"), heat_w[:50], rtol=1e-9)
+
+
+def test_the_heat_that_averages_lose_is_of_the_current_as_it_was_seen():
+    """An instrument's fault is undone on the rows as measured: a current twice as large has twice the heat beside the
+    voltage as measured, and a constant one none."""
+    data = swinging("backward")
+    thin = averaged_over(data, step_s=1.0)
+    for factor in (2.0, 0.0):
+        seen = thin.with_record(data.time_s, factor * data.current_a)
+        expected = factor * thin.unresolved_heat_w("linear")
+        np.testing.assert_allclose(seen.unresolved_heat_w("linear"), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("hold", ["backward", "linear"])
+def test_averages_of_steady_currents_lose_no_heat(hold):
+    time = np.arange(6000.0)
+    current = np.where(time % 2000.0 < 1200.0, 5.0, 0.0)
+    data = Measurement(time, current, 4.0 - 0.02 * current - 1e-5 * time, hold=hold)
+    thin, _ = condensed(data, 5.0, 100.0, Spacing(first_s=1.0, growth=0.5), hold)
+    assert len(thin) < len(data) / 10
+    np.testing.assert_allclose(thin.unresolved_heat_w(hold), 0.0, atol=1e-9)
+
+
+def test_averages_lose_no_heat_over_a_gap():
+    data = swinging("linear", n=400)
+    apart = Measurement(
+        np.concatenate([data.time_s, 3600.0 + data.time_s]),
+        np.concatenate([np.zeros(400), np.full(400, 3.0)]),
+        np.concatenate([np.full(400, 4.0), np.full(400, 3.8)]),
+        hold="linear",
+    )
+    thin = averaged_over(apart, step_s=1.0)
+    assert len(thin) < 90
+    np.testing.assert_allclose(thin.unresolved_heat_w("linear"), 0.0, atol=1e-9)
