@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path as FilePath
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,6 +31,7 @@ from aesi.tracer.decide.evidence import Answer, Evidence, searched_answer
 from aesi.tracer.decide.good_records import searched_answer_beside
 from aesi.tracer.decide.model_choice import ModelChoice, with_model
 from aesi.tracer.decide.other_hold import inferred_holds
+from aesi.tracer.decide.own_heat import heat_of_file, with_heat_told
 from aesi.tracer.decide.temperatures import (
     contradicting_unseen,
     other_temperatures,
@@ -175,7 +177,8 @@ def discover(
     measurements and not on these.
 
     Where the data are explained better if the current of a record that declares no hold runs otherwise between its rows
-    than it was assumed to, they are searched again so.
+    than it was assumed to, they are searched again so. Where nothing explains records without a temperature, they are
+    searched again with a cell that warms itself by the thermal data of its file (`decide.own_heat`).
 
     Raises DataError where the data cannot decide anything or do not belong to the cell.
     """
@@ -184,28 +187,6 @@ def discover(
         raise DataError("give at least one measurement to look at.")
     for data in (*measurements, *good, *tests):
         check_voltage(cell, data)
-    problem_with = partial(
-        inverse_problem,
-        cell,
-        measurements,
-        soc0,
-        0.0 if tests else holdout,
-        effects,
-        given,
-        model or "espm",
-        good,
-    )
-
-    def tests_with(inferred: Mapping[int, InferredHold]) -> tuple[PreparedRecord, ...]:
-        holds = (_hold_of_test(data, measurements, inferred.values()) for data in tests)
-        return tuple(
-            prepare_test(cell, data, measurements, soc0, given, hold)
-            for data, hold in zip(tests, holds, strict=True)
-        )
-
-    inferred: dict[int, InferredHold] = {}
-    problem, tested = problem_with(), tests_with(inferred)
-    _check_case(problem, tested)
     spent = _Spent(progress)
 
     def search(
@@ -218,11 +199,44 @@ def discover(
     def archive_of(one: InverseProblem, other_model: Archive | None) -> Archive:
         return Archive(archive, context_of(one), other_model)
 
-    evidence, choice = with_model(problem, model, search, archive_of, max_effects)
-    while others := inferred_holds(evidence.paths.get("tight", evidence.path)):
-        inferred |= others
-        evidence, choice = with_model(problem_with(inferred=inferred), model, search, archive_of, max_effects)
-        tested = tests_with(inferred)
+    def searched(declared: Sequence[ActiveEffect]) -> _Searched:
+        problem_with = partial(
+            inverse_problem,
+            cell,
+            measurements,
+            soc0,
+            0.0 if tests else holdout,
+            effects,
+            declared,
+            model or "espm",
+            good,
+        )
+
+        def tests_with(inferred: Mapping[int, InferredHold]) -> tuple[PreparedRecord, ...]:
+            holds = (_hold_of_test(data, measurements, inferred.values()) for data in tests)
+            return tuple(
+                prepare_test(cell, data, measurements, soc0, declared, hold)
+                for data, hold in zip(tests, holds, strict=True)
+            )
+
+        inferred: dict[int, InferredHold] = {}
+        problem, tested = problem_with(), tests_with(inferred)
+        _check_case(problem, tested)
+        evidence, choice = with_model(problem, model, search, archive_of, max_effects)
+        while others := inferred_holds(evidence.paths.get("tight", evidence.path)):
+            inferred |= others
+            evidence, choice = with_model(
+                problem_with(inferred=inferred), model, search, archive_of, max_effects
+            )
+            tested = tests_with(inferred)
+        return _Searched(evidence, choice, tested)
+
+    evidence, choice, tested = searched(given)
+    heat = heat_of_file(evidence)
+    if heat is not None and max_effects:
+        warm = searched((*given, heat))
+        if told := with_heat_told(warm.evidence, evidence):
+            evidence, choice, tested = warm._replace(evidence=told)
     found = _discovery_of(
         evidence,
         choice,
@@ -288,6 +302,14 @@ def _restating(effects: Mapping[str, Effect]) -> set[str]:
     """Ids of the effects that restate declared parameters. They may be tried even where they are given: a parameter
     that was corrected once may still be off."""
     return {effect.id for effect in effects.values() if effect.restates_declared}
+
+
+class _Searched(NamedTuple):
+    """A search with its model choice and its test records."""
+
+    evidence: Evidence
+    choice: ModelChoice
+    tested: tuple[PreparedRecord, ...]
 
 
 class _Spent:

@@ -127,9 +127,6 @@ def _truth(case: RealCase, data: Measurement, declared: Cell) -> Truth:
         if full.temperature_degc is None:
             raise DataError(f"{full.name} has no column of temperature.")
         measured_degc = full.temperature_degc
-    if case.measured == "temperature" and measured_degc is not None:
-        reference_degc = declared.initial_temperature_k - ZERO_CELSIUS_K
-        parameters["ambient_temperature.shift_k"] = float(np.mean(measured_degc)) - reference_degc
     if case.against is not None:
         other_ah = taken(case.against).charge_ah
         by_file = case.measured == "declared capacity"
@@ -151,7 +148,10 @@ def _scored_row(
 
     data, declared, given_soc0 : record, cell and initial state of charge as the tracer had them, with the fault.
     """
-    row = answer_scores(case.answers, truth.parameters, content) | {"residual": _residual(found)}
+    parameters = dict(truth.parameters)
+    if case.measured == "temperature" and truth.temperature_degc is not None:
+        parameters["ambient_temperature.shift_k"] = _shift_k(found, declared, truth.temperature_degc)
+    row = answer_scores(case.answers, parameters, content) | {"residual": _residual(found)}
     if truth.temperature_degc is not None:
         row |= temperature_row(found, data, truth.temperature_degc)
     if truth.lost is not None:
@@ -161,6 +161,14 @@ def _scored_row(
     if case.fault and case.fault.kind == "wrong_soc0" and given_soc0 is not None and case.soc0 is not None:
         row |= initial_state_row(data.name, given_soc0, case.soc0, content)
     return row
+
+
+def _shift_k(found: Discovery, declared: Cell, measured_degc: Array) -> float:
+    """K, true temperature minus the declared one: of the surroundings, at which the record begins, where the answer has
+    a cell that warms itself from there; else the mean over the record.  measured_degc : (n,) degC, of the case."""
+    warms = any(active.id == "self_heating" for active in found.model_effects)
+    measured = measured_degc[0] if warms else np.mean(measured_degc)
+    return float(measured) - (declared.initial_temperature_k - ZERO_CELSIUS_K)
 
 
 def taken(take: Take) -> Measurement:

@@ -1,0 +1,50 @@
+"""Records without a temperature, of a cell that warms itself under load as its file says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from aesi.physics.effect import ActiveEffect
+from aesi.physics.effects import self_heating
+from aesi.tracer.decide.evidence import Evidence
+from aesi.tracer.search.plausible import ALIKE_NATS
+
+
+def heat_of_file(evidence: Evidence) -> ActiveEffect | None:
+    """The self-heating that the cell's file declares, of a case that nothing explains at a constant temperature; None
+    where a temperature was measured, where self-heating is in the model or was not to be tried, and where the file
+    lacks a heat capacity or a conductance to the surroundings.
+
+    A constant temperature is an approximation: what a cell loses warms it. One effect at a time, the search does not
+    come to both: of a cell in the cold a constant temperature explains too little, and the heat of a warm cell nothing.
+    """
+    problem = evidence.path.problem
+    asked = evidence.verdict.word == "unknown" and not problem.has_good
+    measured = any(record.data.temperature_degc is not None for record in problem.records)
+    cell = problem.cell
+    declared = cell.heat_capacity_j_k is not None and cell.conductance_w_k is not None
+    if not asked or measured or not declared or self_heating.EFFECT.id not in problem.competing():
+        return None
+    return self_heating.of_file(cell)
+
+
+def nats_ahead(warm: Evidence, evidence: Evidence) -> float:
+    """How much more the answer of a search with the file's heat says of unseen data than that without it, nats."""
+    cold = evidence.paths.get(warm.path.problem.trust, evidence.path)
+    return warm.path.chosen.score.total - cold.chosen.score.total
+
+
+def with_heat_told(warm: Evidence, evidence: Evidence) -> Evidence | None:
+    """The evidence of the search with the file's heat, with a sentence on it; None where the data speak against it, by
+    `ALIKE_NATS`, the least that tells two hypotheses apart."""
+    ahead = nats_ahead(warm, evidence)
+    if ahead < -ALIKE_NATS:
+        return None
+    heat = next(active for active in warm.path.problem.fixed if active.id == self_heating.EFFECT.id)
+    cooling = f"{heat.parameters['heat_transfer_w_k']:.3g} W/K to the surroundings"
+    note = (
+        "no temperature was measured: every model, the declared one, too, warms itself by the thermal data of the "
+        f"cell's file ({cooling}), which says {abs(ahead):.1f} nats {'more' if ahead >= 0.0 else 'less'} of unseen "
+        "data than a constant temperature."
+    )
+    return replace(warm, limits=(note, *warm.limits))
