@@ -74,7 +74,11 @@ def refitted_off_bounds(
         x = fitter.descend(np.array(x0), PRIORS[problem.trust].nearest(fit.score.size), FIT_ROUNDS)
         archive.put(name, x)
     found = fitter.finished(x)
-    return fit if found is None or found.score.total < fit.score.total else found
+    if found is None or found.score.total < fit.score.total:
+        return fit
+    # All later questions are put to this one.
+    archive.fits[fit_name(problem, "fit", fit.hypothesis)] = found
+    return found
 
 
 def _from_the_middle(fitter: HypothesisFitter, prior: SizePrior) -> Array:
