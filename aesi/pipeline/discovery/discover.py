@@ -251,6 +251,7 @@ def discovery_content(
         "schema": SCHEMA,
         "verdict": verdict.word,
         "effects": list(verdict.effects),
+        "chosen": list(found.chosen),
         "written": list(found.written),
         "written_parameters": {name: dict(values) for name, values in found.written.items()},
         "tried": list(found.tried),
