@@ -412,7 +412,16 @@ def discovery_view(
         discovery=content,
         traces=tuple(
             DiscoveryTrace(
-                f.name, f.part, f.time_s, f.current_a, f.soc, f.measured_v, *(f.voltages[s] for s in STATES)
+                f.name,
+                f.part,
+                f.time_s,
+                f.current_a,
+                f.soc,
+                f.measured_v,
+                f.voltages["before"],
+                f.voltages["recalibrated"],
+                f.voltages["after"],
+                f.hold,
             )
             for f in found.files
         ),
