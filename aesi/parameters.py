@@ -84,7 +84,8 @@ class Parameter:
             )
         own = "Give one within, or wider bounds"
         self.check("default", self.default, own)
-        if self.neutral is not None and not self.log:
+        # A logarithmic scale does not reach the zero at which an effect may vanish.
+        if self.neutral is not None and not (self.log and self.neutral == 0.0):
             self.check("neutral", self.neutral, own)
 
     def check(self, name: str, value: float, otherwise: str = "") -> float:

@@ -209,7 +209,16 @@ def fit_traces(found: Calibration) -> tuple[DiscoveryTrace, ...]:
         soc = start_soc(model, x, i) - rows.discharged_ah(record.hold) / capacity_ah
         out.append(
             DiscoveryTrace(
-                record.name, "fit", rows.time_s, rows.current_a, soc, rows.voltage_v, start, simulated, fitted
+                record.name,
+                "fit",
+                rows.time_s,
+                rows.current_a,
+                soc,
+                rows.voltage_v,
+                start,
+                simulated,
+                fitted,
+                record.hold,
             )
         )
     return tuple(out)

@@ -59,8 +59,8 @@ def numbers(values: object, name: str) -> Array:
     """Any sequence of numbers as a float64 array of its shape.
 
     name : how the sentence calls it.
-    Raises DataError for what conversion would refuse without saying which (text), or take for other numbers (dates,
-    whose unit is the library's own; complex ones; what is masked).
+    Raises DataError for what conversion would refuse without saying which (text), or take for other numbers (truth
+    values; dates, whose unit is the library's own; complex ones; what is masked).
     """
     if np.ma.isMaskedArray(values):
         masked = np.argwhere(np.atleast_1d(np.ma.getmaskarray(values)))
@@ -72,6 +72,10 @@ def numbers(values: object, name: str) -> Array:
         kind = np.asarray(values).dtype.kind
     except ValueError:  # numpy's word for rows within a row that differ in length
         raise DataError(f"{name} holds rows of several lengths; give one row of numbers.") from None
+    if kind == "b":
+        raise DataError(
+            f"{name} holds truth values; give numbers, as np.where(on, 2.5, 0.0) does for 2.5 where on."
+        )
     if kind in "mM":
         raise DataError(
             f"{name} holds dates or durations; give numbers, as (dates - dates[0]).total_seconds() does."

@@ -95,7 +95,7 @@ class Measurement:
     """One continuous test of one cell; lists and pandas columns are converted to arrays of floats, arrays are copied.
 
     time_s, current_a, voltage_v : (n,) s (strictly increasing), A (discharge positive), V (NaN where it is unknown).
-    temperature_degc : (n,) degC, or None where it was not measured.
+    temperature_degc : (n,) degC, or one value for all rows; None where it was not measured.
     notes : what a reader dropped, mapped or resampled, one sentence each.
     hold : declared course of the current between rows, or None; `hold_taken` says how it is taken then.
     examined_digest : content hash of the rows that a reader examined; empty where none did.
@@ -127,8 +127,12 @@ class Measurement:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        """Raises DataError, naming column and row, for columns that are not numbers or differ in length, and for an
-        unknown hold."""
+        """Raises DataError, naming column and row, for columns that are not numbers or differ in length, for a name
+        that is no text, and for an unknown hold."""
+        if not isinstance(self.name, str):
+            raise DataError(
+                f"the name of a measurement is {self.name!r}, which is no text; leave it out, or give one."
+            )
         if self.hold is not None and self.hold not in get_args(Hold):
             words = " or ".join(map(repr, get_args(Hold)))
             raise DataError(f"{self.name}: hold = {self.hold!r} is not known; give {words}, or leave it out.")
@@ -143,6 +147,8 @@ class Measurement:
             if getattr(self, label) is not None
         }
         time = columns["time_s"]
+        if "temperature_degc" in columns and not columns["temperature_degc"].ndim:
+            columns["temperature_degc"] = np.full(time.shape, columns["temperature_degc"])
         for label, column in columns.items():
             if label != "voltage_v":  # which may be unknown
                 check_row(column, f"{self.name}: {label}")

@@ -102,6 +102,7 @@ class Discovery:
     soc0 : of the first record: fitted state of charge at the first row, in the stoichiometry windows of `cell`.
     hold : how the current runs between the rows of all records, as they declare or as was inferred; None where they
     differ or do not.
+    chosen : effects of the hypothesis that the search chose, by id; the verdict need not name them.
     written : effects of the written model by id, with their parameters; they differ from the verdict's where these do
     not carry over.  own : model -> the declared parameters that were fitted, and their values.
     candidates : each effect that was simulated, best first.  files : errors by file and part.
@@ -140,6 +141,7 @@ class Discovery:
     other_temperature: tuple[str, ...] = ()
     good: tuple[str, ...] = ()
     held: tuple[ActiveEffect, ...] = ()
+    chosen: tuple[str, ...] = ()
     written: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     own: Mapping[State, tuple[OwnParameter, ...]] = field(default_factory=dict)
     tried: tuple[str, ...] = ()
@@ -381,6 +383,7 @@ def _discovery_of(
         ),
         other_temperature=tuple(at_other),
         good=tuple(record.name for record in records if record.good),
+        chosen=evidence.path.chosen.hypothesis,
         written={name: (evidence.after.values or {})[name] for name in evidence.after.hypothesis},
         own={state: own_parameters(fits[state]) for state in ("recalibrated", "after")},
         tried=tuple(name for name in problem.competing() if _was_tried(evidence, name)),

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -68,10 +68,15 @@ class ExperimentJob:
         self._publish(folder, summary, config)
         return folder
 
+    def _begins(self, stage: str) -> Callable[[str], None]:
+        """Says each long part of a stage as it begins."""
+        return partial(self.console.begins, stage)
+
     def _load(self) -> Loaded:
         stage = "data and physics"
-        begins = partial(self.console.begins, stage)
-        loaded = self.run(stage, lambda: load(self.config, self.request.sources, begins), retries=2)
+        loaded = self.run(
+            stage, lambda: load(self.config, self.request.sources, self._begins(stage)), retries=2
+        )
         for note in loaded.notes:
             self.console.say(f"  {note}")
         return loaded
@@ -108,10 +113,15 @@ class ExperimentJob:
     def _fit(self, found: StudyResult, config: ExperimentConfig, problem: Problem) -> FinalModels:
         cache = Cache(self.console.say, not self.anew)
         key = (config.digest, found.key)
+        stage = "final models"
         models = self.run(
-            "final models",
+            stage,
             lambda: final_models(
-                problem, found.chosen, config, lambda name, fit: cache.get(f"model {name}", key, fit)
+                problem,
+                found.chosen,
+                config,
+                lambda name, fit: cache.get(f"model {name}", key, fit),
+                self._begins(stage),
             ),
         )
         for note in models.unfitted:
@@ -124,8 +134,10 @@ class ExperimentJob:
         self, models: FinalModels, found: StudyResult, problem: Problem, loaded: Loaded
     ) -> tuple[Fitted, ...]:
         config, left_out = loaded.config, loaded.left_out
+        stage = "intervals"
+        begins = self._begins(stage)
         return self.run(
-            "intervals", lambda: conformalise(models.fitted, problem, found.chosen, config, left_out)
+            stage, lambda: conformalise(models.fitted, problem, found.chosen, config, left_out, begins)
         )
 
     def _evaluate(

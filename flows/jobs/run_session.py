@@ -40,12 +40,13 @@ class DiskFull(AesiError):
 def working_on(request: RunRequest, store: Store, console: Console) -> Iterator[tuple[Tracker, RunRecord]]:
     """The tracked run to work on, new or resumed, and its record; closed as what it becomes.
 
-    Raises DiskFull, with what to do, where there is no room for what the run has to keep, and RunTaken where another
-    process works on the run that is to be gone on with.
+    Raises DiskFull, with what to do, where there is no room for what the run has to keep, RunTaken where another
+    process works on the run that is to be gone on with, and StoreAway where the store fails before the run has begun.
     """
     config = request.config
     with _advice_where_full(request), ExitStack() as held:
-        tracker, record = _begin(request, config, store, console, held)
+        with store.in_use():
+            tracker, record = _begin(request, config, store, console, held)
         kept = f"Everything so far is kept; go on with: {request.resuming}"
         with kept_on_interrupt(kept), _ended_as_it_ends(record, tracker, console):
             yield tracker, record
@@ -73,9 +74,10 @@ def tracked_job(subject: Subject, title: str, console: Console) -> Iterator[Trac
         return
     try:
         store = Store(subject.tracking.uri)
-        _close_killed(subject.name, store, console)
-        deliver_leftovers(store, console.say)
-        tracker = Tracker(store, subject, console.say, title=title)
+        with store.in_use():
+            _close_killed(subject.name, store, console)
+            deliver_leftovers(store, console.say)
+            tracker = Tracker(store, subject, console.say, title=title)
     except StoreAway as error:
         console.say(f"not tracked: {error}")
         yield None

@@ -266,6 +266,16 @@ class Store:
         """True for a failure that passes: no connection, a locked database, a full disk, a server in trouble."""
         return _passes(error) or not self._answers()
 
+    @contextmanager
+    def in_use(self) -> Iterator[None]:
+        """Within, a failure of the opened store raises StoreAway, as one at its opening does, with what to do."""
+        from mlflow.exceptions import MlflowException
+
+        try:
+            yield
+        except MlflowException as error:
+            raise _unusable(self.uri, error) from error
+
     def _answers(self) -> bool:
         try:
             self.client.search_experiments(max_results=1)

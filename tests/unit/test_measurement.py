@@ -48,12 +48,29 @@ def test_a_range_was_told_by_two_figures_that_read_the_same():
         ({"voltage_v": None}, "drive: voltage_v is None; give one row of numbers, NaN for unknown voltages"),
         ({"time_s": None}, "drive: time_s is None"),
         ({"current_a": [[1.0], [2.0, 3.0]]}, "drive: current_a holds rows of several lengths"),
+        ({"current_a": np.array([False, True])}, "drive: current_a holds truth values; give numbers"),
+        ({"name": None}, "the name of a measurement is None, which is no text; leave it out, or give one"),
+        ({"temperature_degc": np.nan}, "drive: temperature_degc is nan in row 1"),
     ],
 )
 def test_a_record_that_cannot_be_was_made_and_failed_where_it_was_used(changes, sentence):
     columns = {"time_s": [0.0, 1.0], "current_a": [1.0, 1.0], "voltage_v": [3.7, 3.6], "name": "drive"}
     with pytest.raises(DataError, match=sentence):
         Measurement(**(columns | changes))
+
+
+def test_a_temperature_of_all_rows_was_refused_where_a_simulation_takes_one():
+    record = Measurement([0.0, 1.0, 2.0], np.zeros(3), np.full(3, 3.7), temperature_degc=25.0)
+    np.testing.assert_array_equal(record.temperature_degc, [25.0, 25.0, 25.0])
+    assert (
+        record.digest == Measurement([0.0, 1.0, 2.0], np.zeros(3), np.full(3, 3.7), np.full(3, 25.0)).digest
+    )
+
+
+def test_a_current_that_is_a_condition_was_simulated_as_one_ampere():
+    time_s = np.arange(10.0)
+    with pytest.raises(DataError, match="current_a holds truth values; give numbers"):
+        aesi.simulate(aesi.Cell.from_bpx(BPX), time_s, time_s > 5.0, 0.5)
 
 
 @pytest.mark.parametrize(("offset", "told"), [(0.0, "2.5 s"), (1.7e9, "1700000002.5 s")])

@@ -85,10 +85,20 @@ def _cell_figures(rows: Sequence[CaseRow]) -> dict[str, Any]:
     ]
     if best:
         figures["best_in_hindsight"] = _mean_and_worst("mser_recalibrated_pct", best, of_failed)
-    if BEST in home[0]:
-        gaps = [abs(r["validation_mser_pct"][BEST] - r["models"][BEST]["mser_pct"]) for r in good]
+    gaps = [abs(valid - test) for valid, test in _validated(good)]
+    if gaps:
         figures["validation_minus_test"] = {"median": float(np.median(gaps)), "worst": max(gaps)}
     return figures
+
+
+def _validated(rows: Sequence[CaseRow]) -> list[tuple[float, float]]:
+    """(validation figure, test figure) of AESI I, per cent, for each run that has both; a split with fewer than two
+    pieces to leave out has no validation figure."""
+    return [
+        (row["validation_mser_pct"][BEST], row["models"][BEST]["mser_pct"])
+        for row in rows
+        if BEST in row["models"] and BEST in row["validation_mser_pct"]
+    ]
 
 
 def _band_figures(models: Sequence[Mapping[str, Any]]) -> dict[str, float]:
@@ -136,8 +146,8 @@ def table(rows: Sequence[CaseRow]) -> list[str]:
     A field of the first table is `mean / worst split`, each split with its mean over the seeds. Columns named after a
     model are the reduction of the declared model's squared error by it, per cent. `validation minus test` is the
     absolute difference of these two reductions by AESI I, `median / worst`. `coverage` is over all rows, then that of
-    the worst drive. Fields of a band are empty if a run has none. Failed runs count as in `summary`, and are listed
-    between the two tables.
+    the worst drive. Fields of a band are empty if a run has none, and those of the validation if no split has two
+    pieces to leave out. Failed runs count as in `summary`, and are listed between the two tables.
     rows : each with the figures of all of IN_TABLE, or with an `error`.
     """
     ran = [row for row in rows if row.get("verdict") != NOT_RUN]
@@ -165,23 +175,19 @@ def _over_seeds(rows: Sequence[CaseRow]) -> dict[str, Any]:
 
     `home` and, for each test record at another temperature, `abroad` : model -> mean figures; `against` in them is the
     reduction of the recalibrated model's squared error, per cent. `validation` and `gap` : the validation figure and
-    its absolute difference from the test figure, both of AESI I, percentage points.
+    its absolute difference from the test figure, both of AESI I, percentage points; None if the split has none.
     """
     good = [row for row in rows if "error" not in row]
     first, share = good[0], len(good) / len(rows)
-    validation_pct = [row["validation_mser_pct"][BEST] for row in good]
+    validated = _validated(good)
     return {
         "split": first["split"],
         "seeds": len(rows),
         "one_drive": first["cell"] in ("hg2", "panasonic"),
         "home": _mean_figures([row["models"] for row in good], share),
         "abroad": {n: _mean_figures([row["abroad"][n] for row in good]) for n in first.get("abroad", {})},
-        "validation": float(np.mean(validation_pct)),
-        "gap": float(
-            np.mean(
-                [abs(v - r["models"][BEST]["mser_pct"]) for v, r in zip(validation_pct, good, strict=True)]
-            )
-        ),
+        "validation": float(np.mean([valid for valid, _ in validated])) if validated else None,
+        "gap": float(np.mean([abs(valid - test) for valid, test in validated])) if validated else None,
     }
 
 
@@ -218,8 +224,8 @@ def _cell_rows(
             cells = (title, str(failed), str(len(lost[0])), *["0.0 / 0.0"] * 3, "", "", "")
             yield f"| {' | '.join(cells)} |"
         return
-    gaps = [split["gap"] for split in splits]
-    gap_words = f"{np.median(gaps):.1f} / {max(gaps):.1f}"
+    gaps = [split["gap"] for split in splits if split["gap"] is not None]
+    gap_words = f"{np.median(gaps):.1f} / {max(gaps):.1f}" if gaps else ""
     yield _cell_row(title, splits, [s["home"] for s in splits], failed, gap_words)
     for name in dict.fromkeys(name for split in splits for name in split["abroad"]):
         tested = [split for split in splits if name in split["abroad"]]
@@ -262,7 +268,8 @@ def _fields(*of_bands: tuple[Mapping[str, float], str]) -> str:
 
 def _split_lines(split: Mapping[str, Any]) -> Iterator[str]:
     where = "that drive" if split["one_drive"] else "the others"
-    yield _split_row(split["split"], where, split["home"], f"{split['validation']:.1f}")
+    validation = "" if split["validation"] is None else f"{split['validation']:.1f}"
+    yield _split_row(split["split"], where, split["home"], validation)
     for name, models in split["abroad"].items():
         yield _split_row("", name, models, "")
 

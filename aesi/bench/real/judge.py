@@ -14,7 +14,7 @@ from aesi.bench.limit import LOST, NO_TIME, NOT_RUN, NoAnswer, Stopwatch, answer
 from aesi.bench.real.answers import answer_scores, initial_state_row
 from aesi.bench.real.case import RealCase, Take
 from aesi.bench.real.faults import declared_with_fault, soc0_with_fault, with_fault
-from aesi.bench.real.references import capacity_row, resistance_row, temperature_row
+from aesi.bench.real.references import Witness, capacity_row, resistance_row, temperature_row, witness_of
 from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.data import read_measurement
 from aesi.data.catalogue import locate
@@ -24,7 +24,7 @@ from aesi.numerics.typing import Array
 from aesi.physics import Cell
 from aesi.pipeline.discovery.budget import MOST_ROWS
 from aesi.pipeline.discovery.discover import HOLDOUT, discovery_content
-from aesi.records import Measurement, Spectrum
+from aesi.records import Measurement
 from aesi.tracer import Discovery, discover
 from aesi.tracer.report.outcome import STATES
 
@@ -106,19 +106,20 @@ class Truth:
     """What is known of the cell and of the record, for the score.
 
     parameters : `effect.parameter` -> true value, SI.  temperature_degc : (n,) degC, the temperature that was withheld
-    from the tracer.  lost : measured loss of capacity as a share.  spectra : impedance measured beside the record.
+    from the tracer.  lost : measured loss of capacity as a share.  witness : impedance measured beside the record.
     """
 
     parameters: Mapping[str, float]
     temperature_degc: Array | None
     lost: float | None
-    spectra: tuple[Spectrum, ...]
+    witness: Witness | None
 
 
 def _truth(case: RealCase, data: Measurement, declared: Cell) -> Truth:
     """The truth of a case from its description and the records that it names.
 
-    data : the record of the case, without a fault.  Raises DataError if one of the records is not available.
+    data : the record of the case, without a fault.  Raises DataError if one of the records is not available, and if its
+    spectra do not show the resistances.
     """
     parameters = dict(case.parameters)
     measured_degc, lost = None, None
@@ -131,8 +132,10 @@ def _truth(case: RealCase, data: Measurement, declared: Cell) -> Truth:
         other_ah = taken(case.against).charge_ah
         by_file = case.measured == "declared capacity"
         lost = 1 - (other_ah / declared.capacity_ah if by_file else data.charge_ah / other_ah)
-    spectra = () if case.spectra is None else read_spectra(locate(case.take.set, case.spectra))
-    return Truth(parameters, measured_degc, lost, spectra)
+    witness = None
+    if case.spectra is not None:
+        witness = witness_of(read_spectra(locate(case.take.set, case.spectra)), declared)
+    return Truth(parameters, measured_degc, lost, witness)
 
 
 def _scored_row(
@@ -156,8 +159,8 @@ def _scored_row(
         row |= temperature_row(found, data, truth.temperature_degc)
     if truth.lost is not None:
         row |= capacity_row(found, declared, truth.lost)
-    if truth.spectra:
-        row |= resistance_row(found, declared, truth.spectra)
+    if truth.witness is not None:
+        row |= resistance_row(found, declared, truth.witness)
     if case.fault and case.fault.kind == "wrong_soc0" and given_soc0 is not None and case.soc0 is not None:
         row |= initial_state_row(data.name, given_soc0, case.soc0, content)
     return row

@@ -47,6 +47,23 @@ class Resistances:
     transfer_ohm: float
 
 
+@dataclass(frozen=True, eq=False)
+class Witness:
+    """The measured spectrum that a written model is compared with, and its resistances."""
+
+    spectrum: Spectrum
+    measured: Resistances
+
+
+def witness_of(spectra: Sequence[Spectrum], declared: Cell) -> Witness:
+    """The spectrum nearest to half charge.
+
+    Raises DataError if the resistances cannot be read from it (`measured_resistances`).
+    """
+    spectrum = nearest_half_charge(spectra, declared)
+    return Witness(spectrum, measured_resistances(spectrum))
+
+
 def temperature_row(found: Discovery, record: Measurement, measured_degc: Array) -> dict[str, float]:
     """Comparison of the temperature in the written model with the measured one.
 
@@ -82,14 +99,10 @@ def capacity_row(found: Discovery, declared: Cell, lost: float) -> dict[str, flo
     }
 
 
-def resistance_row(found: Discovery, declared: Cell, spectra: Sequence[Spectrum]) -> dict[str, float]:
-    """The resistances (1) of the measured spectrum nearest to half charge, of the written model and of the declared
-    one, mohm, and the relative errors of those of the written model.
-
-    Raises DataError if the resistances cannot be read from the spectrum (`measured_resistances`).
-    """
-    spectrum = nearest_half_charge(spectra, declared)
-    measured = measured_resistances(spectrum)
+def resistance_row(found: Discovery, declared: Cell, witness: Witness) -> dict[str, float]:
+    """The resistances (1) of the measured spectrum, of the written model and of the declared one, mohm, and the
+    relative errors of those of the written model."""
+    spectrum, measured = witness.spectrum, witness.measured
     ours, before = (
         model_resistances(cell, effects, state_of(declared, spectrum), degc_of(spectrum))
         for cell, effects in ((found.cell, found.model_effects), (declared, ()))

@@ -105,17 +105,19 @@ class Case:
         """Sentences on effects that are not tried, so that nobody reads the verdict as one about them, and on
         options that are not used."""
         only, without = (
-            ", ".join(name.strip() for names in given for name in names.split(","))
+            [name.strip() for names in given for name in names.split(",")]
             for given in (self.only, self.without)
         )
+        competing = self.competing() if only and self.max_effects else ()
+        alone = [name for name in only if name in competing]
         few = "1 effect is" if self.max_effects == 1 else f"{self.max_effects} effects are"
         said = {
             "no effect is tried (at most 0 are added), so that none can be found.": self.max_effects == 0,
             f"at most {few} added, as asked; what more effects explain together is not looked for.": (
                 0 < self.max_effects < Case.max_effects
             ),
-            f"tried alone: {only}; nothing is said about other effects.": bool(only and self.max_effects),
-            f"not tried: {without}.": bool(without and self.max_effects),
+            f"tried alone: {', '.join(alone)}; nothing is said about other effects.": bool(alone),
+            f"not tried: {', '.join(without)}.": bool(without and self.max_effects),
             f"test records are given, so that the holdout of {self.holdout or 0.0:g} is not used: all rows of the data "
             "are looked at.": bool(self.tests and self.holdout),
         }
@@ -163,8 +165,14 @@ class Case:
         return declared_model(self.cell).with_soh(self.soh)
 
     def tried(self) -> dict[str, Effect]:
-        """The effects that compete.  Raises InputError for an effect file or an id that is none."""
+        """The effects that may be tried.  Raises InputError for an effect file or an id that is none."""
         return selected(known_effects(self.effect_files), self.only, self.without)
+
+    def competing(self) -> tuple[str, ...]:
+        """Ids of those that the declared model has not already. One that restates declared parameters may be tried
+        again: a parameter that was corrected once may still be off."""
+        given = {one.id for one in self.declared().effects}
+        return tuple(name for name, one in self.tried().items() if name not in given or one.restates_declared)
 
 
 def run_case(case: Case, out: Path | None = None, progress: Progress | None = None) -> Discovery:
@@ -251,6 +259,7 @@ def discovery_content(
         "schema": SCHEMA,
         "verdict": verdict.word,
         "effects": list(verdict.effects),
+        "chosen": list(found.chosen),
         "written": list(found.written),
         "written_parameters": {name: dict(values) for name, values in found.written.items()},
         "tried": list(found.tried),
@@ -411,7 +420,16 @@ def discovery_view(
         discovery=content,
         traces=tuple(
             DiscoveryTrace(
-                f.name, f.part, f.time_s, f.current_a, f.soc, f.measured_v, *(f.voltages[s] for s in STATES)
+                f.name,
+                f.part,
+                f.time_s,
+                f.current_a,
+                f.soc,
+                f.measured_v,
+                f.voltages["before"],
+                f.voltages["recalibrated"],
+                f.voltages["after"],
+                f.hold,
             )
             for f in found.files
         ),

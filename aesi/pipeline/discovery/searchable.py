@@ -22,7 +22,7 @@ def searchable(case: Case) -> Case:
 
 def _check_some_tried(case: Case) -> None:
     """Raises InputError where effects may be added, and the declared model has each that may be tried already."""
-    tried, given = case.tried(), {one.id for one in case.declared().effects}
-    if case.max_effects and all(name in given and not one.restates_declared for name, one in tried.items()):
+    if case.max_effects and not case.competing():
+        tried = case.tried()
         had = f"the declared model has {listed([*tried])} already" if tried else "every effect is left out"
         raise InputError(f"{had}, so that none is left to try; name another one, or restrict them less.")

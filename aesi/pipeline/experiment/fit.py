@@ -91,18 +91,23 @@ def _fit_again(name: str, fit: Callable[[], Fitted]) -> Fitted:
 
 
 def final_models(
-    problem: Problem, chosen: Candidate, config: ExperimentConfig, keep: KeepModel = _fit_again
+    problem: Problem,
+    chosen: Candidate,
+    config: ExperimentConfig,
+    keep: KeepModel = _fit_again,
+    begins: Callable[[str], None] = lambda part: None,
 ) -> FinalModels:
     """The models that the experiment names, in its order: physics, the two ensembles of the chosen candidate,
     baselines.
 
     keep : called with the fit of each baseline, whose result it may take from an earlier run. The others need no fit.
+    begins : called with the name of each model that is fitted: a fit takes minutes where records are long.
     A baseline that cannot be fitted is left out, so that the result of the search is not lost for it.
     Raises FitError if no model is left.
     """
     fitted, unfitted = [], []
     for name in config.models:
-        fit = partial(_fit, name, problem, chosen, config)
+        fit = partial(_fit, name, problem, chosen, config, begins)
         try:
             fitted.append(keep(name, fit) if name in BASELINES else fit())
         except FitError as error:
@@ -112,7 +117,15 @@ def final_models(
     return FinalModels(tuple(fitted), tuple(unfitted))
 
 
-def _fit(name: str, problem: Problem, chosen: Candidate, config: ExperimentConfig) -> Fitted:
+def _fit(
+    name: str,
+    problem: Problem,
+    chosen: Candidate,
+    config: ExperimentConfig,
+    begins: Callable[[str], None],
+) -> Fitted:
+    if name in BASELINES:
+        begins(name)
     started = time.monotonic()
     trials: list[Mapping[str, Any]] = []
     model, terms = _model(

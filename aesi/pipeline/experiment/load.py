@@ -429,11 +429,11 @@ def _sampling_sentences(
     one_step = "one step ahead they are of rows as measured"
     if ahead < LEAST_ROWS:
         one_step = (
-            f"one step ahead, {ahead} of its rows lie a step after another one, and figures need {LEAST_ROWS} such "
-            "rows of all test records"
+            f"one step ahead, {ahead} rows lie a step after another one, and figures need {LEAST_ROWS} such rows of "
+            "all test records"
         )
     return [
-        f"{measurement.name}: its rows do not lie every {dt_s:g} s. In free run, errors and bands are of {of_what}; "
+        f"{measurement.name}: the rows do not lie every {dt_s:g} s. In free run, errors and bands are of {of_what}; "
         f"{one_step}."
     ]
 

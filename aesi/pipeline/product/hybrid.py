@@ -158,8 +158,7 @@ class HybridModel:
         """
         free = voltage_v is None
         measured = np.full(np.shape(time_s), np.nan) if free else numbers(voltage_v, "voltage_v")
-        warm = _each_row(temperature_degc, np.shape(time_s))
-        record = Measurement(time_s, current_a, measured, warm, "the record")
+        record = Measurement(time_s, current_a, measured, temperature_degc, "the record")
         return self.predict_record(record, soc0, one_step=not free, error0_v=error0_v, soc0_sd=soc0_sd)
 
     def predict_record(
@@ -454,10 +453,3 @@ def _as_saved(file: Path) -> Iterator[None]:
         raise InputError(f"{file} lacks {error}; save the model again.") from None
     except (TypeError, ValueError, AttributeError, IndexError) as error:
         raise InputError(f"{file} is not as it was saved ({error}); save the model again.") from None
-
-
-def _each_row(temperature_degc: Numbers | None, rows: tuple[int, ...]) -> Array | None:
-    if temperature_degc is None:
-        return None
-    given = numbers(temperature_degc, "temperature_degc")
-    return given if given.ndim else np.full(rows, given)

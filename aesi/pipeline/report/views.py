@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from aesi.numerics.typing import Array, BoolArray
-from aesi.records import Role
+from aesi.records import Hold, Role
 
 Row = Mapping[str, Any]
 
@@ -108,7 +108,10 @@ class RunView:
 
 @dataclass(frozen=True, eq=False)
 class DiscoveryTrace:
-    """One measured file: (n,) V of the model as declared, with its own parameters refitted, and augmented."""
+    """One measured file: (n,) V of the model as declared, with its own parameters refitted, and augmented.
+
+    hold : how its current was taken to run between its rows.
+    """
 
     name: str
     part: Literal["fit", "test"]
@@ -119,6 +122,7 @@ class DiscoveryTrace:
     before_v: Array
     recalibrated_v: Array
     after_v: Array
+    hold: Hold = "linear"
 
 
 @dataclass(frozen=True)

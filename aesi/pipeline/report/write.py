@@ -81,7 +81,7 @@ def write_discovery_report(path: str | Path, view: DiscoveryView) -> Path:
         written=discoveries.discovery_consequence(view),
         finding=discoveries.discovery_finding(view),
         sentences=_said(
-            discoveries.reason_finding(view.discovery),
+            discoveries.reason_finding(view.discovery, view.titles),
             discoveries.next_finding(view.discovery, view.titles),
             discoveries.look_alike_finding(view.discovery, view.titles),
             *moved_findings(view.discovery),

@@ -1,6 +1,7 @@
 """Which run is gone on with: one that the tracking store has no more is none."""
 
 import json
+import re
 import shutil
 import time
 from contextlib import ExitStack
@@ -14,7 +15,7 @@ from flows.jobs.run_request import RunRequest
 from flows.jobs.run_session import _close_killed, _unfinished, resume_key, tracked_job, working_on
 from flows.tracking.leftovers import deliver_leftovers
 from flows.tracking.run_records import RunLock, RunRecord, RunTaken, records
-from flows.tracking.store import Store
+from flows.tracking.store import Store, StoreAway
 from flows.tracking.tracker import Subject, Tracker
 
 
@@ -154,6 +155,29 @@ def test_a_run_that_others_work_on_is_neither_closed_nor_delivered(store, unfini
     assert said == []
     assert (box / "00000001.json").exists()
     assert record.again().status == "running"
+
+
+def test_a_store_that_failed_after_it_was_opened_ended_a_job_whose_results_lie_elsewhere(
+    store, unfinished, workspace, monkeypatch, capsys
+):
+    """And an experiment, which has to be tracked, ended in a traceback."""
+    from mlflow.exceptions import MlflowException
+
+    def fails(self, run_id):
+        raise MlflowException("API request failed with error code 500")
+
+    _, record = unfinished
+    replace(record, status="running").write()
+    monkeypatch.setattr(Store, "holds", fails)
+    with tracked_job(Subject("small", 0, "key", "batch"), "title", Console()) as tracker:
+        assert tracker is None
+    told = "cannot be used (API request failed with error code 500)"
+    assert re.match(f"not tracked: the tracking store .* {re.escape(told)}; ", capsys.readouterr().err)
+    with (
+        pytest.raises(StoreAway, match=re.escape(told)),
+        working_on(RunRequest(str(workspace / "small.yaml")), store, Console()),
+    ):
+        pass
 
 
 def test_a_file_that_a_job_left_over_was_sought_from_the_folder_of_the_next(

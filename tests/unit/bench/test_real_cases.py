@@ -7,13 +7,15 @@ import numpy as np
 import pytest
 
 from aesi.bench.detectable import seen_on_measured
-from aesi.bench.limit import NO_TIME
+from aesi.bench.limit import NO_TIME, NOT_RUN
 from aesi.bench.physics.cells import _of_archive
 from aesi.bench.real import chosen, judged, plan, summary, table, write_report
 from aesi.bench.real.answers import answer_scores, initial_state_row
 from aesi.bench.real.faults import declared_with_fault, soc0_with_fault, with_fault
 from aesi.bench.real.judge import _truth, declared_cell, taken
 from aesi.bench.real.references import measured_resistances, model_resistances
+from aesi.data.catalogue import locate
+from aesi.data.spectra import read_spectra
 from aesi.physics import Cell
 from aesi.physics.effect import Record
 from aesi.physics.effects import CATALOGUE
@@ -365,9 +367,23 @@ def test_a_withheld_temperature_is_in_the_answer_and_not_in_the_data(shared_data
 
 
 def test_the_spectra_of_a_witness_are_those_of_its_month(shared_data):
-    _, _, truth = known("witness-10degC_hppc")
-    assert len(truth.spectra) == 13
-    assert {round(s.temperature_degc) for s in truth.spectra} == {10}
+    case, _, truth = known("witness-10degC_hppc")
+    spectra = read_spectra(locate(case.take.set, case.spectra))
+    assert len(spectra) == 13
+    assert {round(s.temperature_degc) for s in (*spectra, truth.witness.spectrum)} == {10}
+
+
+def test_a_spectrum_without_a_zero_crossing_ended_every_case(monkeypatch):
+    hz = np.geomspace(0.01, 1e3, 20)
+    capacitive = Spectrum("month", hz, 0.02 + 0.01 / (1 + 1j * hz), soc=0.5)
+    monkeypatch.setattr("aesi.bench.real.judge.locate", lambda *names: names)
+    monkeypatch.setattr("aesi.bench.real.judge.declared_cell", lambda *names: None)
+    monkeypatch.setattr("aesi.bench.real.judge.taken", lambda take: None)
+    monkeypatch.setattr("aesi.bench.real.judge.read_spectra", lambda path: (capacitive,))
+    case = next(case for case in plan() if case.group == "witness")
+    row = judged(case, CELLS)
+    assert row["verdict"] == NOT_RUN
+    assert row["error"].startswith("month shows no ohmic resistance: its imaginary part has to cross zero")
 
 
 def test_a_case_whose_process_was_ended_entered_the_median_as_no_time_at_all():

@@ -140,6 +140,16 @@ def test_the_table_has_each_split_by_its_mean_over_the_seeds_and_the_worst_split
     assert summary(rows)["failed"] == 1
 
 
+def test_a_split_without_two_pieces_to_leave_out_ended_the_summary():
+    lone = row("nmc 1+2", "nmc", 0, 80.0) | {"validation_mser_pct": {}}
+    assert "validation_minus_test" not in summary([lone])["all"]["nmc"]
+    assert any("| 80.0 | 20.0 |  | 90.0 |" in line for line in table([lone]))
+    both = [lone, row("nmc 1+3", "nmc", 0, 60.0)]
+    assert summary(both)["all"]["nmc"]["validation_minus_test"] == {"median": 10.0, "worst": 10.0}
+    nmc = next(line for line in table(both) if line.startswith("| NMC pouch"))
+    assert "| 10.0 / 10.0 | 90.0 / 80.0 |" in nmc
+
+
 def failed(split: str, cell: str, seed: int, verdict: dict[str, str] | None = None) -> dict:
     return {
         key: value

@@ -153,6 +153,7 @@ def discovery_view(n=4000, seed=0, verdict="found"):
             "schema": "aesi.discovery/1",
             "verdict": verdict,
             "effects": effects,
+            "chosen": {"found": effects, "none": [], "unknown": ["series_resistance"]}[verdict],
             "indistinguishable": [["self_heating", "ambient_temperature"]] if effects else [],
             "confidence": 0.97,
             "before": {"fit": {"rmse_mv": 8.1}, "test": {"rmse_mv": 9.4}},

@@ -156,6 +156,8 @@ def test_a_search_for_what_the_declared_model_has_is_refused(tmp_path):
     with pytest.raises(InputError, match="every effect is left out, so that none is left to try"):
         case_of_files(BPX, [record], without=[*CATALOGUE])
     assert case_of_files(model, [record], only=["self_heating"], max_effects=0).kept_back > 0.0
+    both = case_of_files(model, [record], only=["film_growth,self_heating"])
+    assert "tried alone: film_growth; nothing is said about other effects." in both.restrictions
     # A parameter that was corrected once may still be off.
     assert "series_resistance" in case_of_files(model, [record], only=["series_resistance"]).tried()
 

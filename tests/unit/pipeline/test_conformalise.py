@@ -65,3 +65,15 @@ def test_the_first_sample_of_a_drive_calibrated_intervals_of_physics_as_predicte
 
     (residual_v,) = intervals._intervals([(Bare(), problem.split.train[0], slice(0, 50))], config, Given())
     np.testing.assert_array_equal(np.isfinite(residual_v), np.arange(50) > 0)
+
+
+def test_minutes_of_fits_and_of_calibration_passed_without_a_word(faded):
+    problem, chosen, config = faded
+    config = config.model_copy(update={"models": ("ESPM", "AESI I", "DMD with control")})
+    begun = []
+    fits = final_models(problem, chosen, config, begins=begun.append)
+    assert begun == ["DMD with control"]  # no other model has a fit of its own
+    final_models(problem, chosen, config, lambda name, fit: fits.fitted[-1], begun.append)
+    assert begun == ["DMD with control"]  # taken from an earlier run
+    intervals.conformalise(fits.fitted[:2], problem, chosen, config, begins=begun.append)
+    assert begun[1:] == ["ESPM", "AESI I"]

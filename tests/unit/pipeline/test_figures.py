@@ -340,6 +340,14 @@ def test_what_was_measured_is_a_wider_black_line(views):
     assert widths["measured"][1] > widths["as written"][1]
 
 
+def test_a_current_that_a_row_holds_since_the_row_before_was_drawn_in_straight_lines(views):
+    trace = views.discovery_trace("a", "test", 300, np.random.default_rng(0))
+    held = [trace, replace(trace, hold="backward")]
+    fig = records.residual_figure(held, {"before": "as declared"})
+    shapes = [(t.name, t.line.shape) for t in fig.data if t.line.shape != "linear"]
+    assert shapes == [("current", "vh")]  # vertical at the row before, then along up to its own
+
+
 def test_a_prediction_outside_its_own_interval_is_explained(views):
     trace = views.trace("t", "test", 500, np.random.default_rng(0))
     fig = records.interval_figure([trace], "ESPM + AESI I")

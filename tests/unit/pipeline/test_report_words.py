@@ -548,9 +548,18 @@ def test_the_verdict_says_what_it_rests_on(views, verdict, phrases):
 
 def test_the_error_of_what_the_search_chose_was_taken_for_that_of_the_written_model(views):
     """1.04 mV beside the 18.05 mV of the model in model/, which holds none of what the search chose."""
-    unknown = {**views.discovery_view(200, verdict="unknown").discovery, "effects": []}
+    view = views.discovery_view(200, verdict="unknown")
+    assert discoveries.reason_finding(view.discovery, {"series_resistance": "contacts"}).startswith(
+        "Why: with the hypothesis that the search chose (contacts), the voltage error beyond sensor noise is 4.00 mV in"
+    )
+
+
+@pytest.mark.parametrize("changed", [{"chosen": []}, {"good": ["reference"]}])
+def test_the_error_of_the_bare_model_was_told_as_that_of_a_hypothesis(views, changed):
+    """Beside good records, a verdict without a name is on the model without an effect."""
+    unknown = views.discovery_view(200, verdict="unknown").discovery | changed
     assert discoveries.reason_finding(unknown).startswith(
-        "Why: with the hypothesis that the search chose, the voltage error beyond sensor noise is 4.00 mV in"
+        "Why: with no effect added, the voltage error beyond sensor noise is 4.00 mV in"
     )
 
 

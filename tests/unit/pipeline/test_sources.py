@@ -184,6 +184,8 @@ def test_rows_that_were_filled_in_between_those_of_a_record_were_fitted_and_judg
     near = {name: np.interp(stamps_s, rows["time_s"], rows[name]) for name in rows} | {"time_s": stamps_s}
     pd.DataFrame(near).to_csv(apart, index=False)
     (told,) = (note for note in load(experiment(apart)).notes if "do not lie every" in note)
+    # Joined with those of other records, it was a sentence on one of them: "a, b: its rows".
+    assert told.startswith("apart: the rows do not lie every 1 s.")
     assert "are of voltages filled in between rows" in told
     (told,) = (
         note

@@ -106,6 +106,14 @@ def test_a_wave_that_no_effect_makes_is_unknown(cell, few, make):
     assert found.verdict.word == "unknown"
     assert found.verdict.effects == ()
     assert found.verdict.structured_v == pytest.approx(8e-3, rel=0.3)
+    # What the search chose is no part of the verdict, and is told all the same.
+    content = discovery_content(found)
+    assert content["chosen"] == list(found.chosen)
+    choice = "the choice of the search, with which too much is left unexplained"
+    rows = {row["effect"]: row for row in content["candidates"]}
+    assert found.chosen
+    assert all(set(rows[name]["hypothesis"]) >= set(found.chosen) for name in found.chosen)
+    assert any(row["remark"] == choice for row in rows.values())
 
 
 def test_an_unknown_without_an_effect_to_add_does_not_say_that_the_catalogue_was_tried(cell, few, make):

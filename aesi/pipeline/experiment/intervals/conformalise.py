@@ -5,7 +5,7 @@ This module does not read `Split.test`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import overload
 
@@ -36,6 +36,7 @@ def conformalise(
     chosen: Candidate,
     config: ExperimentConfig,
     left_out: LeftOutDrives | None = None,
+    begins: Callable[[str], None] = lambda part: None,
 ) -> tuple[Fitted, ...]:
     """The models with intervals one step ahead and bands of the free run.
 
@@ -43,8 +44,13 @@ def conformalise(
     fitted without it; the physics models also on the training records.
     left_out : the training drives under physics that was fitted without some of their rows; by default they are under
     the physics as it is. Bands are calibrated on left-out parts of drives and on whole left-out drives.
+    begins : called with the name of each model whose turn it is: one takes minutes where records are long.
     """
-    return tuple(_conformalised(one, problem, chosen, config, left_out or LeftOutDrives()) for one in models)
+    calibrated = []
+    for one in models:
+        begins(one.model.name)
+        calibrated.append(_conformalised(one, problem, chosen, config, left_out or LeftOutDrives()))
+    return tuple(calibrated)
 
 
 def _conformalised(

@@ -136,7 +136,7 @@ def residual_figure(traces: Sequence[DiscoveryTrace], labels: Mapping[str, str])
             voltage = getattr(trace, f"{state}_v")
             line(fig, item.x, voltage, labels[state], style.STATE_COLOURS[state], 1, in_legend=False)
         line(fig, item.x, trace.measured_v, "measured", style.MEASURED, 1, i == 0, style.MEASURED_WIDTH)
-        line(fig, item.x, trace.current_a, "current", style.GREY, 2, i == 0, 1.0)
+        line(fig, item.x, trace.current_a, "current", style.GREY, 2, i == 0, 1.0, trace.hold)
         for state, label in labels.items():
             error = (trace.measured_v - getattr(trace, f"{state}_v")) * MV_PER_V
             line(fig, item.x, error, label, style.STATE_COLOURS[state], 3, i == 0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,10 +12,13 @@ from aesi.numerics.typing import Array
 from aesi.over_time import time_unit
 from aesi.pipeline.report import style
 from aesi.pipeline.report.views import DiscoveryTrace, RecordTrace
+from aesi.records import Hold
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
+SHAPES: Mapping[Hold, str] = {"linear": "linear", "backward": "vh"}
+"""Plotly's name for the line: of what a row holds since the row before, up or down there, and then along."""
 OUTSIDE = "outside the trained range"
 WHOLE_S = 10.0
 """Seconds from which on the start of a part is told to the second."""
@@ -49,11 +52,12 @@ def line(
     row: int = 1,
     in_legend: bool = True,
     width: float = 1.2,
+    hold: Hold = "linear",
 ) -> None:
     """Add a series over time to panel `row`; the page thins it for display and refines it on zoom.
 
     in_legend : once for each name. The lines of one name, of several records or panels, are switched together.
-    width : px.
+    width : px.  hold : how the series runs between its rows.
     """
     fig.add_scatter(
         x=x,
@@ -62,7 +66,7 @@ def line(
         name=name,
         legendgroup=name,
         showlegend=in_legend,
-        line={"color": colour, "width": width},
+        line={"color": colour, "width": width, "shape": SHAPES[hold]},
         meta={"keep": "minmax"},
         row=row,
         col=1,

@@ -206,7 +206,7 @@ def written_finding(discovery: Mapping[str, Any]) -> str:
     return f"{text}."
 
 
-def reason_finding(discovery: Mapping[str, Any]) -> str:
+def reason_finding(discovery: Mapping[str, Any], titles: Mapping[str, str] | None = None) -> str:
     """A sentence on what the verdict rests on: the error left beyond the noise against what any such model may
     leave."""
     left, allowed = discovery["structured_mv"], discovery["tolerance_mv"]
@@ -221,11 +221,24 @@ def reason_finding(discovery: Mapping[str, Any]) -> str:
     if discovery["verdict"] == "found":
         return f"Why: with the finding added, {amount}; up to {allowed:.2f} mV count as explained."
     if left > allowed and not discovery.get("of_another_age"):
-        chosen = "with the hypothesis that the search chose, " if _tried(discovery) else ""
-        under = "with the finding added, " if discovery["effects"] else chosen
+        under = (
+            "with the finding added, " if discovery["effects"] else _under_unnamed(discovery, titles or {})
+        )
         why = f"Why: {under}{amount}; only up to {allowed:.2f} mV would count as explained."
         return f"{why} {OF_MEASURED}" if _tried(discovery) and not discovery.get("good") else why
     return f"Why: {discovery['reason']}."
+
+
+def _under_unnamed(discovery: Mapping[str, Any], titles: Mapping[str, str]) -> str:
+    """Words for the hypothesis that the error of an `unknown` without names is of; '' where no effect was tried."""
+    if not _tried(discovery):
+        return ""
+    # Beside good records the verdict without a name is on the model without an effect, whatever the search chose.
+    chosen = [] if discovery.get("good") else discovery["chosen"]
+    if not chosen:
+        return "with no effect added, "
+    names = listed([_title(titles, effect) for effect in chosen])
+    return f"with the hypothesis that the search chose ({names}), "
 
 
 def next_finding(discovery: Mapping[str, Any], titles: Mapping[str, str] | None = None) -> str:
