@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,13 +13,13 @@ from aesi.bench.physics.cells import _of_archive
 from aesi.bench.real import chosen, judged, plan, summary, table, write_report
 from aesi.bench.real.answers import answer_scores, initial_state_row
 from aesi.bench.real.faults import declared_with_fault, soc0_with_fault, with_fault
-from aesi.bench.real.judge import _truth, declared_cell, taken
+from aesi.bench.real.judge import _shift_k, _truth, declared_cell, taken
 from aesi.bench.real.references import measured_resistances, model_resistances
 from aesi.data.catalogue import locate
 from aesi.data.spectra import read_spectra
 from aesi.physics import Cell
 from aesi.physics.effect import Record
-from aesi.physics.effects import CATALOGUE
+from aesi.physics.effects import CATALOGUE, self_heating
 from aesi.records import Measurement, Spectrum
 
 CELLS = "experiments/cells"
@@ -361,7 +362,11 @@ def test_a_withheld_temperature_is_in_the_answer_and_not_in_the_data(shared_data
     case, data, truth = known("withheld-lg_18650hg2-10degC_us06")
     assert data.temperature_degc is None
     assert len(truth.temperature_degc) == len(data)
-    assert truth.parameters["ambient_temperature.shift_k"] == pytest.approx(10.9 - 25, abs=0.3)
+    declared = declared_cell(case.cell, CELLS)
+    constant = SimpleNamespace(model_effects=())
+    warmed = SimpleNamespace(model_effects=(self_heating.of_file(declared),))
+    assert _shift_k(constant, declared, truth.temperature_degc) == pytest.approx(10.9 - 25, abs=0.3)
+    assert _shift_k(warmed, declared, truth.temperature_degc) == truth.temperature_degc[0] - 25.0
     given = replace(case, take=replace(case.take, temperature=True))
     assert taken(given.take).temperature_degc is not None
 
