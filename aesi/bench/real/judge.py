@@ -21,7 +21,8 @@ from aesi.data.catalogue import locate
 from aesi.data.spectra import read_spectra
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
-from aesi.physics import Cell
+from aesi.physics import Cell, simulate
+from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.discovery.budget import MOST_ROWS
 from aesi.pipeline.discovery.discover import HOLDOUT, discovery_content
 from aesi.records import Measurement
@@ -153,7 +154,9 @@ def _scored_row(
     """
     parameters = dict(truth.parameters)
     if case.measured == "temperature" and truth.temperature_degc is not None:
-        parameters["ambient_temperature.shift_k"] = _shift_k(found, declared, truth.temperature_degc)
+        parameters["ambient_temperature.shift_k"] = _shift_k(
+            found, declared, data, given_soc0, truth.temperature_degc
+        )
     row = answer_scores(case.answers, parameters, content) | {"residual": _residual(found)}
     if truth.temperature_degc is not None:
         row |= temperature_row(found, data, truth.temperature_degc)
@@ -166,12 +169,25 @@ def _scored_row(
     return row
 
 
-def _shift_k(found: Discovery, declared: Cell, measured_degc: Array) -> float:
-    """K, true temperature minus the declared one: of the surroundings, at which the record begins, where the answer has
-    a cell that warms itself from there; else the mean over the record.  measured_degc : (n,) degC, of the case."""
-    warms = any(active.id == "self_heating" for active in found.model_effects)
-    measured = measured_degc[0] if warms else np.mean(measured_degc)
-    return float(measured) - (declared.initial_temperature_k - ZERO_CELSIUS_K)
+def _shift_k(
+    found: Discovery, declared: Cell, data: Measurement, soc0: float | None, measured_degc: Array
+) -> float:
+    """K, true temperature of the surroundings minus the declared one: the mean of what was measured, without what the
+    cell's own heat adds to it, where the answer has that. It is of the declared cell at the temperature that was found.
+
+    data, soc0 : record and initial state of charge as the tracer had them.  measured_degc : (n,) degC, of the case.
+    """
+    shift_k = float(np.mean(measured_degc)) - (declared.initial_temperature_k - ZERO_CELSIUS_K)
+    heat = [active for active in found.model_effects if active.id == "self_heating"]
+    sizes = [c.parameters["shift_k"].value for c in found.candidates if c.effect == "ambient_temperature"]
+    if not heat or not sizes or sizes[0] is None:
+        return shift_k
+    effects = (*heat, CATALOGUE["ambient_temperature"].activate(shift_k=sizes[0]))
+    run = simulate(
+        declared, data.time_s, data.current_a, soc0, effects, hold=data.hold_taken, on_depletion="clip"
+    )
+    kelvin = run.series["temperature_k"]
+    return shift_k - float(np.mean(kelvin) - kelvin[0])
 
 
 def taken(take: Take) -> Measurement:

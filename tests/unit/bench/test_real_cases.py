@@ -363,10 +363,16 @@ def test_a_withheld_temperature_is_in_the_answer_and_not_in_the_data(shared_data
     assert data.temperature_degc is None
     assert len(truth.temperature_degc) == len(data)
     declared = declared_cell(case.cell, CELLS)
-    constant = SimpleNamespace(model_effects=())
-    warmed = SimpleNamespace(model_effects=(self_heating.of_file(declared),))
-    assert _shift_k(constant, declared, truth.temperature_degc) == pytest.approx(10.9 - 25, abs=0.3)
-    assert _shift_k(warmed, declared, truth.temperature_degc) == truth.temperature_degc[0] - 25.0
+    shift = SimpleNamespace(
+        effect="ambient_temperature", parameters={"shift_k": SimpleNamespace(value=-14.0)}
+    )
+    constant = SimpleNamespace(model_effects=(), candidates=(shift,))
+    warmed = SimpleNamespace(model_effects=(self_heating.of_file(declared),), candidates=(shift,))
+    told = [_shift_k(one, declared, data, 1.0, truth.temperature_degc) for one in (constant, warmed)]
+    assert told[0] == pytest.approx(10.9 - 25, abs=0.3)
+    assert told[1] + 25.0 == pytest.approx(
+        truth.temperature_degc[0], abs=1.0
+    )  # the cell was at the chamber's
     given = replace(case, take=replace(case.take, temperature=True))
     assert taken(given.take).temperature_degc is not None
 
