@@ -14,14 +14,21 @@ from aesi.bench.limit import LOST, NO_TIME, NOT_RUN, NoAnswer, Stopwatch, answer
 from aesi.bench.real.answers import answer_scores, initial_state_row
 from aesi.bench.real.case import RealCase, Take
 from aesi.bench.real.faults import declared_with_fault, soc0_with_fault, with_fault
-from aesi.bench.real.references import Witness, capacity_row, resistance_row, temperature_row, witness_of
+from aesi.bench.real.references import (
+    Witness,
+    capacity_row,
+    case_kelvin,
+    resistance_row,
+    temperature_row,
+    witness_of,
+)
 from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.data import read_measurement
 from aesi.data.catalogue import locate
 from aesi.data.spectra import read_spectra
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
-from aesi.physics import Cell, simulate
+from aesi.physics import Cell
 from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.discovery.budget import MOST_ROWS
 from aesi.pipeline.discovery.discover import HOLDOUT, discovery_content
@@ -173,7 +180,7 @@ def _shift_k(
     found: Discovery, declared: Cell, data: Measurement, soc0: float | None, measured_degc: Array
 ) -> float:
     """K, true temperature of the surroundings minus the declared one: the mean of what was measured, without what the
-    cell's own heat adds to it, where the answer has that. It is of the declared cell at the temperature that was found.
+    cell's own heat adds to its case where the answer has such heat: that of the declared cell at the temperature found.
 
     data, soc0 : record and initial state of charge as the tracer had them.  measured_degc : (n,) degC, of the case.
     """
@@ -183,10 +190,7 @@ def _shift_k(
     if not heat or not sizes or sizes[0] is None:
         return shift_k
     effects = (*heat, CATALOGUE["ambient_temperature"].activate(shift_k=sizes[0]))
-    run = simulate(
-        declared, data.time_s, data.current_a, soc0, effects, hold=data.hold_taken, on_depletion="clip"
-    )
-    kelvin = run.series["temperature_k"]
+    kelvin = case_kelvin(declared, data, soc0, effects, data.hold_taken)
     return shift_k - float(np.mean(kelvin) - kelvin[0])
 
 

@@ -25,8 +25,10 @@ from aesi.errors import DataError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
 from aesi.physics import Cell, impedance, simulate
+from aesi.physics.effect import ActiveEffect
+from aesi.physics.model import case_k
 from aesi.physics.simulation import model_with
-from aesi.records import Measurement, Spectrum
+from aesi.records import Hold, Measurement, Spectrum
 from aesi.tracer import Discovery
 
 AT_HZ = 1.0
@@ -64,6 +66,17 @@ def witness_of(spectra: Sequence[Spectrum], declared: Cell) -> Witness:
     return Witness(spectrum, measured_resistances(spectrum))
 
 
+def case_kelvin(
+    cell: Cell, record: Measurement, soc0: float | None, effects: Sequence[ActiveEffect], hold: Hold
+) -> Array:
+    """(n,) K, simulated temperature of the case, where a thermocouple is; that of the winding where the model's cooling
+    leaves no case between it and the surroundings (`case_k`). A measured temperature of the record is not used."""
+    run = simulate(cell, record.time_s, record.current_a, soc0, effects, None, hold, on_depletion="clip")
+    winding_k = run.series["temperature_k"]
+    at_case = case_k(model_with(cell, effects), winding_k)
+    return winding_k if at_case is None else at_case
+
+
 def temperature_row(found: Discovery, record: Measurement, measured_degc: Array) -> dict[str, float]:
     """Comparison of the temperature in the written model with the measured one.
 
@@ -71,12 +84,9 @@ def temperature_row(found: Discovery, record: Measurement, measured_degc: Array)
     Returns the mean of the measured temperature, degC, and the mean and the RMS of the difference model minus measured,
     K.
     """
-    run = simulate(
-        found.cell, record.time_s, record.current_a, found.soc0, found.model_effects, None,
-        found.hold or record.hold_taken,
-        on_depletion="clip",
-    )  # fmt: skip
-    difference = run.series["temperature_k"] - ZERO_CELSIUS_K - measured_degc
+    hold = found.hold or record.hold_taken
+    kelvin = case_kelvin(found.cell, record, found.soc0, found.model_effects, hold)
+    difference = kelvin - ZERO_CELSIUS_K - measured_degc
     return {
         "measured_mean_degc": float(np.mean(measured_degc)),
         "mean_off_k": float(np.mean(difference)),
