@@ -44,7 +44,7 @@ def with_heat_told(warm: Evidence, evidence: Evidence) -> Evidence | None:
     cooling = f"{heat.parameters['heat_transfer_w_k']:.3g} W/K to the surroundings"
     note = (
         "no temperature was measured: every model, the declared one, too, warms itself by the thermal data of the "
-        f"cell's file ({cooling}), which says {abs(ahead):.1f} nats {'more' if ahead >= 0.0 else 'less'} of unseen "
-        "data than a constant temperature."
+        f"cell's file ({cooling}); that says {abs(ahead):.1f} nats {'more' if ahead >= 0.0 else 'less'} of unseen "
+        "data than a constant temperature does."
     )
     return replace(warm, limits=(note, *warm.limits))
