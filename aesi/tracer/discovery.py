@@ -236,8 +236,11 @@ def discover(
     evidence, choice, tested = searched(given)
     heat = heat_of_file(evidence)
     if heat is not None and max_effects:
-        warm = searched((*given, heat))
-        if told := with_heat_told(warm.evidence, evidence):
+        try:
+            warm = searched((*given, heat))
+        except DataError:  # the records speak against that heat
+            warm = None
+        if warm is not None and (told := with_heat_told(warm.evidence, evidence)):
             evidence, choice, tested = warm._replace(evidence=told)
     found = _discovery_of(
         evidence,

@@ -7,10 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from aesi.errors import DataError
 from aesi.physics import Cell, simulate
 from aesi.physics.effects import CATALOGUE, self_heating
 from aesi.records import Measurement
-from aesi.tracer import discover
+from aesi.tracer import discover, discovery
 from aesi.tracer.decide.evidence import Evidence
 from aesi.tracer.decide.own_heat import heat_of_file, with_heat_told
 
@@ -90,3 +91,18 @@ def test_the_heat_of_the_file_is_taken_unless_the_data_speak_against_it(m50, ahe
     cold, warm = case(m50, total=10.0), case(m50, total=10.0 + ahead)
     evidence = Evidence(warm.path, warm.paths, None, None, warm.verdict)
     assert (with_heat_told(evidence, cold) is not None) == told
+
+
+def test_records_that_no_warm_cell_can_have_given_are_answered_without_heat(m50, cold_drive, monkeypatch):
+    checked = discovery.check_same_cell
+
+    def refuses_heat(problem, record, run):
+        if problem.fixed:
+            raise DataError("another cell's")
+        checked(problem, record, run)
+
+    monkeypatch.setattr(discovery, "check_same_cell", refuses_heat)
+    effects = {name: CATALOGUE[name] for name in ("self_heating", "series_resistance")}
+    told = discover(m50, [cold_drive], soc0=0.85, max_effects=1, effects=effects)
+    assert told.verdict.word == "unknown"
+    assert not any("warms itself by the thermal data" in note for note in told.notes)
