@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from aesi.constants import MV_PER_V
+from aesi.data.thinning import Averaged
 from aesi.errors import AesiError
 from aesi.numerics.metrics import rms
 from aesi.records import HOLD_WORDS, OTHER_HOLD, InferredHold
@@ -42,7 +43,7 @@ def _undeclared(problem: InverseProblem) -> Iterator[int]:
     """
     declared = ModelState(problem)
     for k, record in enumerate(problem.records):
-        if record.data.hold is not None or record.thin.time_s is not record.data.time_s:
+        if record.data.hold is not None or isinstance(record.thin, Averaged):
             continue
         held = replace(record, thin_hold=OTHER_HOLD[record.hold])
         try:

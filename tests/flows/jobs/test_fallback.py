@@ -151,8 +151,8 @@ def test_a_run_that_fell_back_was_gone_on_with_on_other_data(experiment, call, m
         first.setattr(module, "build_problem", fails)
         assert call("run", experiment, "--no-prefect")[0] == 1
 
-    def others(config, sources):
-        loaded = load(config, sources)
+    def others(config, sources, begins):
+        loaded = load(config, sources, begins)
         return replace(loaded, digests=dict.fromkeys(loaded.digests, "0123"))
 
     monkeypatch.setattr(module, "load", others)  # the key of what is on disk is the same
