@@ -22,9 +22,9 @@ HOLDERS = (
 """Tables and columns of MLflow's database that hold addresses of artifacts."""
 
 
-def artifact_folder(database: Path, experiment: str) -> Path:
-    """Where the artifacts of an experiment lie."""
-    return database.parent / FOLDER / experiment
+def artifact_folder(home: Path, experiment: str) -> Path:
+    """Where the artifacts of an experiment lie.  home : folder of the database, or the workspace where that is none."""
+    return home / FOLDER / experiment
 
 
 def follow(database: Path) -> tuple[str, ...]:
@@ -53,7 +53,7 @@ def _moved(connection: sqlite3.Connection, database: Path) -> list[str]:
         *_, above, own = ("", "", *(before or "").split("/"))
         if above != FOLDER or not own:
             continue  # the user's own place
-        folder = artifact_folder(database, unquote(own))
+        folder = artifact_folder(database.parent, unquote(own))
         now = folder.as_uri()
         if before in (now, str(folder)) or not folder.is_dir():
             continue

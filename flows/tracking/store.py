@@ -21,6 +21,7 @@ from typing import Any
 from aesi.errors import AesiError, InputError, first_line
 from aesi.logins import login_left_out, without_login
 from aesi.numerics.files.whole import check_writable
+from flows.base import environment
 from flows.base.databases import limits
 from flows.base.locks import ProcessLock
 from flows.base.store_address import (
@@ -40,6 +41,8 @@ JOB, EXPERIMENT = "aesi.job", "experiment"
 """Tag of a whole run: experiment, discovery, batch or benchmark. Runs of earlier versions have none."""
 OTHER_JOBS = {"cases": "benchmark", "cells": "batch"}
 """Parameter that no experiment has -> the job that has it, by which runs of earlier versions are told apart."""
+SERVED = ("http://", "https://")
+"""How the address of a tracking server begins."""
 REACH_S = 5.0
 """Wait for the answer of a tracking server."""
 PASSING = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EAGAIN, errno.EMFILE)
@@ -94,7 +97,7 @@ class Store:
         self.local = self.uri.startswith(SQLITE)
         self._places: dict[str, str] = {}
         self.notes: tuple[str, ...] = ()
-        if self.uri.startswith(("http://", "https://")):
+        if self.uri.startswith(SERVED):
             _reach(self.uri)
         elif not self.local and not self.uri.startswith(DATABRICKS):
             _reach_database(self.uri)
@@ -138,8 +141,7 @@ class Store:
                 if found.lifecycle_stage == "deleted":
                     self.client.restore_experiment(found.experiment_id)
                 return str(found.experiment_id)
-            place = artifact_folder(self._path, name).as_uri() if self.local else None
-            return str(self.client.create_experiment(name, place))
+            return str(self.client.create_experiment(name, self._new_artifact_place(name)))
 
     @property
     def database(self) -> Any:
@@ -151,6 +153,16 @@ class Store:
         if experiment_id not in self._places:
             self._places[experiment_id] = str(self.client.get_experiment(experiment_id).artifact_location)
         return self._places[experiment_id]
+
+    def _new_artifact_place(self, name: str) -> str | None:
+        """The address below which a new experiment keeps its files; None of a server, which has a place for them.
+
+        Of a database MLflow would keep them in mlruns/ of the folder that the command happens to be started in.
+        """
+        if self.uri.startswith((*SERVED, *DATABRICKS)):
+            return None
+        home = self._path.parent if self.local else environment.workspace()
+        return artifact_folder(home, name).as_uri()
 
     @property
     def _path(self) -> Path:

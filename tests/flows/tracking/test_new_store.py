@@ -1,5 +1,7 @@
 """A tracking store that is made anew."""
 
+from types import SimpleNamespace
+
 import pytest
 from alembic.runtime.migration import HeadMaintainer
 
@@ -20,3 +22,32 @@ def test_a_store_that_was_interrupted_while_it_was_made_could_never_be_used(tmp_
         with pytest.raises(KeyboardInterrupt):
             Store(uri)
     assert Store(uri).experiment("again")
+
+
+@pytest.fixture
+def made(monkeypatch):
+    """Names of the experiments that a store without a database behind it makes, with the places of their files."""
+    places = {}
+    client = SimpleNamespace(
+        search_experiments=lambda max_results: [],
+        get_experiment_by_name=lambda name: None,
+        create_experiment=lambda name, place: places.setdefault(name, place),
+    )
+    monkeypatch.setattr("mlflow.MlflowClient", lambda **_: client)
+    for reach in ("_reach", "_reach_database"):
+        monkeypatch.setattr(f"flows.tracking.store.{reach}", lambda uri: None)
+    return places
+
+
+def test_files_of_a_run_in_a_database_were_left_in_the_folder_that_the_command_was_started_in(
+    made, workspace, tmp_path_factory, monkeypatch
+):
+    monkeypatch.chdir(tmp_path_factory.mktemp("elsewhere"))
+    Store("postgresql://me@there/tracking").experiment("drive")
+    assert made == {"drive": (workspace / "mlartifacts" / "drive").as_uri()}
+
+
+def test_a_server_keeps_the_files_of_runs_where_it_says(made):
+    for uri in ("http://there:5000", "databricks"):
+        Store(uri).experiment(uri)
+    assert made == {"http://there:5000": None, "databricks": None}
