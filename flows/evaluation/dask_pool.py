@@ -6,8 +6,12 @@ builds the problem of a study once, from the experiment, and keeps it.
 
 from __future__ import annotations
 
+import logging
 import time
 import uuid
+from collections.abc import Iterator
+from concurrent.futures import CancelledError
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from queue import Empty, Queue
@@ -40,12 +44,38 @@ is restarted for a second candidate that hangs is gone for good then, and its la
 has a nanny that starts it again. It is looked up when a worker is lost, so that it is set to stay."""
 
 
+class SchedulerLost(AesiError):
+    """The Dask scheduler answered when the work began, and does no more."""
+
+
+@contextmanager
+def scheduler_kept(address: str | None, *more: type[Exception]) -> Iterator[None]:
+    """Within, what Dask raises of work whose scheduler is lost is SchedulerLost, with what to do.
+
+    Dask cancels all work at that moment, also where the scheduler is back a second later.
+    more : what else can have no other cause within.
+    """
+    from distributed.client import ClosedClientError
+    from distributed.comm import CommClosedError
+
+    try:
+        yield
+    except (CancelledError, ClosedClientError, CommClosedError, *more) as error:
+        place = without_login(address) if address else "on this machine"
+        raise SchedulerLost(
+            f"the Dask scheduler {place} was lost, and with it what its workers were at; what is finished is kept: "
+            "start it again, then give the same command again (`aesi run` with --resume)."
+        ) from error
+
+
 def connect(address: str | None, workers: int) -> tuple[Any, Any]:
     """A client of the scheduler at an address, or of a new cluster of processes on this machine, and that cluster.
 
     Raises InputError without Dask or for what is no address, AesiError where the scheduler does not answer.
     """
     dask, distributed = _libraries()
+    # What goes wrong with a scheduler reaches the caller as an exception, and need not be told twice, with a traceback.
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
     cluster = None
     if address is None:
         dask.config.set(KEEP_RESTARTED)
@@ -83,8 +113,17 @@ def check_scheduler(address: str | None) -> None:
     if address is None:
         _libraries()
     else:
-        client, _ = connect(address, workers=0)
+        leave(*connect(address, workers=0))
+
+
+def leave(client: Any, cluster: Any) -> None:
+    """Leave a scheduler; end the cluster where it is ours, and none is given otherwise."""
+    with suppress(
+        Exception
+    ):  # of a scheduler that is lost Dask's own end fails at times, and hides why it came
         client.close(timeout=5)
+    if cluster is not None:
+        cluster.close(timeout=10)
 
 
 def _libraries() -> tuple[Any, Any]:
@@ -147,6 +186,7 @@ class DaskPool:
         study: str = "",
     ) -> None:
         self._recipe, self._timeout_s, self._memory_mb = (content, base, study), timeout_s, memory_mb
+        self._address = address
         self._client, self._cluster = connect(address, workers)
         self._submitted: dict[str, _Submitted] = {}
         self._finished: Queue[Any] = Queue()
@@ -155,8 +195,11 @@ class DaskPool:
 
     @property
     def idle(self) -> int:
-        """One candidate a thread, and one waiting for each, so that no worker pauses between two."""
-        return max(0, 2 * max(1, sum(self._client.ncores().values())) - self.busy)
+        """One candidate a thread, and one waiting for each, so that no worker pauses between two.
+
+        As the methods below it raises SchedulerLost where the scheduler answers no more."""
+        with self._kept():
+            return max(0, 2 * max(1, sum(self._client.ncores().values())) - self.busy)
 
     @property
     def busy(self) -> int:
@@ -167,11 +210,19 @@ class DaskPool:
         key = f"candidate-{uuid.uuid4().hex}"
         candidate = self._submitted[key] = _Submitted(tag)  # before it is submitted: it may begin at once
         given = (self._topic, key, self._memory_mb, *self._recipe, codec.dumps(genome))
-        candidate.future = self._client.submit(_evaluate_timed, *given, key=key, pure=False)
+        with self._kept():
+            candidate.future = self._client.submit(_evaluate_timed, *given, key=key, pure=False)
         candidate.future.add_done_callback(self._finished.put)
 
     def collect(self, timeout_s: float) -> list[tuple[Any, Any]]:
         """(tag, outcome) of what has finished, after at most `timeout_s`."""
+        with self._kept():
+            return self._done(timeout_s) + self._overdue()
+
+    def _kept(self) -> AbstractContextManager[None]:
+        return scheduler_kept(self._address, OSError)  # an evaluation raises none: it is an outcome
+
+    def _done(self, timeout_s: float) -> list[tuple[Any, Any]]:
         found = []
         try:
             future = self._finished.get(timeout=timeout_s)
@@ -181,14 +232,11 @@ class DaskPool:
                     found.append((candidate.tag, _outcome(future)))
                 future = self._finished.get_nowait()
         except Empty:
-            pass
-        return found + self._overdue()
+            return found
 
     def close(self) -> None:
         """Leave the scheduler; end the cluster where it is ours."""
-        self._client.close(timeout=5)
-        if self._cluster is not None:
-            self._cluster.close(timeout=10)
+        leave(self._client, self._cluster)
 
     def processor_s(self) -> dict[str, float]:
         """Processor seconds that each worker has used since it started."""
@@ -247,10 +295,8 @@ def _scorer(content: str, base: str, study: str) -> Any:
 
 
 def _outcome(future: Any) -> Any:
-    if future.status == "finished":
-        return codec.loads(future.result())
-    if future.status == "cancelled":
-        return Failed("was cancelled by the scheduler", of_machine=True)
+    if future.status != "error":
+        return codec.loads(future.result())  # which raises CancelledError of one that is cancelled
     error = future.exception()
     if isinstance(error, AesiError):  # the experiment cannot be loaded there: no candidate ever will
         raise error

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from flows.base import environment
 from flows.base.interrupt import leaving_interrupts_to_us
-from flows.evaluation.dask_pool import connect
+from flows.evaluation.dask_pool import connect, leave, scheduler_kept
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -74,23 +74,22 @@ def on_dask(
     """Results by the scheduler at an address, or by a cluster of `workers` processes here.
 
     lost : as above, for an item that Dask gives up because worker after worker ended over it; without it that raises
-    KilledWorker. Raises as `connect` does.
+    KilledWorker. Raises as `connect` does, and SchedulerLost.
     """
     client, cluster = connect(address, workers)
     from distributed import KilledWorker, as_completed
 
     try:
-        futures: Any = client.map(function, list(items), pure=False)
-        given = dict(zip((future.key for future in futures), items, strict=True))
-        for future in as_completed(futures, loop=client.loop):
-            try:
-                result = future.result()
-            except KilledWorker:
-                if lost is None:
-                    raise
-                result = lost(given[future.key])
-            yield result
+        with scheduler_kept(address):
+            futures: Any = client.map(function, list(items), pure=False)
+            given = dict(zip((future.key for future in futures), items, strict=True))
+            for future in as_completed(futures, loop=client.loop):
+                try:
+                    result = future.result()
+                except KilledWorker:
+                    if lost is None:
+                        raise
+                    result = lost(given[future.key])
+                yield result
     finally:
-        client.close(timeout=5)
-        if cluster is not None:
-            cluster.close(timeout=10)
+        leave(client, cluster)
