@@ -24,6 +24,7 @@ class DatabaseOutcomes:
 
     def __init__(self, url: str) -> None:
         import sqlalchemy as sa
+        from sqlalchemy.dialects.mysql import LONGBLOB
 
         self._sa = sa
         self._engine = engine_of(url)
@@ -32,8 +33,10 @@ class DatabaseOutcomes:
             sa.MetaData(),
             sa.Column("key", sa.String(64), primary_key=True),
             sa.Column("owner", sa.String(100)),
-            sa.Column("beat_s", sa.Float),
-            sa.Column("data", sa.LargeBinary),
+            sa.Column("beat_s", sa.Double),  # MySQL's FLOAT tells seconds of now apart by 128
+            sa.Column(
+                "data", sa.LargeBinary().with_variant(LONGBLOB(), "mysql", "mariadb")
+            ),  # BLOB ends at 64 kB
         )
         self._owner = f"{socket.gethostname()}:{os.getpid()}:{uuid.uuid4().hex[:8]}"
         self._mine: set[str] = set()

@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import re
 import socket
 import subprocess
 import sys
@@ -10,7 +11,9 @@ import time
 from types import SimpleNamespace
 
 import pytest
+from sqlalchemy.dialects import mysql, postgresql, sqlite
 from sqlalchemy.exc import OperationalError
+from sqlalchemy.schema import CreateTable
 
 from aesi.errors import InputError
 from flows.base.databases import limits
@@ -224,3 +227,18 @@ def test_a_statement_in_postgresql_waited_for_ever_for_a_lock():
     assert "tcp_user_timeout" not in options["connect_args"]  # the address says it
     assert "pool_events" not in limits("postgres://h/none?options=-c%20statement_timeout%3D5s")
     assert limits("postgresql+pg8000://127.0.0.1/none") == {}
+
+
+@pytest.mark.parametrize(
+    ("dialect", "beat", "data"),
+    [
+        (mysql, "DOUBLE", "LONGBLOB"),
+        (postgresql, "DOUBLE PRECISION", "BYTEA"),
+        (sqlite, "DOUBLE", "BLOB"),
+    ],
+)
+def test_mysql_held_a_claim_to_two_minutes_and_no_outcome_above_64_kb(tmp_path, dialect, beat, data):
+    store = DatabaseOutcomes(f"sqlite:///{tmp_path}/outcomes.db")
+    store.close()
+    made = str(CreateTable(store._table).compile(dialect=dialect.dialect()))
+    assert re.search(rf"beat_s {beat},\s+data {data},", made), made
