@@ -107,7 +107,7 @@ def _tracked(
     from flows.tracking.tracker import Subject
     from flows.tracking.view import BATCH_COLUMNS, CELLS, HOW_TO_READ_BATCHES, experiment_tags
 
-    of_jobs = {job.name: job.unusable or job.key(settings.key) for job in jobs}
+    of_jobs = {job.name: _identity(job, settings) for job in jobs}
     key = sha256(repr(sorted(of_jobs.items())).encode()).hexdigest()[:16]
     quiet = TrackingConfig(system_metrics=False, log_model=False)
     subject = Subject("batch", settings.seed, key, "batch", quiet)
@@ -117,6 +117,14 @@ def _tracked(
             content = {"plan_digest": key, "cells": len(jobs), "versions": versions()}
             tracker.parameters(asked | content, {CODE: source_digest()})
         yield tracker
+
+
+def _identity(job: Job, settings: Settings) -> str:
+    """What tells a job from others; of one that cannot be done, why, which its row says, too."""
+    try:
+        return job.unusable or job.key(settings.key)
+    except OSError as error:
+        return str(error)
 
 
 def _track(tracker: Tracker | None, row: dict[str, Any], source: str) -> None:

@@ -69,7 +69,7 @@ def run_job(job: Job, out: Path, settings: Settings) -> dict[str, Any]:
     except AesiError as error:
         return _failed(job, folder, with_columns(str(error)))
     except OSError as error:
-        return _failed(job, folder, f"{error.filename or 'a file'}: {error.strerror or error}")
+        return _failed(job, folder, f"{error.filename or 'a file'}: {error.strerror or error}.")
     return row
 
 

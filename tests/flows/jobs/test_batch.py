@@ -1,6 +1,7 @@
 """A batch: what is done is taken again, every cell is tracked, and one that failed says why."""
 
 import json
+import sys
 from importlib import import_module
 from pathlib import Path
 
@@ -114,6 +115,19 @@ def test_a_process_that_the_system_killed_ended_the_whole_batch(tracked, monkeyp
     assert {row["name"]: row["status"] for row in rows} == dict.fromkeys(names, "done") | {"large": "failed"}
     assert "the system ended the process that worked on it" in rows[1]["reason"]
     assert "large" in (tracked / "out" / "summary.csv").read_text()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a file that is there and cannot be read, whoever asks")
+def test_one_record_that_cannot_be_read_ended_the_whole_batch(tracked):
+    from flows.jobs.batch import batch
+
+    (tracked / "a.csv").write_text("a")
+    plan = tracked / "plan.csv"
+    plan.write_text("name,data\ngood,a.csv\nbad,/proc/self/mem\n")
+    done(tracked / "out" / "good", read_plan(plan, CELL)[0], 3.0)
+    good, bad = batch(plan, tracked / "out", CELL, workers=1)
+    assert (good["status"], bad["status"]) == ("done", "failed")
+    assert bad["reason"].endswith("Input/output error.")
 
 
 def test_a_batch_for_a_scheduler_that_is_away_left_a_failed_run(workspace, monkeypatch, capsys):
