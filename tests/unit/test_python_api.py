@@ -543,6 +543,8 @@ def test_a_parameter_that_is_no_number_is_told():
         CATALOGUE["series_resistance"].activate(resistance_ohm=10**400)
     with pytest.raises(InputError, match="resistance_ohm = '1m' is not a number"):
         CATALOGUE["series_resistance"].activate(resistance_ohm="1m")
+    with pytest.raises(InputError, match="resistance_ohm = True is not a number"):
+        CATALOGUE["series_resistance"].activate(resistance_ohm=True)
 
 
 def test_a_type_checker_lets_through_what_the_functions_take():
