@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING
 
 from aesi.constants import SECONDS_PER_HOUR
@@ -20,6 +20,8 @@ PANEL_HEIGHT = 190
 """Pixels."""
 COLOURS = ("#1f2328", "#0072B2", "#D55E00", "#009E73", "#CC79A7")
 """Ink, then Okabe and Ito's palette, safe for colour-blind readers."""
+HELD = "vh"
+"""Plotly's name for the line of what a row holds since the row before: up or down there, and then along."""
 BAND = "rgba(0,114,178,0.2)"
 
 
@@ -48,11 +50,15 @@ def extent(time_s: Array) -> str:
 
 
 def over_time(
-    time_s: Array, panels: Mapping[str, Mapping[str, Array]], band: tuple[str, Array, Array] | None = None
+    time_s: Array,
+    panels: Mapping[str, Mapping[str, Array]],
+    band: tuple[str, Array, Array] | None = None,
+    held: Collection[str] = (),
 ) -> Figure:
     """A plotly figure: panels below one another over a common time, from the first sample.
 
     time_s : (n,) s.  panels : axis title with unit -> name -> (n,).  band : name, lower and upper (n,), in the first.
+    held : names of what a row holds since the row before; all else runs straight between rows.
     Raises InputError where there is no row.
     """
     if not len(time_s):
@@ -71,9 +77,8 @@ def over_time(
         )
     for row, (title, columns) in enumerate(panels.items(), start=1):
         for colour, (name, values) in zip(COLOURS, columns.items(), strict=False):
-            figure.add_trace(
-                Scatter(x=x, y=values, name=name, mode="lines", line={"width": 1.2, "color": colour}), row, 1
-            )
+            line = {"width": 1.2, "color": colour, "shape": HELD if name in held else "linear"}
+            figure.add_trace(Scatter(x=x, y=values, name=name, mode="lines", line=line), row, 1)
         figure.update_yaxes(title_text=title, row=row, col=1)
     figure.update_xaxes(title_text=f"time, {unit}", row=len(panels), col=1)
     return figure.update_layout(

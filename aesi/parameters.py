@@ -123,6 +123,8 @@ def checked(
 
 def _number(name: str, value: object) -> float:
     try:
+        if isinstance(value, bool):
+            raise TypeError
         return float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         raise ParameterError(f"{name} = {value!r} is not a number.") from None

@@ -41,7 +41,7 @@ count as empty. With less, a pulse reached the limit, which happens at any state
 cell counts as charged again where this share of the charge taken was returned. A convention."""
 NEAR_THE_SIZE = 0.5
 """Least ratio of a full discharge to the largest one: a smaller one is of another cell, or in another unit, and does
-not determine the size. A convention."""
+not determine the size. Likewise of a discharge to empty to the capacity in the file. A convention."""
 LONG_CHARGE = 0.3
 """Charge, as a share of the capacity or of the most that was taken out, beyond which a charging phase changes the
 branch of a hysteresis."""
@@ -239,7 +239,7 @@ def full_discharge_ah(cell: Cell, data: Measurement) -> float | None:
         top = slice(position, position + int(left[0]))
         start = position + int(np.argmin(taken_ah[top]))
         stop = top.stop + _recharged(taken_ah[top.stop :] - taken_ah[start], full[top.stop :])
-        most = max(filter(None, (most, _emptied_ah(cell, data, taken_ah, start, stop))), default=None)
+        most = max(filter(None, (most, emptied_ah(cell, data, taken_ah, start, stop))), default=None)
         position = stop
     return most
 
@@ -258,7 +258,7 @@ def _recharged(taken_ah: Array, full: BoolArray) -> int:
     return int(again[0]) if len(again) else len(taken_ah)
 
 
-def _emptied_ah(cell: Cell, data: Measurement, taken_ah: Array, start: int, stop: int) -> float | None:
+def emptied_ah(cell: Cell, data: Measurement, taken_ah: Array, start: int, stop: int) -> float | None:
     """Charge from a full row to the lowest voltage before the next full row, Ah; None where that is not empty."""
     end = start + int(np.argmin(data.voltage_v[start:stop]))
     if data.voltage_v[end] > cell.lower_voltage_v + 2 * FULL_WINDOW_V:

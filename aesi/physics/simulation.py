@@ -161,7 +161,7 @@ def simulate(
             }
     voltage = _as_read(changed, active, record.beside_voltage(backward), voltage, series, backward)
     _check_finite(time, voltage, written_at)
-    return Run(time, current, voltage, series, profile_arrays or {})
+    return Run(time, current, voltage, series, profile_arrays or {}, hold)
 
 
 def model_with(cell: Cell, effects: Iterable[ActiveEffect]) -> EspmModel:

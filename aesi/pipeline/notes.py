@@ -10,6 +10,7 @@ from numbers import Real
 
 import numpy as np
 
+from aesi.calibration.records.sizes import aged_sentence
 from aesi.calibration.records.thinning import thinned
 from aesi.calibration.records.zero import zero_of
 from aesi.constants import ZERO_CELSIUS_K
@@ -203,6 +204,15 @@ def fitted_record_sentences(
             for sentence in zero.sentences
         ]
     return tuple(said)
+
+
+def aged_sentences(cell: Cell, record: Measurement, soc0: float, soh: Soh | None) -> tuple[str, ...]:
+    """A sentence where a record shows less capacity than the cell's file has, unless a state of health is given or the
+    file knows that of the record (`fitted_record_sentences`).  soc0 : at the first row."""
+    if soh is not None or record.name in dict(cell.capacity_shares):
+        return ()
+    said = aged_sentence(cell, record, soc0) if np.all(np.isfinite(record.voltage_v)) else ""
+    return (said,) if said else ()
 
 
 def seen_names(declared: HybridModel, judging: Iterable[Measurement]) -> tuple[str, ...]:

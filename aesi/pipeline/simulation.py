@@ -26,6 +26,7 @@ from aesi.physics.model import case_k
 from aesi.physics.record_checks import check_belongs
 from aesi.physics.simulation import model_with
 from aesi.pipeline.notes import (
+    aged_sentences,
     contradiction_sentences,
     dry_collector_sentences,
     fitted_record_sentences,
@@ -250,6 +251,7 @@ def _profiled_model(
             *saved_model_sentences(model, record),
             *fitted_record_sentences(model.cell, record, asked.soh, model.effects),
             start.sentence,
+            *aged_sentences(model.cell, record, start.soc, asked.soh),
             hold_sentence(record.name, hold, asked.hold is not None, why=saved),
             temperature_sentence(model.cell, record, model.effects),
             *temperature_range_sentences(model.cell, [record.temperature_degc], model.effects),

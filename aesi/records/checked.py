@@ -72,7 +72,7 @@ def numbers(values: object, name: str) -> Array:
         kind = np.asarray(values).dtype.kind
     except ValueError:  # numpy's word for rows within a row that differ in length
         raise DataError(f"{name} holds rows of several lengths; give one row of numbers.") from None
-    if kind == "b":
+    if kind == "b" or _has_truth_value(values):
         raise DataError(
             f"{name} holds truth values; give numbers, as np.where(on, 2.5, 0.0) does for 2.5 where on."
         )
@@ -180,6 +180,13 @@ def row_words(row: int) -> str:
     row : from 0.
     """
     return f"row {row + 1}, counted from 1"
+
+
+def _has_truth_value(values: object) -> bool:
+    """Whether a list, or a column of objects, holds one among its numbers, which numpy would take for 0 or 1."""
+    if getattr(getattr(values, "dtype", None), "kind", "O") != "O":
+        return False
+    return any(isinstance(value, bool | np.bool_) for value in np.asarray(values, dtype=object).ravel())
 
 
 def _first_other(values: object) -> object:

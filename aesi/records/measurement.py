@@ -203,7 +203,7 @@ class Measurement:
         panels = {"voltage, V": {"measured": self.voltage_v}, "current, A": {"current": self.current_a}}
         if self.temperature_degc is not None:
             panels["temperature, degC"] = {"temperature": self.temperature_degc}
-        return over_time(self.time_s, panels)
+        return over_time(self.time_s, panels, held=("current",) if self.hold_taken == "backward" else ())
 
     @property
     def digest(self) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 
 from aesi.numerics.typing import Array
 from aesi.over_time import extent, over_time, range_words
+from aesi.records.measurement import Hold
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,6 +25,7 @@ class Run:
     profiles : name -> array across the electrodes; empty where they were not asked for. x_m (places,) is the distance
     from the negative collector; (n, places) have surface_stoichiometry, reaction_a_m2 (per particle surface,
     delithiation positive), electrolyte_mol_m3, and potential_v of the solid against the electrolyte.
+    hold : how the current was taken to run between the samples.
     """
 
     time_s: Array
@@ -31,6 +33,7 @@ class Run:
     voltage_v: Array
     series: dict[str, Array] = field(default_factory=dict)
     profiles: dict[str, Array] = field(default_factory=dict)
+    hold: Hold = "linear"
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -51,7 +54,7 @@ class Run:
         panels = {"voltage, V": {"simulated": self.voltage_v}, "current, A": {"current": self.current_a}}
         if "soc" in self.series:
             panels["state of charge"] = {"state of charge": self.series["soc"]}
-        return over_time(self.time_s, panels)
+        return over_time(self.time_s, panels, held=("current",) if self.hold == "backward" else ())
 
     @property
     def collector_mol_m3(self) -> Array:

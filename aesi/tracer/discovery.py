@@ -190,62 +190,21 @@ def discover(
     for data in (*measurements, *good, *tests):
         check_voltage(cell, data)
     spent = _Spent(progress)
-
-    def search(
-        problem: InverseProblem, archive: Archive, most: int, shallower: Answer | None = None
-    ) -> Answer:
-        if problem.has_good:
-            return searched_answer_beside(problem, most, archive, Thresholds(), spent)
-        return searched_answer(problem, most, archive, Thresholds(), spent, shallower)
-
-    def archive_of(one: InverseProblem, other_model: Archive | None) -> Archive:
-        return Archive(archive, context_of(one), other_model)
-
-    def searched(declared: Sequence[ActiveEffect]) -> _Searched:
-        problem_with = partial(
-            inverse_problem,
-            cell,
-            measurements,
-            soc0,
-            0.0 if tests else holdout,
-            effects,
-            declared,
-            model or "espm",
-            good,
-        )
-
-        def tests_with(inferred: Mapping[int, InferredHold]) -> tuple[PreparedRecord, ...]:
-            holds = (_hold_of_test(data, measurements, inferred.values()) for data in tests)
-            return tuple(
-                prepare_test(cell, data, measurements, soc0, declared, hold)
-                for data, hold in zip(tests, holds, strict=True)
-            )
-
-        inferred: dict[int, InferredHold] = {}
-        problem, tested = problem_with(), tests_with(inferred)
-        _check_case(problem, tested)
-        evidence, choice = with_model(problem, model, search, archive_of, max_effects)
-        while others := inferred_holds(evidence.paths.get("tight", evidence.path)):
-            inferred |= others
-            evidence, choice = with_model(
-                problem_with(inferred=inferred), model, search, archive_of, max_effects
-            )
-            tested = tests_with(inferred)
-        return _Searched(evidence, choice, tested)
-
-    evidence, choice, tested = searched(given)
-    heat = heat_of_file(evidence)
-    if heat is not None and max_effects:
-        try:
-            warm = searched((*given, heat))
-        except DataError:  # the records speak against that heat
-            warm = None
-        if warm is not None and (told := with_heat_told(warm.evidence, evidence)):
-            evidence, choice, tested = warm._replace(evidence=told)
+    search = _Search(
+        cell=cell,
+        measurements=measurements,
+        tests=tests,
+        soc0=soc0,
+        holdout=0.0 if tests else holdout,
+        max_effects=max_effects,
+        effects=effects,
+        archive=archive,
+        model=model,
+        good=good,
+        spent=spent,
+    )
     found = _discovery_of(
-        evidence,
-        choice,
-        tested,
+        _with_heat(search, given) if max_effects else search.of(given),
         spent.simulations,
         np.random.default_rng(seed),
         time.perf_counter() - began,
@@ -317,6 +276,91 @@ class _Searched(NamedTuple):
     tested: tuple[PreparedRecord, ...]
 
 
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """The search that `discover` makes of a declared model, with the arguments of that.
+
+    holdout : as there, 0 where there are tests.
+    """
+
+    cell: Cell
+    measurements: Sequence[Measurement]
+    tests: Sequence[Measurement]
+    soc0: float | None
+    holdout: float
+    max_effects: int
+    effects: Mapping[str, Effect]
+    archive: FilePath | None
+    model: ModelName | None
+    good: Sequence[Measurement]
+    spent: _Spent
+
+    def of(self, declared: Sequence[ActiveEffect]) -> _Searched:
+        """The search of the cell with these effects, repeated while the data say that the current of a record runs
+        otherwise between its rows.  Raises DataError as `discover`."""
+        inferred: dict[int, InferredHold] = {}
+        problem, tested = self._problem(declared, inferred), self._tested(declared, inferred)
+        _check_case(problem, tested)
+        evidence, choice = self._answered(problem)
+        while others := inferred_holds(evidence.paths.get("tight", evidence.path)):
+            inferred |= others
+            evidence, choice = self._answered(self._problem(declared, inferred))
+            tested = self._tested(declared, inferred)
+        return _Searched(evidence, choice, tested)
+
+    def _problem(
+        self, declared: Sequence[ActiveEffect], inferred: Mapping[int, InferredHold]
+    ) -> InverseProblem:
+        return inverse_problem(
+            self.cell,
+            self.measurements,
+            self.soc0,
+            self.holdout,
+            self.effects,
+            declared,
+            self.model or "espm",
+            self.good,
+            inferred,
+        )
+
+    def _tested(
+        self, declared: Sequence[ActiveEffect], inferred: Mapping[int, InferredHold]
+    ) -> tuple[PreparedRecord, ...]:
+        holds = (_hold_of_test(data, self.measurements, inferred.values()) for data in self.tests)
+        return tuple(
+            prepare_test(self.cell, data, self.measurements, self.soc0, declared, hold)
+            for data, hold in zip(self.tests, holds, strict=True)
+        )
+
+    def _answered(self, problem: InverseProblem) -> tuple[Evidence, ModelChoice]:
+        return with_model(problem, self.model, self._answer, self._archive_of, self.max_effects)
+
+    def _answer(
+        self, problem: InverseProblem, archive: Archive, most: int, shallower: Answer | None = None
+    ) -> Answer:
+        if problem.has_good:
+            return searched_answer_beside(problem, most, archive, Thresholds(), self.spent)
+        return searched_answer(problem, most, archive, Thresholds(), self.spent, shallower)
+
+    def _archive_of(self, problem: InverseProblem, other_model: Archive | None) -> Archive:
+        return Archive(self.archive, context_of(problem), other_model)
+
+
+def _with_heat(search: _Search, given: Sequence[ActiveEffect]) -> _Searched:
+    """The search of the declared model; of one that warms itself by its file, where that is asked for by
+    `heat_of_file` and the data do not speak against it."""
+    cold = search.of(given)
+    heat = heat_of_file(cold.evidence)
+    if heat is None:
+        return cold
+    try:
+        warm = search.of((*given, heat))
+    except DataError:  # the records speak against that heat
+        return cold
+    told = with_heat_told(warm.evidence, cold.evidence)
+    return cold if told is None else warm._replace(evidence=told)
+
+
 class _Spent:
     """Counts simulations and passes on what was tried."""
 
@@ -336,14 +380,10 @@ class _Spent:
 
 
 def _discovery_of(
-    evidence: Evidence,
-    choice: ModelChoice,
-    tested: Sequence[PreparedRecord],
-    simulations: int,
-    rng: np.random.Generator,
-    seconds: float,
+    searched: _Searched, simulations: int, rng: np.random.Generator, seconds: float
 ) -> Discovery:
     """The outcome as reported.  rng : of the bootstrap intervals.  simulations, seconds : spent on the search."""
+    evidence, choice, tested = searched
     problem, verdict = evidence.path.problem, evidence.verdict
     records, declared = problem.records, ModelState(problem)
     fitted = _fitted(evidence)

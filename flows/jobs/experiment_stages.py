@@ -30,7 +30,14 @@ from flows.base.stage_cache import Cache
 from flows.jobs.run_request import RunRequest
 from flows.jobs.stages import Stages
 from flows.search.study import StudyResult, run_study
-from flows.tracking.experiment_log import UNFITTED, CandidateTracker, result_line, track_result, track_start
+from flows.tracking.experiment_log import (
+    UNFITTED,
+    CandidateTracker,
+    result_line,
+    track_result,
+    track_settings,
+    track_start,
+)
 from flows.tracking.tracker import Tracker
 
 
@@ -55,6 +62,7 @@ class ExperimentJob:
 
     def results(self) -> Path:
         """Every stage in its order; the folder of the results."""
+        track_settings(self.tracker, self.config)
         loaded = self._load()
         config = loaded.config  # that of the fallback where it fell back to one
         folder = environment.run_folder(config.name, self.tracker.run_id)

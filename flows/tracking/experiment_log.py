@@ -14,6 +14,7 @@ from aesi.logins import without_login
 from aesi.numerics.files.source_digest import source_digest
 from aesi.numerics.files.whole import write_whole
 from aesi.pipeline.experiment.candidate import ScoredCandidate
+from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.judging.reductions import valid_reductions, valid_shares
 from aesi.pipeline.experiment.load import Loaded
@@ -34,6 +35,8 @@ INPUTS, RECORDS, LEFT_OUT, DECLARED = "inputs", "records.bin", "left_out.bin", "
 them, and the declared cell with its effects."""
 NO_PARAMETERS = ("note", "name", "fallback", "discover")
 """Keys of an experiment that are no settings of the run."""
+OF_DATA = ("data", "cell")
+"""Keys of an experiment that its fallback replaces."""
 ADDRESSES = (("tracking", "uri"), ("runner", "storage"), ("runner", "address"))
 """Sections and keys of an experiment that hold the address of a server or a database."""
 HEADLINES = ("free_run", "one_step", "intervals")
@@ -50,8 +53,16 @@ OF_A_MODEL = {"seconds": "fit_and_evaluation_s"}
 """Names for figures of the chosen model that would be taken for the run's own: a search takes longer."""
 
 
+def track_settings(tracker: Tracker, config: ExperimentConfig) -> None:
+    """Settings and versions of a run before its data are there, which takes minutes; those that a fallback may replace
+    are left to `track_start`."""
+    left = () if config.fallback is None else OF_DATA
+    settings = {key: value for key, value in _settings(config).items() if key not in left}
+    tracker.parameters(flat(settings) | {"versions": versions()}, {CODE: source_digest()})
+
+
 def track_start(tracker: Tracker, loaded: Loaded, folder: Path) -> None:
-    """Settings, versions and data of a run, as it is run: those of the fallback where it fell back to one.
+    """Data of a run, and its settings of them, as it is run: those of the fallback where it fell back to one.
 
     folder : of the run, where what its candidates are made from is kept.
     Raises BegunOtherwise where a run that is gone on with was begun on other data or of another cell.
@@ -59,14 +70,13 @@ def track_start(tracker: Tracker, loaded: Loaded, folder: Path) -> None:
     config = loaded.config
     held = {"cell_digest": loaded.files, "data_digest": ", ".join(loaded.digests.values())}
     tracker.as_begun(held)
-    whole = _without_logins(config.model_dump(mode="json"))
-    content = {key: value for key, value in whole.items() if key not in NO_PARAMETERS}
+    of_data = {key: value for key, value in _settings(config).items() if key in OF_DATA}
     tracker.about(experiment_tags(f"{config.note}\n\n{HOW_TO_READ}".strip(), RUN_COLUMNS))
-    tags = {NOTE: config.note, SETTING: loaded.setting, CODE: source_digest()}
+    tags = {NOTE: config.note, SETTING: loaded.setting}
     if loaded.fallback:
         tags[FALLBACK] = loaded.fallback
-    tracker.parameters(flat(content) | {"versions": versions(), "cell": loaded.cell_name, **held}, tags)
-    tracker.json(EXPERIMENT, whole)
+    tracker.parameters(flat(of_data) | {"cell": loaded.cell_name, **held}, tags)
+    tracker.json(EXPERIMENT, _without_logins(config))
     write_whole(folder / INPUTS / RECORDS, codec.dumps(loaded.split))
     write_whole(folder / INPUTS / LEFT_OUT, codec.dumps(loaded.left_out))
     soc0 = next(iter(loaded.soc0.values()), None)
@@ -96,8 +106,14 @@ def track_start(tracker: Tracker, loaded: Loaded, folder: Path) -> None:
     )
 
 
-def _without_logins(content: dict[str, Any]) -> dict[str, Any]:
-    """The settings of an experiment with the addresses that may hold a password as they may be written."""
+def _settings(config: ExperimentConfig) -> dict[str, Any]:
+    """What of an experiment is tracked as parameters, by section."""
+    return {key: value for key, value in _without_logins(config).items() if key not in NO_PARAMETERS}
+
+
+def _without_logins(config: ExperimentConfig) -> dict[str, Any]:
+    """The content of an experiment with the addresses that may hold a password as they may be written."""
+    content = config.model_dump(mode="json")
     for section, key in ADDRESSES:
         given = content[section]
         content[section] = given | {key: given[key] and without_login(given[key])}

@@ -49,6 +49,8 @@ def test_a_range_was_told_by_two_figures_that_read_the_same():
         ({"time_s": None}, "drive: time_s is None"),
         ({"current_a": [[1.0], [2.0, 3.0]]}, "drive: current_a holds rows of several lengths"),
         ({"current_a": np.array([False, True])}, "drive: current_a holds truth values; give numbers"),
+        ({"current_a": [True, 2.0]}, "drive: current_a holds truth values; give numbers"),
+        ({"current_a": np.array([2.0, True], object)}, "drive: current_a holds truth values; give numbers"),
         ({"name": None}, "the name of a measurement is None, which is no text; leave it out, or give one"),
         ({"temperature_degc": np.nan}, "drive: temperature_degc is nan in row 1"),
     ],

@@ -78,6 +78,14 @@ def test_a_measurement_has_its_temperature_where_it_was_measured(record):
     assert repr(bare.take(slice(0, 0))) == "Measurement('measurement', no rows)"
 
 
+@pytest.mark.parametrize(("hold", "shape"), [("backward", "vh"), ("linear", "linear")])
+def test_a_current_that_rows_hold_was_drawn_in_straight_lines(cell, record, hold, shape):
+    run = aesi.simulate(cell, record.time_s, record.current_a, SOC0, hold=hold)
+    for figure, first in ((record.held(hold).plot(), "measured"), (run.plot(), "simulated")):
+        lines = {line.name: line.line.shape for line in figure.data}
+        assert (lines["current"], lines[first]) == (shape, "linear")
+
+
 def test_a_spectrum_is_short_in_words_and_whole_in_a_table():
     spectrum = Spectrum(
         "S1", np.array([1000.0, 1.0, 0.1]), np.array([0.01, 0.02 - 0.01j, 0.03 - 0.005j]), soc=0.5
@@ -535,6 +543,8 @@ def test_a_parameter_that_is_no_number_is_told():
         CATALOGUE["series_resistance"].activate(resistance_ohm=10**400)
     with pytest.raises(InputError, match="resistance_ohm = '1m' is not a number"):
         CATALOGUE["series_resistance"].activate(resistance_ohm="1m")
+    with pytest.raises(InputError, match="resistance_ohm = True is not a number"):
+        CATALOGUE["series_resistance"].activate(resistance_ohm=True)
 
 
 def test_a_type_checker_lets_through_what_the_functions_take():

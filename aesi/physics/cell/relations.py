@@ -197,6 +197,8 @@ def _column(table: Mapping[str, Any], name: str) -> tuple[float, ...]:
     numbers = []
     for value in values:
         try:
+            if isinstance(value, bool):
+                raise TypeError
             numbers.append(float(value))
         except (TypeError, ValueError):
             raise CellError(f"{name} of a table holds {value!r}, which is not a number.") from None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.metadata import version
@@ -19,8 +19,11 @@ from aesi.numerics.files.whole import write_whole
 from aesi.physics.cell import Soh
 from aesi.physics.effects import CATALOGUE, Effect, known_effects, selected
 from aesi.physics.folded import folded
+from aesi.physics.initial_state import initial_state
+from aesi.physics.rest.open_circuit import GOOD_READING_V
 from aesi.physics.simulation import ModelName
 from aesi.pipeline.notes import (
+    aged_sentences,
     seen_names,
     seen_sentences,
     soh_sentences,
@@ -146,6 +149,7 @@ class Case:
             *given.cell.unread,
             *filter(None, [sizes_sentence(given.cell, self.records, given.cell.capacity_ah)]),
             *soh_sentences(declared_model(self.cell), self.soh),
+            *(told(self.reader, sentence) for sentence in self._aged(given)),
             *seen_sentences(given, self.judging),
             *temperature_range_sentences(
                 given.cell, (m.temperature_degc for m in self.records), given.effects
@@ -153,6 +157,24 @@ class Case:
             *left,
             *(told(self.reader, sentence) for sentence in temperatures),
         )
+
+    def _aged(self, given: HybridModel) -> Iterator[str]:
+        """Sentences on records that look as of a cell with less capacity than the file's, from the start that the
+        search reads."""
+        shared = len(self.measurements) > 1
+        for m in self.measurements:
+            if not aged_sentences(given.cell, m, 1.0, self.soh):
+                continue  # nor is it with a start below full, which leaves more of the charge to the cell
+            start = initial_state(
+                given.cell,
+                m,
+                self.soc0,
+                m.hold_taken,
+                given.effects,
+                shared=shared,
+                potentials_v=GOOD_READING_V,
+            )
+            yield from aged_sentences(given.cell, m, start.soc, self.soh)
 
     @property
     def notes(self) -> tuple[str, ...]:

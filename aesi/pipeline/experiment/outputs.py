@@ -222,6 +222,7 @@ def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
         corrected=shown(result.corrected),
         fallback=result.loaded.fallback,
         seen=result.loaded.seen,
+        hold=result.loaded.config.data.hold,
     )
 
 

@@ -36,7 +36,7 @@ def paper_figures(view: RunView) -> dict[str, Figure]:
         figures["bootstrap_coverage"] = ensemble.bootstrap_figure(view.bootstrap)
     if view.traces:
         for quantity in ("current", "voltage"):
-            figures[f"profile_{quantity}"] = records.profile_figure(view.traces, quantity)
+            figures[f"profile_{quantity}"] = records.profile_figure(view.traces, quantity, view.hold)
     figures |= physics_maps(view)
     figures |= before_and_after_maps(view)
     for role in ROLES:

@@ -76,6 +76,7 @@ class RunView:
     settings : what the search picked (lambda1, lambda2, tau, ...), as text.
     fallback : why the run is not on the data that were asked for; empty where it is.
     seen : names of the test records that the declared model was fitted to.
+    hold : how the current was taken to run between the rows.
     """
 
     experiment: str
@@ -96,6 +97,7 @@ class RunView:
     corrected: str = "ESPM"
     fallback: str = ""
     seen: tuple[str, ...] = ()
+    hold: Hold = "linear"
 
     def of(self, role: Role) -> tuple[RecordTrace, ...]:
         """The records of one role, in order."""

@@ -28,16 +28,11 @@ def heat_of_file(evidence: Evidence) -> ActiveEffect | None:
     return self_heating.of_file(cell)
 
 
-def nats_ahead(warm: Evidence, evidence: Evidence) -> float:
-    """How much more the answer of a search with the file's heat says of unseen data than that without it, nats."""
-    cold = evidence.paths.get(warm.path.problem.trust, evidence.path)
-    return warm.path.chosen.score.total - cold.chosen.score.total
-
-
 def with_heat_told(warm: Evidence, evidence: Evidence) -> Evidence | None:
     """The evidence of the search with the file's heat, with a sentence on it; None where the data speak against it, by
     `ALIKE_NATS`, the least that tells two hypotheses apart."""
-    ahead = nats_ahead(warm, evidence)
+    cold = evidence.paths.get(warm.path.problem.trust, evidence.path)
+    ahead = warm.path.chosen.score.total - cold.chosen.score.total
     if ahead < -ALIKE_NATS:
         return None
     heat = next(active for active in warm.path.problem.fixed if active.id == self_heating.EFFECT.id)

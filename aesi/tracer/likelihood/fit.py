@@ -285,7 +285,8 @@ def _posterior(
 
 
 def covariance_at(problem: InverseProblem, blocks: Blocks, fit: LinearForm, size: Size) -> Array:
-    """(m, m) posterior covariance of the coordinates, for a model error of this size."""
+    """(m, m) posterior covariance of the coordinates, for a model error of this size, without bounds as that of
+    `prediction_sd_v`."""
     own = slice(0, len(fit.point.x))
     return _posterior(problem, blocks, fit, size).covariance[own, own]
 
@@ -294,7 +295,8 @@ def prediction_sd_v(
     problem: InverseProblem, blocks: Blocks, fit: LinearForm, size: Size, partition: str = "block"
 ) -> Array:
     """(n,) V, standard deviation of the predicted voltage of each block, with the parameters fitted to the blocks
-    outside its fold, for a model error of this size.
+    outside its fold, for a model error of this size. It is of (1) of `gaussian`, which knows no bounds: a parameter
+    that the score holds on one counts here as uncertain to both sides of it.
 
     partition : one of `blocks.folds` in which each block is left out once.
     """

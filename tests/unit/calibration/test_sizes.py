@@ -8,7 +8,7 @@ import pytest
 
 from aesi.calibration import Conditions
 from aesi.calibration.prepared_model import prepared_model
-from aesi.calibration.records.sizes import capacity_test_ah, sizes_sentence
+from aesi.calibration.records.sizes import aged_sentence, capacity_test_ah, sizes_sentence
 from aesi.errors import DataError
 from aesi.physics import Cell
 from aesi.pipeline.calibrate import start_at_size
@@ -17,6 +17,7 @@ from aesi.pipeline.experiment.config import parse_experiment
 from aesi.pipeline.experiment.load import _on_grid
 from aesi.pipeline.experiment.sources import Sources
 from aesi.pipeline.product.declared import declared_model
+from aesi.pipeline.simulation import ProfileRequest, simulate_file
 from aesi.records import Measurement
 
 FILE = Path(__file__).resolve().parents[3] / "experiments" / "cells" / "lg_m50_chen2020.bpx.json"
@@ -81,6 +82,57 @@ def test_a_part_of_a_discharge_and_an_aged_cell_are_not_noted(m50):
     part = discharge(m50, "part", 5.0, 0.05).take(slice(0, 200))
     aged = discharge(m50, "aged", 4.0, 0.05)
     assert sizes_sentence(m50, [whole, replace(part, name="part"), aged], m50.capacity_ah) == ""
+
+
+def rested(record):
+    """The record with a first row at rest, by which a full cell is known."""
+    return replace(record, current_a=np.concatenate([[0.0], record.current_a[1:]]))
+
+
+def test_an_aged_cell_was_no_reason_to_point_to_its_state_of_health(m50):
+    aged = rested(discharge(m50, "aged", 0.84 * m50.capacity_ah, 1.0, 24.0))
+    (note,) = [note for note in Case(FILE, (aged,)).assumed if "--soh" in note]
+    assert note == (
+        "aged: from a state of charge of 1.000 it is empty after 4.33 Ah, as a cell with 0.84 of the 5.15 Ah in the "
+        "cell's file; if it has aged, --soh 0.84 takes it so."
+    )
+    assert not [note for note in Case(FILE, (aged,), soh=0.84).assumed if "--soh" in note]  # as was declared
+    (note,) = [note for note in Case(FILE, (aged,), reader="python").assumed if "soh" in note]
+    assert note.endswith("--soh 0.84 takes it so (in Python: soh).")
+
+
+def test_a_simulation_passed_over_the_age_that_its_record_shows(m50, tmp_path):
+    aged = rested(discharge(m50, "aged", 0.84 * m50.capacity_ah, 0.05, 24.0))
+    aged.to_frame().to_csv(tmp_path / "aged.csv", index=False)
+    for soh, noted in ((None, True), (0.84, False)):
+        said: list[str] = []
+        simulate_file(
+            FILE,
+            tmp_path / "aged.csv",
+            tmp_path / "out.csv",
+            ProfileRequest(soh=soh),
+            say_notes=said.extend,
+        )
+        assert any("--soh 0.84 takes it so" in one for one in said) == noted
+
+
+@pytest.mark.parametrize(
+    ("share", "c_rate", "degc", "soc0", "noted"),
+    [
+        (0.84, 1.0, 24.0, 1.0, True),
+        (0.84, 0.05, None, 1.0, True),
+        (0.84, 1.0, 24.0, 0.9, False),  # it was not full
+        (0.95, 1.0, 24.0, 1.0, False),  # as discharges of new cells show
+        (0.84, 1.0, None, 1.0, False),  # it may have been cold
+        (0.84, 1.0, -10.0, 1.0, False),
+        (0.84, 3.0, 24.0, 1.0, False),  # its load ends it early
+        (0.4, 0.05, 24.0, 0.5, False),  # hangs on where it starts
+    ],
+)
+def test_a_discharge_that_shows_no_capacity_is_no_sign_of_age(m50, share, c_rate, degc, soc0, noted):
+    record = discharge(m50, "one", share * m50.capacity_ah, c_rate, degc)
+    assert bool(aged_sentence(m50, record, soc0)) == noted
+    assert not aged_sentence(m50, record.take(slice(0, 200)), soc0)
 
 
 def test_a_record_was_refused_for_the_size_that_another_one_gave_the_file(m50):

@@ -132,6 +132,7 @@ def test_a_mixture_that_is_not_finite_inside_is_refused_in_one_sentence():
     [
         ({"x": [0, 1], "y": [1, "a"]}, "y of a table holds 'a', which is not a number"),
         ({"x": [0, 1], "y": [None, 1]}, "y of a table holds None, which is not a number"),
+        ({"x": [0, True], "y": [0, 1]}, "x of a table holds True, which is not a number"),
         ({"x": 0, "y": 1}, "x of a table is 0, and has to be a list of numbers"),
         ({"x": "01", "y": [0, 1]}, "x of a table is '01', and has to be a list of numbers"),
         ({"x": [0, float("inf")], "y": [0, 1]}, "x of a table is inf in row 2, counted from 1; give finite"),

@@ -348,6 +348,13 @@ def test_a_current_that_a_row_holds_since_the_row_before_was_drawn_in_straight_l
     assert shapes == [("current", "vh")]  # vertical at the row before, then along up to its own
 
 
+def test_the_profile_of_a_run_drew_a_held_current_in_straight_lines(views):
+    figures = paper_figures(replace(views.run_view(200), hold="backward"))
+    current, voltage = (figures[f"profile_{quantity}"].data for quantity in ("current", "voltage"))
+    assert {t.line.shape for t in current} == {"vh"}
+    assert {t.line.shape for t in voltage} == {"linear"}
+
+
 def test_a_prediction_outside_its_own_interval_is_explained(views):
     trace = views.trace("t", "test", 500, np.random.default_rng(0))
     fig = records.interval_figure([trace], "ESPM + AESI I")

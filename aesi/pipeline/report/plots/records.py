@@ -22,6 +22,7 @@ from aesi.pipeline.report.plots.timeline import (
     time_title,
 )
 from aesi.pipeline.report.views import DiscoveryTrace, RecordTrace
+from aesi.records import Hold
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -34,8 +35,11 @@ ROLE_NAMES = {"train": "I training", "valid": "II validation", "test": "III test
 ROLE_WORDS = {"train": "training", "valid": "validation", "test": "test"}
 
 
-def profile_figure(traces: Sequence[RecordTrace], quantity: str) -> Figure:
-    """Current or voltage of every record by role; `quantity` is `current` or `voltage`."""
+def profile_figure(traces: Sequence[RecordTrace], quantity: str, hold: Hold = "linear") -> Figure:
+    """Current or voltage of every record by role; `quantity` is `current` or `voltage`.
+
+    hold : how the current runs between rows.
+    """
     fig = stack(1)
     label = {"current": "current, A (discharge > 0)", "voltage": "voltage, V"}[quantity]
     placed, unit = end_to_end(traces)
@@ -44,9 +48,9 @@ def profile_figure(traces: Sequence[RecordTrace], quantity: str) -> Figure:
     for item in placed:
         trace = item.trace
         assert isinstance(trace, RecordTrace)
-        y = trace.current_a if quantity == "current" else trace.measured_v
+        y, course = (trace.current_a, hold) if quantity == "current" else (trace.measured_v, "linear")
         role = ROLE_NAMES[trace.role]
-        line(fig, item.x, y, role, colours[trace.role], in_legend=role not in seen)
+        line(fig, item.x, y, role, colours[trace.role], in_legend=role not in seen, hold=course)
         seen.add(role)
     mark_records(fig, placed)
     fig.update_xaxes(title_text=time_title(placed, unit))

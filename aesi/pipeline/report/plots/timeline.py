@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aesi.numerics.typing import Array
-from aesi.over_time import time_unit
+from aesi.over_time import HELD, time_unit
 from aesi.pipeline.report import style
 from aesi.pipeline.report.views import DiscoveryTrace, RecordTrace
 from aesi.records import Hold
@@ -17,8 +17,8 @@ from aesi.records import Hold
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
-SHAPES: Mapping[Hold, str] = {"linear": "linear", "backward": "vh"}
-"""Plotly's name for the line: of what a row holds since the row before, up or down there, and then along."""
+SHAPES: Mapping[Hold, str] = {"linear": "linear", "backward": HELD}
+"""Plotly's name for the line."""
 OUTSIDE = "outside the trained range"
 WHOLE_S = 10.0
 """Seconds from which on the start of a part is told to the second."""
