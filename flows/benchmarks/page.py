@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from aesi.errors import InputError
+from aesi.numerics.files.whole import write_whole
 
 
 def check_marks(page: str, begin: str, end: str) -> None:
@@ -31,4 +32,4 @@ def write_between(page: str, begin: str, end: str, lines: Sequence[str]) -> None
     before, _, below = path.read_text(encoding="utf-8").partition(begin)
     after = below.partition(end)[2]
     body = "\n".join(lines)
-    path.write_text(f"{before}{begin}\n{body}\n{end}{after}", encoding="utf-8")
+    write_whole(path, f"{before}{begin}\n{body}\n{end}{after}")

@@ -42,7 +42,7 @@ class DatabaseOutcomes:
         self._mine: set[str] = set()
         self._stop = threading.Event()
         self._create()
-        self._thread = threading.Thread(target=self._beat, name="aesi-claims", daemon=True)
+        self._thread = threading.Thread(target=self._keep_beating, name="aesi-claims", daemon=True)
         self._thread.start()
 
     def get(self, key: str) -> bytes | None:
@@ -106,20 +106,18 @@ class DatabaseOutcomes:
             )
         return done.rowcount == 1
 
-    def _beat(self) -> None:
+    def beat(self) -> None:
+        """Renew the claims of this process; those that could not be given back are not among them, and go stale."""
+        if not (mine := list(self._mine)):
+            return
+        ours = (self._table.c.owner == self._owner, self._table.c.key.in_(mine))
+        with self._reached() as connection:
+            connection.execute(self._table.update().where(*ours).values(beat_s=self._now(connection)))
+
+    def _keep_beating(self) -> None:
         while not self._stop.wait(self.BEAT_S):
-            mine = list(self._mine)  # what could not be given back is not among them, and goes stale
-            if not mine:
-                continue
-            try:
-                with self._engine.begin() as connection:
-                    connection.execute(
-                        self._table.update()
-                        .where(self._table.c.owner == self._owner, self._table.c.key.in_(mine))
-                        .values(beat_s=self._now(connection))
-                    )
-            except self._sa.exc.SQLAlchemyError:
-                continue  # a missed beat is made up by the next; STALE_S is ten of them
+            with suppress(OSError):  # a missed beat is made up by the next; STALE_S is ten of them
+                self.beat()
 
     @contextmanager
     def _reached(self) -> Iterator[Any]:

@@ -12,6 +12,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -97,11 +98,13 @@ class Outbox:
         return last
 
     def close(self) -> None:
-        """Stop delivering; what waits stays on disk."""
+        """Stop delivering; what waits, or was refused, stays on disk."""
         with self._wake:
             self._closing = True
             self._wake.notify_all()
         self._thread.join(timeout=30)
+        with suppress(OSError):  # it is not empty
+            self._folder.rmdir()
 
     @property
     def _at_work(self) -> bool:

@@ -121,32 +121,47 @@ def test_the_claim_of_a_killed_process_is_free_at_once(tmp_path):
     store.close()
 
 
-def test_the_claim_of_a_silent_owner_is_taken_over(tmp_path, monkeypatch):
-    monkeypatch.setattr(DatabaseOutcomes, "BEAT_S", 60.0)  # as good as dead
-    monkeypatch.setattr(DatabaseOutcomes, "STALE_S", 2.0)
+@pytest.fixture
+def clock(monkeypatch):
+    """The time of the stores in a list, s. No heart beats by itself while a test lasts."""
+    now_s = [0.0]
+    monkeypatch.setattr(DatabaseOutcomes, "BEAT_S", 3600.0)
+    monkeypatch.setattr(DatabaseOutcomes, "_now", lambda *_: now_s[0])
+    return now_s
+
+
+def test_the_claim_of_a_silent_owner_is_taken_over(tmp_path, clock):
     url = f"sqlite:///{tmp_path}/outcomes.db"
     dead, alive = DatabaseOutcomes(url), DatabaseOutcomes(url)
     assert dead.claim(KEY)
+    clock[0] = DatabaseOutcomes.STALE_S
     assert not alive.claim(KEY)
-    time.sleep(2.2)
+    clock[0] += 1.0
     assert alive.claim(KEY)
 
 
-def test_a_beating_heart_keeps_the_claim(tmp_path, monkeypatch):
-    monkeypatch.setattr(DatabaseOutcomes, "BEAT_S", 0.1)
-    monkeypatch.setattr(DatabaseOutcomes, "STALE_S", 0.5)
+def test_a_beating_heart_keeps_the_claim(tmp_path, clock):
     url = f"sqlite:///{tmp_path}/outcomes.db"
     owner, other = DatabaseOutcomes(url), DatabaseOutcomes(url)
     assert owner.claim(KEY)
-    time.sleep(1.0)
+    clock[0] = DatabaseOutcomes.STALE_S
+    owner.beat()
+    clock[0] += 1.0
     assert not other.claim(KEY)
     owner.close()
     other.close()
 
 
-def test_a_claim_that_could_not_be_given_back_was_held_until_its_owner_ended(tmp_path, monkeypatch):
-    monkeypatch.setattr(DatabaseOutcomes, "BEAT_S", 0.1)
-    monkeypatch.setattr(DatabaseOutcomes, "STALE_S", 0.5)
+def test_a_heart_beats_by_itself(tmp_path, monkeypatch):
+    beaten = threading.Event()
+    monkeypatch.setattr(DatabaseOutcomes, "BEAT_S", 0.01)
+    monkeypatch.setattr(DatabaseOutcomes, "beat", lambda self: beaten.set())
+    store = DatabaseOutcomes(f"sqlite:///{tmp_path}/outcomes.db")
+    assert beaten.wait(30.0)
+    store.close()
+
+
+def test_a_claim_that_could_not_be_given_back_was_held_until_its_owner_ended(tmp_path, monkeypatch, clock):
     url = f"sqlite:///{tmp_path}/outcomes.db"
     owner, other = DatabaseOutcomes(url), DatabaseOutcomes(url)
     assert owner.claim(KEY)
@@ -155,7 +170,9 @@ def test_a_claim_that_could_not_be_given_back_was_held_until_its_owner_ended(tmp
         away.setattr(owner, "_engine", engine_of(f"sqlite:///{tmp_path}/nowhere/outcomes.db"))
         with pytest.raises(OSError, match="unable to open"):
             owner.release(KEY)
-    time.sleep(1.0)
+    clock[0] = DatabaseOutcomes.STALE_S
+    owner.beat()
+    clock[0] += 1.0
     assert other.claim(KEY)
     assert not other.claim("cd" * 16)
     owner.close()

@@ -55,6 +55,19 @@ def test_items_arrive_in_order(tmp_path, store, said):
     assert not said
 
 
+def test_the_folder_of_each_run_was_kept_for_good(tmp_path, store, said):
+    store.here.clear()
+    waiting = opened(tmp_path, store, said)
+    waiting.put({"n": 1})
+    waiting.close()
+    assert (tmp_path / "box" / "00000001.json").is_file()
+    store.here.set()
+    later = opened(tmp_path, store, said)
+    assert later.flush(5) == 0
+    later.close()
+    assert not (tmp_path / "box").exists()
+
+
 def test_a_store_that_is_away_in_mid_run_loses_nothing(tmp_path, store, said):
     box = opened(tmp_path, store, said)
     box.put({"n": 0})
