@@ -130,7 +130,7 @@ def test_how_often_a_name_that_is_no_temperature_is_right(page):
     assert all(row["right"] == "yes" for row in named if "ambient_temperature" in row["verdict"])
     before = [row for row in cases("aesi bench real") if row["case"].startswith("temperature withheld")]
     found = sum(row["right"] == "yes" for row in before)
-    assert f"{found} of {len(before)} records before" in text_of(page)
+    assert f"{found} of {len(before)} records met before" in text_of(page)
 
 
 def test_how_often_an_artificial_sensor_fault_is_named():
