@@ -267,7 +267,7 @@ def test_the_right_answers_of_some_seeds_counted_look_alikes_beside_seeds_that_d
         *table_below(page, "| cases | exactly right |"),
         *(row for row in table_below(page, "| seed | cases |") if row["exactly right"]),
     ]
-    assert len(rows) == 4 + 8
+    assert len(rows) == 4 + 9
     columns = ("with effects, exact", "nothing missing, named", "strangers `unknown`")
     for row in rows:
         (exact, effects), (named, nothing), (silent, strangers) = (
