@@ -118,9 +118,8 @@ def check_scheduler(address: str | None) -> None:
 
 def leave(client: Any, cluster: Any) -> None:
     """Leave a scheduler; end the cluster where it is ours, and none is given otherwise."""
-    with suppress(
-        Exception
-    ):  # of a scheduler that is lost Dask's own end fails at times, and hides why it came
+    # Of a scheduler that is lost Dask's own end fails at times, and would hide why it came.
+    with suppress(Exception):
         client.close(timeout=5)
     if cluster is not None:
         cluster.close(timeout=10)

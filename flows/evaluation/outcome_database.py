@@ -33,10 +33,10 @@ class DatabaseOutcomes:
             sa.MetaData(),
             sa.Column("key", sa.String(64), primary_key=True),
             sa.Column("owner", sa.String(100)),
-            sa.Column("beat_s", sa.Double),  # MySQL's FLOAT tells seconds of now apart by 128
-            sa.Column(
-                "data", sa.LargeBinary().with_variant(LONGBLOB(), "mysql", "mariadb")
-            ),  # BLOB ends at 64 kB
+            # MySQL's FLOAT tells seconds of now apart by 128.
+            sa.Column("beat_s", sa.Double),
+            # MySQL's BLOB ends at 64 kB.
+            sa.Column("data", sa.LargeBinary().with_variant(LONGBLOB(), "mysql", "mariadb")),
         )
         self._owner = f"{socket.gethostname()}:{os.getpid()}:{uuid.uuid4().hex[:8]}"
         self._mine: set[str] = set()
