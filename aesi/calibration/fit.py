@@ -236,7 +236,7 @@ def _with_provenance(
         fitted_with=model.model_name,
         capacity_shares=tuple(shares.items()),
         tested_on=tuple((name, day_of(days[name])) for name in shares if name in days),
-        fitted_at_k=tuple((r.name, round(kelvin_taken(declared, r), 2)) for r in model.records),
+        fitted_at_k=tuple((r.name, round(kelvin_taken(declared, r.rows), 2)) for r in model.records),
     )
 
 

@@ -6,11 +6,10 @@ from collections.abc import Sequence
 
 from aesi.calibration.ageing import Ageing
 from aesi.calibration.model import Model
-from aesi.calibration.parameters import free_parameters, with_interfaces, with_priors
+from aesi.calibration.parameters import free_parameters, with_interfaces, with_parameters, with_priors
 from aesi.calibration.records.conditions import Conditions
 from aesi.calibration.records.named import uniquely_named
 from aesi.calibration.records.prepared import (
-    Prepared,
     check_flows,
     fitted_rows_sentence,
     kelvin_taken,
@@ -19,6 +18,7 @@ from aesi.calibration.records.prepared import (
 )
 from aesi.calibration.records.sizes import other_sizes, sizes_sentence
 from aesi.calibration.records.spectra import degc_of, fitted_spectra
+from aesi.calibration.records.thinning import thinned
 from aesi.calibration.records.zero import Zero, zero_of
 from aesi.calibration.shapes import Shapes
 from aesi.calibration.start import (
@@ -69,18 +69,22 @@ def prepared_model(
         r.name for r, whole in zip(at_temperatures, records, strict=True) if r.time_s[0] > whole.time_s[0]
     ]
     model_name = conditions.model or "espm"
-    prepared_records = prepared(
-        start, at_temperatures, conditions.soc0, model_name, conditions.same_cell, cut_names
-    )
-    for one in prepared_records:
-        check_charge(start, one.rows, one.start.soc, one.hold)
+    rows = [thinned(data, start.capacity_ah) for data in at_temperatures]
     spectra, spectrum_sentences = fitted_spectra(start, conditions.spectra)
-    span = _span_k(start, prepared_records, spectra)
-    on_case = any(r.kelvin is not None and measured_on_case(r.kelvin) for r in prepared_records)
+    span = _span_k(start, [one.data for one in rows], spectra)
+    degc = (one.data.temperature_degc for one in rows)
+    on_case = any(one is not None and measured_on_case(one) for one in degc)
     start = with_interfaces(start, on_case)
     if span <= SPAN_K:
         start = with_unmoved_energies(declared, start, conditions.same_cell)
     free = with_priors(free_parameters(start, span, conditions.same_cell, on_case), conditions.priors)
+    # A voltage under load tells the charge of the cell that the fit starts from, with its films, contacts and energies.
+    loaded = with_parameters(start, {one.name: one.start for one in free})
+    prepared_records = prepared(
+        loaded, at_temperatures, rows, conditions.soc0, model_name, conditions.same_cell, cut_names
+    )
+    for one in prepared_records:
+        check_charge(start, one.rows, one.start.soc, one.hold)
     energies = {f.name: (f.start, f.sd) for f in free if f.name.endswith("_energy")}
     ageing = Ageing.of(prepared_records, conditions.dates, conditions.as_of)
     model = Model(
@@ -161,7 +165,7 @@ def _small_span_sentences(span_k: float, n_records: int) -> tuple[str, ...]:
     return (f"{apart}: activation energies and entropy are not fitted.",)
 
 
-def _span_k(cell: Cell, records: Sequence[Prepared], spectra: Sequence[Spectrum]) -> float:
+def _span_k(cell: Cell, records: Sequence[Measurement], spectra: Sequence[Spectrum]) -> float:
     """K between the coldest and the warmest record's mean, or spectrum."""
     means = [kelvin_taken(cell, r) for r in records] + [degc_of(s) + ZERO_CELSIUS_K for s in spectra]
     return max(means) - min(means)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aesi.calibration.records.thinning import thinned
+from aesi.calibration.records.thinning import Thinned
 from aesi.calibration.records.zero import is_slow, steadily_flowing
 from aesi.calibration.start import flowing
 from aesi.constants import ZERO_CELSIUS_K
@@ -64,6 +64,7 @@ class Prepared:
 def prepared(
     cell: Cell,
     records: Sequence[Measurement],
+    rows: Sequence[Thinned],
     soc0: float | None,
     model: ModelName = "espm",
     same_cell: bool = False,
@@ -71,21 +72,27 @@ def prepared(
 ) -> tuple[Prepared, ...]:
     """The records with their rows and initial states.
 
+    cell : that a fit starts from; under load a voltage is read of it.  rows : of each record, see `thinned`.
     soc0 : state of charge of all records whose voltage does not contradict it.  same_cell : True where the potentials
     are of this very cell.  cut : names of records whose first rows were cut off, so that `soc0` does not apply and the
     voltage is read.
     """
     least = SOC_SD if same_cell else OTHER_CELL_SD
     return tuple(
-        _prepared(cell, data, None if data.name in cut else soc0, len(records) > 1, model, least)
-        for data in records
+        _prepared(cell, data, thin, None if data.name in cut else soc0, len(records) > 1, model, least)
+        for data, thin in zip(records, rows, strict=True)
     )
 
 
 def _prepared(
-    cell: Cell, data: Measurement, soc0: float | None, shared: bool, model: ModelName, least: float
+    cell: Cell,
+    data: Measurement,
+    thin: Thinned,
+    soc0: float | None,
+    shared: bool,
+    model: ModelName,
+    least: float,
 ) -> Prepared:
-    thin = thinned(data, cell.capacity_ah)
     start = initial_state(
         cell, data, soc0, data.hold_taken, shared=shared, model=model, potentials_v=GOOD_READING_V
     )
@@ -177,6 +184,7 @@ def with_temperatures(
     return tuple(out), tuple(notes)
 
 
-def kelvin_taken(cell: Cell, record: Prepared) -> float:
-    """Mean temperature of a record, K; the file's where the record tells none."""
-    return cell.initial_temperature_k if record.mean_kelvin is None else record.mean_kelvin
+def kelvin_taken(cell: Cell, rows: Measurement) -> float:
+    """Mean temperature of the rows of a record, K; the file's where the record tells none."""
+    degc = rows.temperature_degc
+    return cell.initial_temperature_k if degc is None else float(degc.mean()) + ZERO_CELSIUS_K

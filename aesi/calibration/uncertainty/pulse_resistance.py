@@ -95,7 +95,7 @@ def pulse_resistance(
 
 def _fitted_pulses(found: Calibration, record: Prepared) -> Iterator[MeasuredPulse]:
     """The pulses in a fitted record, as its rows were measured."""
-    degc = kelvin_taken(found.declared, record) - ZERO_CELSIUS_K
+    degc = kelvin_taken(found.declared, record.rows) - ZERO_CELSIUS_K
     name = record.name
     socs, ohm = measured_pulses(found.cell, record.data, found.starts[name], found.capacities[name])
     for soc, resistance_ohm in zip(socs.tolist(), ohm.tolist(), strict=True):

@@ -98,7 +98,7 @@ def drive(step_s: float, hold: str | None = None) -> Measurement:
 )
 def test_how_the_current_was_taken_between_the_rows_of_a_fit_is_told(data, taken):
     cell = Cell.from_bpx(CELLS / "lg_m50_chen2020.bpx.json")
-    (ready,) = prepared(cell, [data], 0.8)
+    (ready,) = prepared(cell, [data], [thinned(data, cell.capacity_ah)], 0.8)
     assert fitted_rows_sentence(ready).endswith(taken)
 
 
@@ -106,7 +106,7 @@ def test_a_start_was_read_with_another_hold_than_its_record_is_simulated_with():
     cell = Cell.from_bpx(CELLS / "lg_m50_chen2020.bpx.json")
     time, current = np.arange(1000.0), np.repeat(np.random.default_rng(1).normal(2.5, 4.0, 200), 5)
     loaded = Measurement(time, current, simulate(cell, time, current, 0.7).voltage_v).between(505.0, 1000.0)
-    (ready,) = prepared(cell, [loaded], None)
+    (ready,) = prepared(cell, [loaded], [thinned(loaded, cell.capacity_ah)], None)
     linear, backward = (initial_state(cell, loaded, hold=hold).soc for hold in ("linear", "backward"))
     assert ready.hold == loaded.hold_taken == "linear"
     assert ready.start.soc == linear
