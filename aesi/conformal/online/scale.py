@@ -19,6 +19,10 @@ but constant there, a voltage that is written in millivolts is hit nearly always
 for the misses of that. Records of which 20, 10 and 5 % are driven by currents of either sign alike, under errors that
 grow with them (spci_boosted at 90 %): charging is covered 91.2, 91.6 and 91.4 %, in one group with rest 85.1, 79.8 and
 69.5; discharging 90.9, 90.3 and 91.5, and 92.4, 92.6 and 96.0."""
+ROUND_OFF = 1e-14
+"""Share by which a factor is rounded up. It is the score of a residual, and those that equal this one, of which rounded
+residuals have many, would else be left out by round-off: of residuals in steps of 1 mV a constant band at 70 % held 58
+to 59 % in three draws, and holds 78 to 80."""
 ENOUGH_SCORES = 200
 """Fewest held-out samples for a group to be scaled by its own scores; a smaller one is scaled by all."""
 
@@ -77,7 +81,7 @@ def _log_factor(scores: Array, alpha: float) -> float:
     """Log of the factor that the scores ask for; minus infinity where they are zero, as in a rest of constant voltage
     (`initial_log_ratio`)."""
     with np.errstate(divide="ignore"):
-        return float(np.log(conformal_quantile(scores, alpha)))
+        return float(np.log(conformal_quantile(scores, alpha))) + ROUND_OFF
 
 
 def _edges(current_a: Array) -> Array:

@@ -74,12 +74,13 @@ def initial_log_ratio(start: Array) -> Array:
 
 @kept_njit()
 def scaled_band(low: float, high: float, log_ratio: float, floor: float) -> tuple[float, float, bool]:
-    """The raw band scaled by r about its middle, at least `floor` wide; and whether it is held there."""
-    middle = 0.5 * (low + high)
-    half = 0.5 * max(abs(high - low), floor) * np.exp(log_ratio)
-    held = half <= 0.5 * floor
-    half = max(half, 0.5 * floor)
-    return middle - half, middle + half, held
+    """The raw band, low <= high, scaled by r about its middle, at least `floor` wide; and whether it is held there."""
+    raw, least = 0.5 * (high - low), 0.5 * floor
+    half = max(raw, least) * np.exp(log_ratio)
+    # Not middle +- half: an end is a residual of the calibration, which others equal where residuals are rounded, and
+    # round-off would leave all of them out.
+    more = max(half, least) - raw
+    return low - more, high + more, half <= least
 
 
 @kept_njit()

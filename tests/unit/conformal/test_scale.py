@@ -30,6 +30,15 @@ def test_currents_beside_those_that_are_held_are_in_no_group_with_them() -> None
     np.testing.assert_array_equal(scale.groups(np.array([-1.0, 0.0, 1.0, 2.0, 3.0])), [0, 1, 2, 3, 4])
 
 
+def test_residuals_that_equal_that_of_the_factor_were_left_out_by_round_off(rng: np.random.Generator) -> None:
+    calibration, later = 1e-3 * np.round(1.5 * rng.standard_normal((2, 2000))) + 4e-4
+    low, high = np.full(2000, -1.4e-3), np.full(2000, 6e-4)
+    scale = Scale.fit(np.abs(calibration - 0.5 * (low + high)) / (0.5 * (high - low)), 0.3, None)
+    everywhere, group = np.ones(2000, dtype=bool), np.zeros(2000, dtype=np.int64)
+    replay(low, high, everywhere, later, group, scale.log_ratio, 0.0, 0.3, 1e-6)
+    assert np.mean((low <= later) & (later <= high)) >= 0.7
+
+
 def test_rest_paid_for_the_misses_of_charging(rng: np.random.Generator) -> None:
     n = 40_000
     current = currents(rng, n, 0.1)

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aesi.conformal.online.tracker import AIM, LOG_RATIO_LIMIT, SHARED, adapt_log_ratio, replay
+from aesi.conformal.registry import METHODS
 
 ALPHA, RATE = 0.1, 0.05
 
@@ -51,6 +52,16 @@ def test_without_a_rate_nothing_moves() -> None:
     low, high, _ = run(np.array([5.0, -5.0, 5.0]), rate=0.0)
     np.testing.assert_array_equal(high, 1.0)
     np.testing.assert_array_equal(low, -1.0)
+
+
+@pytest.mark.parametrize("name", ["split", "enbpi"])
+def test_residuals_at_the_end_of_a_band_were_left_out_by_round_off(
+    name: str, rng: np.random.Generator
+) -> None:
+    # In steps of 1 mV, a third of them at one end of the band: 55 and 49 % of the next ones were inside.
+    calibration, later = 1e-3 * np.round(1.2 * rng.exponential(size=(2, 2000))) - 4e-4
+    intervals = METHODS[name].fit([calibration], alpha=0.3, window=60).intervals(later)
+    assert intervals.covers(later).mean() >= 0.7
 
 
 def test_a_stuck_sensor_neither_collapses_nor_explodes_the_band() -> None:

@@ -158,6 +158,25 @@ def test_a_whole_number_that_no_float_holds_is_told_with_its_field(content, sect
 
 
 @pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("Parameterisation", "Cell", "Nominal cell capacity [A.h]"), True),
+        (("Parameterisation", "Negative electrode", "Conductivity [S.m-1]"), True),
+        (("Parameterisation", "Electrolyte", "Conductivity activation energy [J.mol-1]"), False),
+        (("State", "Initial conditions", "Initial state-of-charge"), True),
+    ],
+    ids=["capacity", "electrode", "energy", "state"],
+)
+def test_a_truth_value_was_taken_for_a_number(content, path, value):
+    *sections, field = path
+    section = content
+    for name in sections:
+        section = section.setdefault(name, {})
+    section[field] = value
+    assert fault(content) == f"BPX data: {': '.join(path)} is {value}; give a number."
+
+
+@pytest.mark.parametrize(
     ("text", "told"),
     [
         ('{"Header": ' + 5000 * "1" + "}", "holds a whole number of thousands of digits"),

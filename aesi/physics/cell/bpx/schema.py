@@ -206,6 +206,7 @@ def _check_schema(v1: dict[str, Any], where: str) -> None:
                 relation(fields[name], f"{where}: {section}, {name}")
             if name in fields and name in OCP_FIELDS:
                 fields[name] = STANDIN_TABLE
+    _check_no_truth_value({name: part for name, part in shown.items() if name != "Header"}, where)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -214,6 +215,15 @@ def _check_schema(v1: dict[str, Any], where: str) -> None:
         raise CellError(f"{where}: {_fault_sentence(error)}") from None
     except (ValueError, TypeError, KeyError, AttributeError) as error:
         raise CellError(f"{where} fails the BPX schema: {error}.") from None
+
+
+def _check_no_truth_value(content: Mapping[str, Any], where: str) -> None:
+    """Raises CellError, naming sections and field, for `true` or `false`: the schema takes them for 1 and 0."""
+    for name, value in content.items():
+        if isinstance(value, bool):
+            raise CellError(f"{where}: {name} is {value}; give a number.")
+        if isinstance(value, Mapping):
+            _check_no_truth_value(value, f"{where}: {name}")
 
 
 def _fault_sentence(error: Any) -> str:
