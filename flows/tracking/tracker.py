@@ -114,9 +114,11 @@ class Tracker:
         self._outbox = Outbox(
             environment.state() / "outbox" / self.run_id, partial(deliver, store), store.away, say
         )
-        self._tracked |= {item["label"] for item in self._outbox.left if item["kind"] == "run"}
         for item in self._outbox.left:
-            self._began |= item["params"] if item["kind"] == "batch" else {}
+            if item.get("kind") == "run":
+                self._tracked.add(item["label"])
+            elif item.get("kind") == "batch":
+                self._began |= item["params"]
         self._stop = threading.Event()
         if config.tracking.system_metrics:
             threading.Thread(target=self._sample, name="aesi-system", daemon=True).start()

@@ -248,9 +248,9 @@ def test_an_item_that_was_left_over_and_refused_was_called_delivered(store, work
     (box / "00000001.json").write_text(json.dumps({"kind": "of a later version"}))
     deliver_leftovers(store, said.append)
     refused, delivered = said
-    assert "the store refused an item" in refused
+    assert "the store refused an item (this version knows no item of kind 'of a later version')" in refused
     assert delivered == (
-        f"tracking: what run {run_id[:8]} had left over is delivered, but for what the store refused."
+        f"tracking: what run {run_id[:8]} had left over is delivered, but for what was put aside."
     )
 
 
@@ -377,3 +377,23 @@ def test_a_run_that_was_killed_when_all_was_done_was_closed_as_killed(store, unf
     store.client.set_terminated(record.run_id, "FINISHED")
     assert status_after_the_next_job(store, record.run_id) == "FINISHED"
     assert "had been killed" not in capsys.readouterr().err
+
+
+def test_an_item_that_was_cut_off_ended_each_later_command(store, workspace, capsys):
+    run_id = store.create_run(store.experiment("small"), "small, seed 0", {})
+    box = workspace / ".aesi" / "outbox" / run_id
+    box.mkdir(parents=True)
+    (box / "00000001.json").write_text('{"kind": "json", "run_')
+    (box / "00000002.json").write_text(
+        json.dumps({"kind": "json", "run_id": run_id, "name": "a.json", "content": {}})
+    )
+    assert status_after_the_next_job(store, run_id) == "RUNNING"
+    unreadable, delivered, *_ = capsys.readouterr().err.splitlines()
+    assert "cannot be read (Unterminated string" in unreadable
+    assert (
+        f"it is kept in {box / 'refused' / '00000001.json'}: put a whole copy back into {box}" in unreadable
+    )
+    assert delivered.endswith("is delivered, but for what was put aside.")
+    assert [one.path for one in store.client.list_artifacts(run_id)] == ["a.json"]
+    status_after_the_next_job(store, run_id)
+    assert capsys.readouterr().err == ""
