@@ -32,6 +32,21 @@ def without_login(uri: str) -> str:
     return f"{head}{place}{'?' if kept else ''}{'&'.join(kept)}"
 
 
+def login_to_fill_in(uri: str) -> str:
+    """The address as a command line to be typed shows it: USER and PASSWORD stand where the login was."""
+    shown = without_login(uri)
+    if shown == uri:
+        return uri
+    head, login = _head_and_login(uri)
+    blank = "USER@" if login and ":" not in login else "USER:PASSWORD@"
+    return f"{head}{blank}{shown.removeprefix(head)}"
+
+
+def logins_to_fill_in(text: str) -> str:
+    """A text with each address in it as `login_to_fill_in` has it."""
+    return ADDRESS.sub(lambda found: login_to_fill_in(found[0]), text)
+
+
 def without_logins(text: str) -> str:
     """A text, such as an error's, with each address in it as `without_login` has it."""
     return ADDRESS.sub(lambda found: without_login(found[0]), text)

@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from aesi.logins import without_login
+from aesi.logins import login_to_fill_in
 from aesi.pipeline.written import REPORT
 from flows.base.console import Console, duration
 from flows.jobs.run_request import RunRequest
@@ -45,8 +45,8 @@ def run_experiment(request: RunRequest, run: Stages, console: Console) -> Path:
 
 
 def _uri_option(uri: str | None) -> str:
-    """What finds the store of an experiment that names one, as a shell takes it; without the login in it."""
-    return f" --uri {shlex.quote(without_login(uri))}" if uri else ""
+    """What finds the store of an experiment that names one, as a shell takes it; its login is left to fill in."""
+    return f" --uri {shlex.quote(login_to_fill_in(uri))}" if uri else ""
 
 
 def _shown(path: Path) -> str:

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 from aesi.errors import InputError
-from aesi.logins import without_login, without_logins
+from aesi.logins import login_to_fill_in, logins_to_fill_in, without_login, without_logins
 from aesi.pipeline.experiment.config import (
     LIMITS,
     NO_PART,
@@ -91,11 +91,11 @@ class RunRequest:
 
     @property
     def resuming(self) -> str:
-        """The command line that goes on with what this one began, without the logins of addresses in it."""
+        """The command line that goes on with what this one began; the logins of addresses in it are left to fill in."""
         words = ["aesi", "run", self.path]
-        words += [word for text in self.shown_overrides for word in ("--set", text)]
+        words += [word for text in self.overrides for word in ("--set", logins_to_fill_in(text))]
         words += ["--runner", self.runner] if self.runner else []
-        words += ["--address", self.shown_address] if self.shown_address else []
+        words += ["--address", login_to_fill_in(self.address)] if self.address else []
         words += [] if self.use_cache else ["--no-cache"]
         words += [] if self.use_prefect else ["--no-prefect"]
         return shlex.join([*words, "--resume"])

@@ -24,7 +24,7 @@ from flows.tracking.run_records import RunLock, RunRecord, RunTaken, records
 
 if TYPE_CHECKING:
     from flows.tracking.store import Store
-    from flows.tracking.tracker import Subject, Tracker
+    from flows.tracking.tracker import Subject, Trackable, Tracker
 
 UNFINISHED = ("running", "killed", "failed")
 BAD_INPUT = InputError.exit_code
@@ -57,12 +57,10 @@ def tracked_job(subject: Subject, title: str, console: Console) -> Iterator[Trac
     """A tracked run of a job that is no experiment, closed as what it becomes; None, which is said, where the store is
     away or nothing can be written in the workspace: the job's results lie elsewhere.
 
-    title : what the run is called.  Runs of the same name that were killed before are closed first, and what any run
-    could not deliver is delivered.
+    title : what the run is called.  Runs that were killed before are closed first, and what they could not deliver is
+    delivered.
     """
-    from flows.tracking.leftovers import deliver_leftovers
     from flows.tracking.store import Store, StoreAway
-    from flows.tracking.tracker import Tracker
 
     try:
         check_writable(environment.state() / "state" / "any")
@@ -72,19 +70,16 @@ def tracked_job(subject: Subject, title: str, console: Console) -> Iterator[Trac
         )
         yield None
         return
-    try:
-        store = Store(subject.tracking.uri)
-        with store.in_use():
-            _close_killed(subject.name, store, console)
-            deliver_leftovers(store, console.say)
-            tracker = Tracker(store, subject, console.say, title=title)
-    except StoreAway as error:
-        console.say(f"not tracked: {error}")
-        yield None
-        return
-    record = RunRecord(tracker.run_id, subject.name, subject.digest, time.time())
-    with RunLock(tracker.run_id):
-        record.write()
+    with ExitStack() as held:
+        try:
+            store = Store(subject.tracking.uri)
+            with store.in_use():
+                _put_in_order(store, console)
+                tracker, record = _begun(subject, subject.digest, title, store, console, held)
+        except StoreAway as error:
+            console.say(f"not tracked: {error}")
+            yield None
+            return
         with _ended_as_it_ends(record, tracker, console):
             yield tracker
 
@@ -121,21 +116,36 @@ def _begin(
 ) -> tuple[Tracker, RunRecord]:
     """The tracker of the run to work on and its record, after what earlier runs have left is put in order; `held` keeps
     the run's lock, outside of which nothing is done with it."""
-    from flows.tracking.leftovers import deliver_leftovers
     from flows.tracking.tracker import Tracker
 
-    _close_killed(config.name, store, console)
-    deliver_leftovers(store, console.say)
+    _put_in_order(store, console)
     anew = not request.use_cache
     old = _unfinished(config, store, console, held, anew) if request.resume else None
-    tracker = Tracker(store, config, console.say, old.run_id if old else None, request.title)
-    if old:
-        record = replace(old, status="running")
-    else:
-        key = resume_key(config)
-        record = RunRecord(tracker.run_id, config.name, key, time.time(), anew=anew)
+    if old is None:
+        return _begun(config, resume_key(config), request.title, store, console, held, anew)
+    record = replace(old, status="running")
+    record.write()  # before it runs in the store: who is killed in between is closed there
+    return Tracker(store, config, console.say, old.run_id), record
+
+
+def _begun(
+    subject: Trackable,
+    key: str,
+    title: str,
+    store: Store,
+    console: Console,
+    held: ExitStack,
+    anew: bool = False,
+) -> tuple[Tracker, RunRecord]:
+    """The tracker of a new run and its record, on disk; its lock is in `held`.  key : the record's digest."""
+    from flows.tracking.beginnings import noted_beginning
+    from flows.tracking.tracker import Tracker
+
+    with noted_beginning(store, subject.name) as tags:
+        tracker = Tracker(store, subject, console.say, title=title, tags=tags)
         held.enter_context(RunLock(tracker.run_id))  # before anybody could find its record without
-    record.write()
+        record = RunRecord(tracker.run_id, subject.name, key, time.time(), anew=anew)
+        record.write()
     return tracker, record
 
 
@@ -154,10 +164,12 @@ def _advice_where_full(request: RunRequest) -> Iterator[None]:
 
 def _close(record: RunRecord, tracker: Tracker, status: str, wait_s: float) -> None:
     """Say on disk and in the store how the run ended, as far as they take it; the reason is on its way already."""
-    with suppress(OSError):
+    with suppress(
+        OSError
+    ):  # the store first: whoever comes next looks at no run whose record says that it has ended
+        tracker.conclude(status.upper())
         replace(record, status=status).write()
-    with suppress(OSError):
-        tracker.end(status.upper(), wait_s)
+    tracker.close(wait_s)
 
 
 def _withdraw(record: RunRecord, tracker: Tracker) -> None:
@@ -215,22 +227,25 @@ def _unfinished(
     return None
 
 
-def _close_killed(experiment: str, store: Store, console: Console) -> None:
+def _put_in_order(store: Store, console: Console) -> None:
+    """Close what was killed, deliver what was left over."""
+    from flows.tracking.beginnings import close_unrecorded
+    from flows.tracking.leftovers import deliver_leftovers
+
+    close_unrecorded(store, console.say)
+    _close_killed(store, console)
+    deliver_leftovers(store, console.say)
+
+
+def _close_killed(store: Store, console: Console) -> None:
     """A run that was killed stays RUNNING in MLflow for ever; whoever comes next closes it."""
-    for record in records(experiment):
+    for record in records():
         if record.status != "running" or not store.holds(record.run_id):
             continue
         with suppress(RunTaken), RunLock(record.run_id) as lock:
-            if lock.held and record.again() == record:
-                replace(record, status="killed").write()
-                _terminate(store, record.run_id)
+            if not lock.held or record.again() != record:
+                continue
+            if store.run(record.run_id).info.status == "RUNNING":  # else it was killed when all was done
+                store.client.set_terminated(record.run_id, "KILLED")
                 console.say(f"run {record.run_id} had been killed; it is closed as such.")
-
-
-def _terminate(store: Store, run_id: str) -> None:
-    from mlflow.exceptions import MlflowException
-
-    try:
-        store.client.set_terminated(run_id, "KILLED")
-    except (MlflowException, OSError):
-        return  # the run is gone from the store: nothing to close
+            replace(record, status="killed").write()

@@ -155,7 +155,10 @@ one (`_send_run`): each request would make a new one."""
 
 def deliver(store: Store, item: Item, again: bool) -> None:
     """Send an item.  again : whether it may have been sent before."""
-    if item["kind"] == "run":
+    kind = item.get("kind")
+    if kind == "run":
         _send_run(store, item, again)
+    elif kind in SENDERS:
+        SENDERS[kind](store, item)
     else:
-        SENDERS[item["kind"]](store, item)
+        raise ValueError(f"this version knows no item of kind {kind!r}")

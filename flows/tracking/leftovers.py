@@ -27,5 +27,5 @@ def deliver_leftovers(store: Store, say: Callable[[str], None]) -> None:
             left = outbox.flush(FLUSH_S)
             outbox.close()
             if not left:
-                but = ", but for what the store refused" if outbox.refused else ""
+                but = ", but for what was put aside" if outbox.refused else ""
                 say(f"tracking: what run {folder.name[:8]} had left over is delivered{but}.")

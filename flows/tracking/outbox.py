@@ -38,7 +38,7 @@ class Outbox:
 
     away : tells a passing failure (retried for ever) from an item the store refuses (put aside, and said).
     left : what an earlier process had put in and not delivered, in order.
-    refused : whether an item was put aside since this object was made, which the store refused.
+    refused : whether an item was put aside since this object was made: the store refused it, or it cannot be read.
     """
 
     def __init__(
@@ -60,11 +60,13 @@ class Outbox:
         self.refused = False
         folder.mkdir(parents=True, exist_ok=True)
         # One process writes here, so that the folder is listed once: very many may wait for a store that is away.
-        self._waiting = deque(sorted(folder.glob("[0-9]*.json")))
-        self.left: tuple[Item, ...] = tuple(json.loads(path.read_bytes()) for path in self._waiting)
-        self._old = {path.name for path in self._waiting}
+        found = sorted(folder.glob("[0-9]*.json"))
         aside = (folder / REFUSED).glob("[0-9]*.json")  # whose numbers are taken, too
-        self._next = 1 + max((int(path.stem) for path in (*self._waiting, *aside)), default=0)
+        self._next = 1 + max((int(path.stem) for path in (*found, *aside)), default=0)
+        read = {path: item for path in found if (item := self._read(path)) is not None}
+        self.left: tuple[Item, ...] = tuple(read.values())
+        self._waiting = deque(read)
+        self._old = {path.name for path in read}
         self._thread = threading.Thread(target=self._run, name="aesi-outbox", daemon=True)
         self._thread.start()
 
@@ -156,16 +158,13 @@ class Outbox:
                 return False
             self._tries = 0
             refused = f"the store refused an item ({first_line(error)})"
-            aside = self._folder / REFUSED / path.name
             try:
-                aside.parent.mkdir(exist_ok=True)
-                path.replace(aside)
+                aside = self._put_aside(path)
             except OSError as blocked:
                 self._complain(
                     f"{refused}; {path} cannot be put aside ({first_line(blocked)}) and is tried again"
                 )
                 return False
-            self.refused = True
             self._say(f"tracking: {refused}; it is kept in {aside}.")
             return True
         self._tries = 0
@@ -174,6 +173,32 @@ class Outbox:
             self._failing_since = None
             self._say("tracking: the store answers again; what waited is being delivered.")
         return True
+
+    def _read(self, path: Path) -> Item | None:
+        """What an earlier process had put in; None, which is said, of what cannot be read, such as a file that is cut
+        off. It is put aside where it can be."""
+        try:
+            item = json.loads(path.read_bytes())
+            if isinstance(item, dict):
+                return item
+            reason = "it is no item"
+        except (ValueError, OSError) as error:
+            reason = first_line(error)
+        where = path
+        with suppress(OSError):
+            where = self._put_aside(path)
+        self._say(
+            f"tracking: an item that waited for the store cannot be read ({reason}), so that what it held is missing "
+            f"there; it is kept in {where}: put a whole copy back into {path.parent}, or delete it."
+        )
+        return None
+
+    def _put_aside(self, path: Path) -> Path:
+        """Where an item is from now on.  Raises OSError where it cannot be moved."""
+        self.refused = True
+        aside = self._folder / REFUSED / path.name
+        aside.parent.mkdir(exist_ok=True)
+        return path.replace(aside)
 
     def _complain(self, reason: str) -> None:
         """Say, once until something is delivered again, why nothing is."""

@@ -134,14 +134,35 @@ class Store:
         return cls(uri)
 
     def experiment(self, name: str) -> str:
-        """Id of the experiment of that name, made if it is not there."""
+        """Id of the experiment of that name, made if it is not there.
+
+        Raises StoreAway where it keeps the files of its runs in a folder of another machine.
+        """
         with _alone(self._path if self.local else None):
             found = self.client.get_experiment_by_name(name)
             if found is not None:
                 if found.lifecycle_stage == "deleted":
                     self.client.restore_experiment(found.experiment_id)
+                self._check_artifacts(name, found.artifact_location)
                 return str(found.experiment_id)
-            return str(self.client.create_experiment(name, self._new_artifact_place(name)))
+            place = self._new_artifact_place(name)
+            number = str(self.client.create_experiment(name, place))
+            if place:  # by which the machine is known that made the experiment
+                _local(place).mkdir(parents=True, exist_ok=True)
+            return number
+
+    def _check_artifacts(self, name: str, place: str) -> None:
+        """Whoever made the folder of another machine here would keep files that the other one never finds."""
+        if (
+            place.startswith("file:")
+            and place != self._new_artifact_place(name)
+            and not _local(place).is_dir()
+        ):
+            raise StoreAway(
+                f"the experiment {name} of the tracking store {without_login(self.uri)} keeps its artifacts in "
+                f"{_local(place)}, which is not on this machine; mount that folder here at the same path, track on a "
+                "server (http://HOST:PORT), which keeps them itself, or give the experiment another name."
+            )
 
     @property
     def database(self) -> Any:
@@ -214,13 +235,13 @@ class Store:
         Raises InputError where the run carries none of that name.
         """
         from mlflow.exceptions import MlflowException
-        from mlflow.utils.file_utils import local_file_uri_to_path
 
         if str(run.info.artifact_uri).startswith("file:"):  # where it lies: MLflow would leave a copy behind
-            path = Path(local_file_uri_to_path(run.info.artifact_uri)) / name
-            if not path.exists():
-                raise InputError(f"run {run.info.run_id} carries no {name}: there is no {path}.")
-            return path
+            path = _local(run.info.artifact_uri) / name
+            if path.exists():
+                return path
+            there = "" if path.parents[2].is_dir() else " Mount the artifacts of its experiment at that path."
+            raise InputError(f"run {run.info.run_id} carries no {name}: there is no {path}.{there}")
         try:
             return Path(self.client.download_artifacts(run.info.run_id, name))
         except (OSError, ValueError, MlflowException) as error:
@@ -294,6 +315,13 @@ class Store:
         except Exception:
             return False
         return True
+
+
+def _local(uri: str) -> Path:
+    """The path of a `file:` address."""
+    from mlflow.utils.file_utils import local_file_uri_to_path
+
+    return Path(local_file_uri_to_path(uri))
 
 
 def now_ms() -> int:

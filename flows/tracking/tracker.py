@@ -82,7 +82,7 @@ class Tracker:
 
     run_id : MLflow's id of the parent run, which also names the folder below runs/.  resumed : whether it is old.
     experiment_id : MLflow's id of the experiment.  title : what a new run is called; None names the experiment and the
-    seed.
+    seed.  tags : what a new run carries beside its own.
     """
 
     def __init__(
@@ -92,6 +92,7 @@ class Tracker:
         say: Callable[[str], None],
         run_id: str | None = None,
         title: str | None = None,
+        tags: Mapping[str, str] | None = None,
     ) -> None:
         self.store = store
         self._config = config
@@ -102,9 +103,9 @@ class Tracker:
         self.resumed = run_id is not None
         if run_id is None:
             job = config.job if isinstance(config, Subject) else EXPERIMENT
-            tags = {KIND: "run", JOB: job, "aesi.config_digest": config.digest, **source_tags()}
+            own = {KIND: "run", JOB: job, "aesi.config_digest": config.digest, **source_tags()}
             name = title or f"{config.name}, seed {config.seed}"
-            self.run_id = store.create_run(self.experiment_id, _short(name), tags)
+            self.run_id = store.create_run(self.experiment_id, _short(name), {**own, **(tags or {})})
         else:
             self.run_id = run_id
             store.client.update_run(run_id, status="RUNNING")
@@ -113,9 +114,11 @@ class Tracker:
         self._outbox = Outbox(
             environment.state() / "outbox" / self.run_id, partial(deliver, store), store.away, say
         )
-        self._tracked |= {item["label"] for item in self._outbox.left if item["kind"] == "run"}
         for item in self._outbox.left:
-            self._began |= item["params"] if item["kind"] == "batch" else {}
+            if item.get("kind") == "run":
+                self._tracked.add(item["label"])
+            elif item.get("kind") == "batch":
+                self._began |= item["params"]
         self._stop = threading.Event()
         if config.tracking.system_metrics:
             threading.Thread(target=self._sample, name="aesi-system", daemon=True).start()
@@ -234,8 +237,16 @@ class Tracker:
 
     def end(self, status: str, wait_s: float = FLUSH_S) -> int:
         """Close the parent run; returns how many items the store has not taken yet."""
+        self.conclude(status)
+        return self.close(wait_s)
+
+    def conclude(self, status: str) -> None:
+        """Keep on disk, for the store, that the parent run ends."""
         self._stop.set()
         self._outbox.put({"kind": "end", "run_id": self.run_id, "status": status, "at_ms": now_ms()})
+
+    def close(self, wait_s: float) -> int:
+        """Stop tracking; returns how many items the store has not taken yet."""
         left = self.flush(wait_s)
         self._outbox.close()
         return left

@@ -3,7 +3,7 @@
 import pytest
 
 from aesi.errors import first_line
-from aesi.logins import login_left_out, without_login, without_logins
+from aesi.logins import login_left_out, login_to_fill_in, without_login, without_logins
 
 
 @pytest.mark.parametrize(
@@ -55,3 +55,20 @@ def test_a_password_with_an_at_sign_was_told_as_a_part_of_the_host():
     said = 'could not translate host name "cret@127.0.0.1" to address'
     told = login_left_out(said, "postgresql://me:se@cret@127.0.0.1:9/none")
     assert told == 'could not translate host name "127.0.0.1" to address'
+
+
+@pytest.mark.parametrize(
+    ("uri", "typed"),
+    [
+        (
+            "postgresql://me:secret@host/db?sslmode=require",
+            "postgresql://USER:PASSWORD@host/db?sslmode=require",
+        ),
+        ("postgresql://me@host/db", "postgresql://USER@host/db"),  # the password is in a file of the driver's
+        ("postgresql://host/db?user=me&password=secret", "postgresql://USER:PASSWORD@host/db"),
+        ("postgresql://host/db", "postgresql://host/db"),
+        ("sqlite:////home/me/a@b.db", "sqlite:////home/me/a@b.db"),
+    ],
+)
+def test_a_command_to_be_typed_had_no_place_for_the_login_that_it_needs(uri, typed):
+    assert login_to_fill_in(uri) == typed

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from aesi.pipeline.experiment.sections import TrackingConfig
 from flows.base.console import Console
 from flows.jobs.run_request import RunRequest
 from flows.jobs.run_session import _close_killed, _unfinished, resume_key, tracked_job, working_on
@@ -119,9 +120,9 @@ def test_a_run_was_tracked_and_noted_before_it_was_this_processs_alone(
             return True
 
     class Watched(Tracker):
-        def __init__(self, store, config, say, run_id=None, title=None):
+        def __init__(self, store, config, say, run_id=None, **named):
             seen.append(run_id is None or taken(run_id))
-            super().__init__(store, config, say, run_id, title)
+            super().__init__(store, config, say, run_id, **named)
 
     written = RunRecord.write
 
@@ -151,7 +152,7 @@ def test_a_run_that_others_work_on_is_neither_closed_nor_delivered(store, unfini
     (box / "00000001.json").write_text("{}")
     with RunLock(record.run_id):
         deliver_leftovers(store, said.append)
-        _close_killed("small", store, Console())
+        _close_killed(store, Console())
     assert said == []
     assert (box / "00000001.json").exists()
     assert record.again().status == "running"
@@ -218,7 +219,7 @@ def test_a_run_was_left_behind_by_its_workspace_when_that_was_moved(
     shutil.rmtree(report.parent)
     monkeypatch.setenv("AESI_HOME", str(moved))
     store = Store()
-    _close_killed("small", store, Console())
+    _close_killed(store, Console())
     deliver_leftovers(store, print)
     assert f"run {record.run_id} had been killed" in capsys.readouterr().err
     assert [one.path for one in store.client.list_artifacts(record.run_id)] == ["report.html"]
@@ -247,9 +248,9 @@ def test_an_item_that_was_left_over_and_refused_was_called_delivered(store, work
     (box / "00000001.json").write_text(json.dumps({"kind": "of a later version"}))
     deliver_leftovers(store, said.append)
     refused, delivered = said
-    assert "the store refused an item" in refused
+    assert "the store refused an item (this version knows no item of kind 'of a later version')" in refused
     assert delivered == (
-        f"tracking: what run {run_id[:8]} had left over is delivered, but for what the store refused."
+        f"tracking: what run {run_id[:8]} had left over is delivered, but for what was put aside."
     )
 
 
@@ -263,9 +264,136 @@ def test_a_run_that_ended_while_its_lock_was_asked_for_was_closed_as_killed(
     config, record = unfinished
     stale = replace(record, status="running")
     replace(record, status="finished").write()
-    monkeypatch.setattr("flows.jobs.run_session.records", lambda experiment: [stale])
-    _close_killed("small", store, Console())
+    monkeypatch.setattr("flows.jobs.run_session.records", lambda *experiment: [stale])
+    _close_killed(store, Console())
     assert record.again().status == "finished"
     assert _unfinished(config, store, Console(), held) is None
     with RunLock(record.run_id):
         pass
+
+
+def dying_after(function):
+    """The function, whose process dies when its work is done."""
+
+    def dies(*arguments, **named):
+        function(*arguments, **named)
+        raise KeyboardInterrupt
+
+    return dies
+
+
+def status_after_the_next_job(store, run_id):
+    with tracked_job(Subject("another", 0, "key", "batch"), "title", Console()):
+        return store.run(run_id).info.status
+
+
+JOB = Subject("job", 0, "key", "batch")
+
+
+def test_a_run_of_a_process_that_died_before_its_record_was_written_stayed_running_for_good(
+    store, workspace, monkeypatch, capsys
+):
+    with monkeypatch.context() as patched:
+        patched.setattr(Store, "create_run", dying_after(Store.create_run))
+        with pytest.raises(KeyboardInterrupt), tracked_job(JOB, "title", Console()):
+            pass
+    (run,) = store.jobs(store.find_experiment("job"))
+    assert (run.info.status, records()) == ("RUNNING", [])
+    assert status_after_the_next_job(store, run.info.run_id) == "KILLED"
+    assert f"run {run.info.run_id} had been killed as it began" in capsys.readouterr().err
+    assert not list((workspace / ".aesi" / "begun").glob("*.json"))
+
+
+def test_the_note_of_a_run_is_kept_until_the_store_that_may_hold_it_was_asked(store, workspace, monkeypatch):
+    def dies(*_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Store, "create_run", dies)
+        with pytest.raises(KeyboardInterrupt), tracked_job(JOB, "title", Console()):
+            pass
+    (note,) = (workspace / ".aesi" / "begun").glob("*.json")
+    with tracked_job(
+        replace(JOB, tracking=TrackingConfig(uri=f"sqlite:///{workspace}/other.db")), "title", Console()
+    ):
+        assert note.exists()
+    with tracked_job(JOB, "title", Console()):
+        assert not note.exists()
+
+
+def test_a_process_that_died_as_it_closed_its_run_left_it_running_in_the_store(store, monkeypatch):
+    written = RunRecord.write
+
+    def dies(record):
+        written(record)
+        if record.status == "failed":
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(RunRecord, "write", dies)
+        with pytest.raises(KeyboardInterrupt), tracked_job(JOB, "title", Console()) as tracker:
+            raise ValueError
+    assert records("job")[0].status == "failed"
+    assert status_after_the_next_job(store, tracker.run_id) == "FAILED"
+
+
+def test_a_process_that_died_as_it_went_on_with_a_run_left_it_running_in_the_store(
+    store, unfinished, workspace, monkeypatch
+):
+    from mlflow import MlflowClient
+
+    _, record = unfinished
+    with monkeypatch.context() as patched:
+        patched.setattr(MlflowClient, "update_run", dying_after(MlflowClient.update_run))
+        with (
+            pytest.raises(KeyboardInterrupt),
+            working_on(RunRequest(str(workspace / "small.yaml"), resume=True), store, Console()),
+        ):
+            pass
+    assert store.run(record.run_id).info.status == "RUNNING"
+    assert status_after_the_next_job(store, record.run_id) == "KILLED"
+
+
+def test_a_run_whose_end_the_store_did_not_take_was_noted_as_closed(store, unfinished, monkeypatch):
+    from mlflow import MlflowClient
+    from mlflow.exceptions import MlflowException
+
+    def fails(self, *_):
+        raise MlflowException("database is locked")
+
+    _, record = unfinished
+    replace(record, status="running").write()
+    with monkeypatch.context() as patched:
+        patched.setattr(MlflowClient, "set_terminated", fails)
+        with tracked_job(JOB, "title", Console()) as tracker:
+            assert tracker is None
+    assert record.again().status == "running"
+    assert status_after_the_next_job(store, record.run_id) == "KILLED"
+
+
+def test_a_run_that_was_killed_when_all_was_done_was_closed_as_killed(store, unfinished, capsys):
+    _, record = unfinished
+    replace(record, status="running").write()
+    store.client.set_terminated(record.run_id, "FINISHED")
+    assert status_after_the_next_job(store, record.run_id) == "FINISHED"
+    assert "had been killed" not in capsys.readouterr().err
+
+
+def test_an_item_that_was_cut_off_ended_each_later_command(store, workspace, capsys):
+    run_id = store.create_run(store.experiment("small"), "small, seed 0", {})
+    box = workspace / ".aesi" / "outbox" / run_id
+    box.mkdir(parents=True)
+    (box / "00000001.json").write_text('{"kind": "json", "run_')
+    (box / "00000002.json").write_text(
+        json.dumps({"kind": "json", "run_id": run_id, "name": "a.json", "content": {}})
+    )
+    assert status_after_the_next_job(store, run_id) == "RUNNING"
+    unreadable, delivered, *_ = capsys.readouterr().err.splitlines()
+    assert "cannot be read (Unterminated string" in unreadable
+    assert (
+        f"it is kept in {box / 'refused' / '00000001.json'}: put a whole copy back into {box}" in unreadable
+    )
+    assert delivered.endswith("is delivered, but for what was put aside.")
+    assert [one.path for one in store.client.list_artifacts(run_id)] == ["a.json"]
+    status_after_the_next_job(store, run_id)
+    assert capsys.readouterr().err == ""

@@ -321,7 +321,7 @@ def test_what_waits_in_the_workspace_was_not_compared_nor_rebuilt(tracked, call,
 
 def test_the_hints_at_the_end_of_a_run_did_not_find_it_on_a_server():
     assert _uri_option(None) == ""
-    assert _uri_option("https://me:secret@host/my runs") == " --uri 'https://host/my runs'"
+    assert _uri_option("https://me:secret@host/my runs") == " --uri 'https://USER:PASSWORD@host/my runs'"
 
 
 def test_the_time_of_a_fit_is_called_so_of_an_earlier_version_s_runs_too(tracked, tmp_path):

@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import pytest
 from alembic.runtime.migration import HeadMaintainer
 
-from flows.tracking.store import Store
+from aesi.errors import InputError
+from flows.tracking.store import Store, StoreAway
 
 
 def test_a_store_that_was_interrupted_while_it_was_made_could_never_be_used(tmp_path, monkeypatch):
@@ -51,3 +52,26 @@ def test_a_server_keeps_the_files_of_runs_where_it_says(made):
     for uri in ("http://there:5000", "databricks"):
         Store(uri).experiment(uri)
     assert made == {"http://there:5000": None, "databricks": None}
+
+
+def test_files_of_a_run_were_left_at_the_path_of_another_machine(tracked, tmp_path_factory):
+    store, there = Store(), tmp_path_factory.mktemp("there") / "mlartifacts" / "drive"
+    number = store.client.create_experiment("drive", there.as_uri())
+    with pytest.raises(
+        StoreAway, match=f"keeps its artifacts in {there}, which is not on this machine; mount"
+    ):
+        store.experiment("drive")
+    run = store.client.create_run(number)
+    with pytest.raises(InputError, match="Mount the artifacts of its experiment at that path"):
+        store.read(run, "summary.json")
+    assert not there.exists()
+    there.mkdir(parents=True)
+    assert store.experiment("drive") == number
+    with pytest.raises(InputError, match=r"summary\.json\.$"):
+        store.read(run, "summary.json")
+
+
+def test_an_experiment_whose_folder_was_not_made_yet_is_at_home(tracked):
+    store = Store()
+    number = store.client.create_experiment("drive", (tracked / "mlartifacts" / "drive").as_uri())
+    assert store.experiment("drive") == number
