@@ -164,9 +164,8 @@ def _advice_where_full(request: RunRequest) -> Iterator[None]:
 
 def _close(record: RunRecord, tracker: Tracker, status: str, wait_s: float) -> None:
     """Say on disk and in the store how the run ended, as far as they take it; the reason is on its way already."""
-    with suppress(
-        OSError
-    ):  # the store first: whoever comes next looks at no run whose record says that it has ended
+    # The store first: whoever comes next looks at no run whose record says that it has ended.
+    with suppress(OSError):
         tracker.conclude(status.upper())
         replace(record, status=status).write()
     tracker.close(wait_s)
