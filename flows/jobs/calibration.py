@@ -10,7 +10,7 @@ from typing import Any
 from aesi.calibration.result import until_words
 from aesi.pipeline.calibrate import Request, calibrate_files
 from aesi.pipeline.notes import together
-from aesi.pipeline.report.words.calibrations import open_line
+from aesi.pipeline.report.words.calibrations import errors_apart, open_line
 from aesi.pipeline.written import calibration_files
 from aesi.records import Measurement
 from flows.base import environment
@@ -47,6 +47,8 @@ def calibrate(
             f"{row['as_simulated_rmse_mv']:.2f} mV as the file is simulated"
             f"{until_words(row['ran_out_s'], row['until_ran_out_rmse_mv'])}"
         )
+    if apart := errors_apart(content):
+        console.say(f"  {apart}.")
     for row in content["impedance"]:
         low, high = row["band_hz"]
         outside = row["rms_pct"] is None

@@ -17,6 +17,11 @@ from aesi.pipeline.report.words.sizes import capitalised
 
 NAMED_OPEN = 3
 """Parameters that the sentence on what is left open names: it is a line on a console, and the report has all."""
+ERRORS_OF_FIT = (
+    "after, with the capacity (over the file's), initial state and offset of the current sensor that were fitted to "
+    "this record alone; as simulated, the file as it is, with the current as measured"
+)
+"""What the two errors of a record differ by."""
 
 
 def open_line(content: Mapping[str, Any]) -> str:
@@ -50,6 +55,12 @@ def to_text(content: Mapping[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def errors_apart(content: Mapping[str, Any]) -> str:
+    """What a record's error after the fit and that of the file as simulated are of; '' where no two differ as shown."""
+    apart = any(f"{f['after_rmse_mv']:.2f}" != as_simulated(f) for f in content["files"])
+    return ERRORS_OF_FIT if apart else ""
+
+
 def _files(content: Mapping[str, Any]) -> list[str]:
     rows = [
         f"| {f['name']} | {_at(f['temperature_degc'], content['declared_degc'])} "
@@ -62,9 +73,7 @@ def _files(content: Mapping[str, Any]) -> list[str]:
         "|---|---|---|---|---|---|",
         *rows,
         "",
-        "Errors are RMSE on the data that were fitted: after, with the capacity (over the file's), initial state and "
-        "offset of the current sensor that were fitted to this record alone; as simulated, the file as it is, with the "
-        "current as measured.",
+        f"Errors are RMSE on the data that were fitted: {ERRORS_OF_FIT}.",
     ]
 
 
