@@ -40,7 +40,6 @@ from aesi.calibration.result import (
 )
 from aesi.calibration.start import size_assumed, with_area_factor
 from aesi.calibration.written_cell import capacities, fit_states, start_soc, written_cell
-from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import FitError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
@@ -284,4 +283,5 @@ def _descend(reporting: _ReportingModel, evaluations: int, x0: Array) -> _Descen
 
 def _degc(record: Prepared) -> float | None:
     """Mean temperature of a record, degC; None where it has none."""
-    return None if record.mean_kelvin is None else record.mean_kelvin - ZERO_CELSIUS_K
+    degc = record.rows.temperature_degc
+    return None if degc is None else float(degc.mean())

@@ -79,9 +79,9 @@ def prepared_model(
         start = with_unmoved_energies(declared, start, conditions.same_cell)
     free = with_priors(free_parameters(start, span, conditions.same_cell, on_case), conditions.priors)
     # A voltage under load tells the charge of the cell that the fit starts from, with its films, contacts and energies.
-    loaded = with_parameters(start, {one.name: one.start for one in free})
+    first_cell = with_parameters(start, {one.name: one.start for one in free})
     prepared_records = prepared(
-        loaded, at_temperatures, rows, conditions.soc0, model_name, conditions.same_cell, cut_names
+        first_cell, at_temperatures, rows, conditions.soc0, model_name, conditions.same_cell, cut_names
     )
     for one in prepared_records:
         check_charge(start, one.rows, one.start.soc, one.hold)

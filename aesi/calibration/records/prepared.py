@@ -55,11 +55,6 @@ class Prepared:
         """The measurement's name."""
         return self.data.name
 
-    @property
-    def mean_kelvin(self) -> float | None:
-        """K, over the rows."""
-        return None if self.kelvin is None else float(self.kelvin.mean())
-
 
 def prepared(
     cell: Cell,
