@@ -131,11 +131,13 @@ def compare(
 ) -> None:
     """Compare tracked runs on one HTML page that opens offline: their settings, their figures, maps of their errors."""
     outputs.check_page(out, COMPARISON_MARK)
-    from aesi.pipeline.report.compare import counted_jobs
+    from aesi.pipeline.report.compare import counted_jobs, out_of_reach
     from flows.results.compare import compare as write
 
     _deliver(uri)
     shown = write(runs, out, uri)
+    for sentence in out_of_reach(shown):
+        typer.echo(sentence, err=True)
     typer.echo(f"{out}: {counted_jobs(shown)}", err=True)
 
 

@@ -81,6 +81,7 @@ def _compared(store: Store, experiment: str, run: Any) -> ComparedRun:
         judged_on=_judged_on(run.data.params),
         comparison=_content(store, run, COMPARISON),
         discovery=_content(store, run, FINDING) if "verdict" in run.data.tags else {},
+        away=store.files_away(run),
     )
 
 

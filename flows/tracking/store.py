@@ -31,7 +31,7 @@ from flows.base.store_address import (
     checked_address,
     database_file,
 )
-from flows.tracking.relocation import artifact_folder, follow
+from flows.tracking.relocation import FOLDER, artifact_folder, follow
 from flows.tracking.whole_run import read_runs
 
 PARENT = "mlflow.parentRunId"
@@ -219,8 +219,23 @@ class Store:
                 raise
             return False
 
+    def files_away(self, run: Any) -> str:
+        """Where a run keeps its files, and what to do, if that folder is not on this machine; else ''."""
+        if not str(run.info.artifact_uri).startswith("file:"):
+            return ""
+        folder = _local(run.info.artifact_uri).parents[
+            1
+        ]  # of its experiment; that of a run without files is not made
+        if folder.is_dir():
+            return ""
+        # Where the files of a moved database are looked for, see `follow`.
+        beside = artifact_folder(self._path.parent, folder.name) if self.local else folder
+        copied = f", or copy it to {beside}" if folder.parent.name == FOLDER and folder != beside else ""
+        return f"its files are in {folder}, which is not here; mount or restore it at that path{copied}"
+
     def artifact(self, run: Any, name: str) -> Path | None:
-        """A file at the top of a run's artifacts, or None where the store lists none of that name.
+        """A file at the top of a run's artifacts, or None where the store lists none of that name; one that is not on
+        this machine (`files_away`) is not listed.
 
         Raises InputError for one that is listed and cannot be read.
         """
@@ -240,8 +255,8 @@ class Store:
             path = _local(run.info.artifact_uri) / name
             if path.exists():
                 return path
-            there = "" if path.parents[2].is_dir() else " Mount the artifacts of its experiment at that path."
-            raise InputError(f"run {run.info.run_id} carries no {name}: there is no {path}.{there}")
+            reason = self.files_away(run) or f"there is no {path}"
+            raise InputError(f"run {run.info.run_id} carries no {name}: {reason}.")
         try:
             return Path(self.client.download_artifacts(run.info.run_id, name))
         except (OSError, ValueError, MlflowException) as error:

@@ -61,7 +61,8 @@ class ComparedRun:
     settings : dotted key -> text.  metrics : by MLflow's names.  chosen : the model that a search ended with.
     judged_on : the same text for runs whose errors are of the same test records at the same step.  job : see JOB_WORDS.
     finished : whether it ran to its end.
-    comparison : see `aesi.pipeline.experiment.comparison`.  discovery : content of discovery.json.
+    comparison : see `aesi.pipeline.experiment.comparison`.  discovery : content of discovery.json.  away : where these
+    two lie and what to do, if they are out of reach.
     """
 
     run_id: str
@@ -76,6 +77,7 @@ class ComparedRun:
     discovery: Mapping[str, Any] = field(default_factory=dict)
     job: str = "experiment"
     finished: bool = True
+    away: str = ""
 
     @property
     def label(self) -> str:
@@ -172,8 +174,14 @@ def differing_settings(runs: Sequence[ComparedRun]) -> list[str]:
 
 def _finding(runs: Sequence[ComparedRun]) -> str:
     """A sentence on the runs: which errs least in free run, whether a correction helped, the verdicts, and what is not
-    finished."""
-    sentences = (_least(runs), _worse_than_declared(runs), _verdict_counts(runs), _unfinished(runs))
+    finished or out of reach."""
+    sentences = (
+        _least(runs),
+        _worse_than_declared(runs),
+        _verdict_counts(runs),
+        _unfinished(runs),
+        *out_of_reach(runs),
+    )
     return " ".join(filter(None, sentences)) or f"{counted_jobs(runs)} compared."
 
 
@@ -230,6 +238,14 @@ def _unfinished(runs: Sequence[ComparedRun]) -> str:
     if not labels:
         return ""
     return f"{listed(labels)} {'has' if len(labels) == 1 else 'have'} not finished."
+
+
+def out_of_reach(runs: Sequence[ComparedRun]) -> list[str]:
+    """Sentences on the runs whose files are not here, with what the page lacks for it."""
+    told = dict.fromkeys((run.experiment, run.away) for run in runs if run.away)
+    return [
+        f"Ranges, terms, maps and verdicts of {experiment} are missing: {away}." for experiment, away in told
+    ]
 
 
 def _settings(runs: Sequence[ComparedRun]) -> PageTable | None:

@@ -349,3 +349,24 @@ def test_an_artifact_that_the_server_lists_and_does_not_give_was_taken_for_none(
     monkeypatch.setattr(store.client, "download_artifacts", refused)
     with pytest.raises(InputError, match=r"carries no readable comparison\.json \(403 Forbidden\)"):
         store.artifact(run, "comparison.json")
+
+
+def test_a_run_whose_files_lie_on_another_machine_was_compared_as_one_that_has_none(
+    call, tracked, tmp_path_factory
+):
+    store, there = Store(), tmp_path_factory.mktemp("there") / "mlartifacts" / "drive"
+    number = store.client.create_experiment("drive", there.as_uri())
+    found = {"verdict": "found", "effects": ["series_resistance"], "candidates": []}
+    for _ in range(2):
+        run_id = store.create_run(number, "drive", {KIND: "run", JOB: "discovery", "verdict": "found"})
+        store.client.log_dict(run_id, found, "discovery.json")
+        store.client.set_terminated(run_id)
+    code, _, err = call("compare", "drive", "--out", tracked / "page.html")
+    assert (code, "missing" in err) == (0, False)
+    assert "Of 2 discoveries: 2 found." in (tracked / "page.html").read_text().replace("\u00a0", " ")
+
+    there.rename(there.with_name("gone"))
+    code, _, err = call("compare", "drive", "--out", tracked / "page.html")
+    said = f"verdicts of drive are missing: its files are in {there}, which is not here; mount or restore it"
+    assert (code, err.count(said)) == (0, 1)
+    assert said in re.sub(r"&nbsp;|\u00a0", " ", (tracked / "page.html").read_text())

@@ -62,8 +62,15 @@ def test_files_of_a_run_were_left_at_the_path_of_another_machine(tracked, tmp_pa
     ):
         store.experiment("drive")
     run = store.client.create_run(number)
-    with pytest.raises(InputError, match="Mount the artifacts of its experiment at that path"):
-        store.read(run, "summary.json")
+    beside = tracked / "mlartifacts" / "drive"
+    away = f"its files are in {there}, which is not here; mount or restore it at that path, or copy it to {beside}"
+    assert store.files_away(run) == away
+    for name in (
+        "summary.json",
+        "inputs/records.json",
+    ):  # of the latter nothing was said but that it is missing
+        with pytest.raises(InputError, match=f"carries no {name}: {away}"):
+            store.read(run, name)
     assert not there.exists()
     there.mkdir(parents=True)
     assert store.experiment("drive") == number
