@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from flows.base import environment
-from flows.tracking.outbox import Item
+from flows.tracking.outbox import Item, OfAnotherVersion
 from flows.tracking.store import NUMBER, PARENT
 from flows.tracking.view import of_both_kinds
 from flows.tracking.whole_run import insert_run, new_artifact_uri
@@ -154,11 +154,14 @@ one (`_send_run`): each request would make a new one."""
 
 
 def deliver(store: Store, item: Item, again: bool) -> None:
-    """Send an item.  again : whether it may have been sent before."""
+    """Send an item.  again : whether it may have been sent before.
+
+    Raises OfAnotherVersion for one that lacks what is sent of its kind, or is of an unknown kind.
+    """
     kind = item.get("kind")
     if kind == "run":
         _send_run(store, item, again)
     elif kind in SENDERS:
         SENDERS[kind](store, item)
     else:
-        raise ValueError(f"this version knows no item of kind {kind!r}")
+        raise OfAnotherVersion(f"its kind {kind!r} is not known here")

@@ -11,15 +11,26 @@ import json
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from aesi.errors import first_line
+from aesi.errors import AesiError, first_line
 from aesi.numerics.files.whole import write_whole
 
-Item = dict[str, Any]
+
+class OfAnotherVersion(AesiError):
+    """An item that another version of the program wrote, which this one cannot deliver."""
+
+
+class Item(dict[str, Any]):
+    """What is to be tracked. Raises OfAnotherVersion where a key is asked for that it lacks."""
+
+    def __missing__(self, key: str) -> Any:
+        raise OfAnotherVersion(f"it lacks {key!r}")
+
+
 Deliver = Callable[[Item, bool], None]
 """Sends one item; the flag says that it may have been sent before."""
 
@@ -38,7 +49,8 @@ class Outbox:
 
     away : tells a passing failure (retried for ever) from an item the store refuses (put aside, and said).
     left : what an earlier process had put in and not delivered, in order.
-    refused : whether an item was put aside since this object was made: the store refused it, or it cannot be read.
+    refused : whether an item was put aside since this object was made: the store refused it, it cannot be read, or
+    another version wrote it.
     """
 
     def __init__(
@@ -70,7 +82,7 @@ class Outbox:
         self._thread = threading.Thread(target=self._run, name="aesi-outbox", daemon=True)
         self._thread.start()
 
-    def put(self, item: Item) -> None:
+    def put(self, item: Mapping[str, Any]) -> None:
         """Keep the item on disk and deliver it when possible."""
         with self._wake:
             path = self._folder / f"{self._next:08d}.json"
@@ -144,7 +156,14 @@ class Outbox:
     def _send(self, path: Path) -> bool:
         """True where the item is dealt with."""
         try:
-            self._deliver(json.loads(path.read_bytes()), path.name in self._old)
+            self._deliver(_parsed(path), path.name in self._old)
+        except OfAnotherVersion as error:
+            self._leave_out(
+                path,
+                f"is of another version of the program ({error})",
+                f"put it back into {path.parent} and run `aesi tables` of that version",
+            )
+            return True
         except Exception as error:
             self._old.add(path.name)  # part of it may have arrived
             if self._away(error):
@@ -178,20 +197,24 @@ class Outbox:
         """What an earlier process had put in; None, which is said, of what cannot be read, such as a file that is cut
         off. It is put aside where it can be."""
         try:
-            item = json.loads(path.read_bytes())
-            if isinstance(item, dict):
+            item = _parsed(path)
+            if isinstance(item, Item):
                 return item
             reason = "it is no item"
         except (ValueError, OSError) as error:
             reason = first_line(error)
+        self._leave_out(path, f"cannot be read ({reason})", f"put a whole copy back into {path.parent}")
+        return None
+
+    def _leave_out(self, path: Path, why: str, advice: str) -> None:
+        """Say of an item that it is not delivered, put aside where it can be."""
         where = path
         with suppress(OSError):
             where = self._put_aside(path)
         self._say(
-            f"tracking: an item that waited for the store cannot be read ({reason}), so that what it held is missing "
-            f"there; it is kept in {where}: put a whole copy back into {path.parent}, or delete it."
+            f"tracking: an item that waited for the store {why}, so that what it held is missing there; it is kept in "
+            f"{where}: {advice}, or delete it."
         )
-        return None
 
     def _put_aside(self, path: Path) -> Path:
         """Where an item is from now on.  Raises OSError where it cannot be moved."""
@@ -205,3 +228,8 @@ class Outbox:
         if self._failing_since is None:
             self._failing_since = time.monotonic()
             self._say(f"tracking: {reason}.")
+
+
+def _parsed(path: Path) -> Any:
+    """The content of an item's file."""
+    return json.loads(path.read_bytes(), object_hook=Item)

@@ -116,9 +116,9 @@ class Tracker:
         )
         for item in self._outbox.left:
             if item.get("kind") == "run":
-                self._tracked.add(item["label"])
+                self._tracked.add(item.get("label", ""))
             elif item.get("kind") == "batch":
-                self._began |= item["params"]
+                self._began |= item.get("params", {})
         self._stop = threading.Event()
         if config.tracking.system_metrics:
             threading.Thread(target=self._sample, name="aesi-system", daemon=True).start()

@@ -248,10 +248,34 @@ def test_an_item_that_was_left_over_and_refused_was_called_delivered(store, work
     (box / "00000001.json").write_text(json.dumps({"kind": "of a later version"}))
     deliver_leftovers(store, said.append)
     refused, delivered = said
-    assert "the store refused an item (this version knows no item of kind 'of a later version')" in refused
+    assert "of another version of the program (its kind 'of a later version' is not known here)" in refused
     assert delivered == (
         f"tracking: what run {run_id[:8]} had left over is delivered, but for what was put aside."
     )
+
+
+def test_an_item_of_another_version_was_refused_in_the_words_of_a_key_error(store, workspace, said):
+    run_id = store.create_run(store.experiment("small"), "small, seed 0", {})
+    box = workspace / ".aesi" / "outbox" / run_id
+    box.mkdir(parents=True)
+    lacking = {"kind": "batch", "run_id": run_id, "params": {}, "tags": {}, "at_ms": 1}
+    (box / "00000001.json").write_text(json.dumps(lacking))
+    within = {"kind": "datasets", "run_id": run_id, "datasets": [{"name": "a", "digest": "b"}]}
+    (box / "00000002.json").write_text(json.dumps(within))
+    (box / "00000003.json").write_text(json.dumps(lacking | {"metrics": {"fitness": 0.5}}))
+    deliver_leftovers(store, said.append)
+    assert store.run(run_id).data.metrics == {"fitness": 0.5}
+    for number, key in enumerate(("metrics", "source"), 1):
+        aside = box / "refused" / f"0000000{number}.json"
+        assert aside.is_file()
+        assert said[number - 1] == (
+            f"tracking: an item that waited for the store is of another version of the program (it lacks '{key}'), so "
+            f"that what it held is missing there; it is kept in {aside}: put it back into {box} and run `aesi tables` "
+            "of that version, or delete it."
+        )
+    assert said[2:] == [
+        f"tracking: what run {run_id[:8]} had left over is delivered, but for what was put aside."
+    ]
 
 
 def _away(store, item, again):

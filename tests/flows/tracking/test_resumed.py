@@ -1,5 +1,7 @@
 """A run that is gone on with: what it was begun with stays tracked."""
 
+import json
+
 import pytest
 
 from aesi.pipeline.experiment.sections import TrackingConfig
@@ -34,3 +36,17 @@ def test_a_resumed_run_took_other_data_for_those_it_was_begun_with(store, said):
     ):
         resumed.as_begun(held | {"data_digest": "aa, bd"})
     assert resumed.end("FAILED") == 0
+
+
+def test_a_run_with_an_item_of_another_version_could_not_be_gone_on_with(store, said, workspace):
+    begun = Tracker(store, QUIET, said.append)
+    assert begun.end("FAILED") == 0
+    box = workspace / ".aesi" / "outbox" / begun.run_id
+    box.mkdir(parents=True)
+    for number, kind in enumerate(("run", "batch"), 1):
+        (box / f"0000000{number}.json").write_text(json.dumps({"kind": kind}))
+    resumed = Tracker(store, QUIET, said.append, begun.run_id)
+    resumed.parameters({"seed": 0})
+    assert resumed.end("FINISHED") == 0
+    assert store.run(begun.run_id).data.params == {"seed": "0"}
+    assert [line.count("of another version") for line in said] == [1, 1]
