@@ -63,6 +63,11 @@ class FrameTable:
                 continue
             try:
                 numbers[row] = float(cell)
+            except OverflowError:
+                raise DataError(
+                    f"{self.path.name}, {self.where(row)}: column {self.header[position]!r} holds a whole number of "
+                    "more than 308 digits; remove or correct this row."
+                ) from None
             except (TypeError, ValueError):
                 raise DataError(
                     f"{self.path.name}, {self.where(row)}: column {self.header[position]!r} holds {str(cell)[:40]!r}, "

@@ -50,7 +50,7 @@ def compile_expression(text: str) -> Function:
         raise CellError(f"an expression of {len(text)} characters is too long; give a table instead.")
     try:
         part = _part(ast.parse(text.strip(), mode="eval").body, text)
-    except (SyntaxError, ValueError, OverflowError, RecursionError, MemoryError) as error:
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         if isinstance(error, CellError):
             raise
         why = error.msg if isinstance(error, SyntaxError) else error
@@ -63,7 +63,12 @@ def compile_expression(text: str) -> Function:
 def _part(node: ast.expr, text: str) -> Operand:
     value = node.value if isinstance(node, ast.Constant) else None
     if isinstance(value, int | float) and not isinstance(value, bool):
-        return np.float64(value)
+        try:
+            return np.float64(value)
+        except OverflowError:
+            raise CellError(
+                f"the expression {_short(text)!r} holds a whole number of more than 308 digits; correct it."
+            ) from None
     if isinstance(node, ast.Name) and node.id == VARIABLE:
         return lambda x: x
     if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:

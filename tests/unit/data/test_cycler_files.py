@@ -704,3 +704,22 @@ def test_a_test_that_goes_on_in_another_sheet_lost_it_without_a_word(tmp_path):
     notes = read_measurement(tmp_path / "long.xlsx").notes
     assert notes[0].endswith("Read from the sheet 'Channel_1-1'.")
     assert "Not read: 'Channel_1-2', with the same columns" in notes[1]
+
+
+def test_a_sheet_with_a_number_that_no_float_holds_ended_in_an_overflow(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    book.active.append(["time_s", "current_a", "voltage_v"])
+    for row in zip(TIME.tolist(), CURRENT.tolist(), VOLTAGE.tolist(), strict=True):
+        book.active.append(list(row))
+    book.active["B42"] = 777777
+    book.save(tmp_path / "plain.xlsx")
+    # As another program may write it: openpyxl reads such a cell, and does not write it.
+    with zipfile.ZipFile(tmp_path / "plain.xlsx") as plain, zipfile.ZipFile(tmp_path / "a.xlsx", "w") as book:
+        for name in plain.namelist():
+            book.writestr(name, plain.read(name).replace(b">777777<", b">1" + 400 * b"0" + b"<"))
+    with pytest.raises(
+        DataError,
+        match=r"a\.xlsx, row 41 \(row 42 .*'current_a' holds a whole number of more than 308 digits; remove",
+    ):
+        read_measurement(tmp_path / "a.xlsx")

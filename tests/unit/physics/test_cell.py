@@ -145,9 +145,16 @@ BEYOND_FLOATS = 10**400
         ("Cell", "Number of electrode pairs connected in parallel to make a cell", BEYOND_FLOATS, ""),
         ("Electrolyte", "Conductivity [S.m-1]", -BEYOND_FLOATS, ""),
         ("Positive electrode", "OCP [V]", {"x": [0.0, 1.0], "y": [BEYOND_FLOATS, 3.0]}, ": y"),
+        ("Positive electrode", "OCP [V]", {"x": (0.0, 1.0), "y": (BEYOND_FLOATS, 3.0)}, ": y"),
+        (
+            "Positive electrode",
+            "OCP [V]",
+            {"x": [0.0, 1.0], "y": np.array([BEYOND_FLOATS, 3.0], object)},
+            ": y",
+        ),
         ("User-defined", "Contact resistance [Ohm]", BEYOND_FLOATS, ""),
     ],
-    ids=["number", "count", "negative", "table", "own"],
+    ids=["number", "count", "negative", "table", "tuple", "array", "own"],
 )
 def test_a_whole_number_that_no_float_holds_is_told_with_its_field(content, section, field, value, below):
     content["Parameterisation"].setdefault(section, {})[field] = value
@@ -266,6 +273,20 @@ def test_a_single_particle_file_is_refused(content):
 def test_a_full_cell_under_the_header_of_a_single_particle_was_told_in_words_of_the_schema(content):
     content["Header"]["Model"] = "SPM"
     assert 'those of a full cell; write "Model": "SPMe" there, or "DFN".' in fault(content)
+
+
+@pytest.mark.parametrize("direction", ["lithiation", "delithiation"])
+@pytest.mark.parametrize("value", [np.nan, np.inf, "log(x - 0.5)"])
+def test_a_potential_of_one_direction_was_taken_without_being_a_number(content, direction, value):
+    field = f"OCP ({direction}) [V]"
+    content["Parameterisation"]["Negative electrode"][field] = value
+    assert f"Negative electrode: {field} is not finite at a stoichiometry of" in fault(content)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -5.0])
+def test_a_decay_of_hysteresis_was_taken_without_being_a_number_from_0_on(content, value):
+    content["Parameterisation"]["Negative electrode"]["OCP hysteresis decay constant"] = value
+    assert "OCP hysteresis decay constant = " in fault(content)
 
 
 def test_a_blend_is_refused(content):

@@ -45,3 +45,8 @@ def test_anything_but_arithmetic_is_refused(text):
 def test_a_tower_of_powers_ends_as_infinity_and_not_as_a_hang():
     with np.errstate(over="ignore"):
         assert np.isinf(compile_expression("9 ** 9 ** 9 ** 9")(np.zeros(1))).all()
+
+
+def test_a_number_that_no_float_holds_was_told_in_words_of_python():
+    with pytest.raises(CellError, match=r"1 - x .* holds a whole number of more than 308 digits; correct it"):
+        compile_expression(f"1 - x * {10**400}")

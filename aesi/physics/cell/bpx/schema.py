@@ -18,6 +18,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from aesi.errors import CellError, did_you_mean, wanted
 from aesi.physics.cell.relations import relation
 
@@ -136,7 +138,7 @@ def _check_whole_numbers(content: Any, where: str) -> None:
     if isinstance(content, Mapping):
         for name, value in content.items():
             _check_whole_numbers(value, f"{where}: {name}")
-    elif isinstance(content, list):
+    elif isinstance(content, list | tuple | np.ndarray):
         for value in content:
             _check_whole_numbers(value, where)
     elif isinstance(content, int):

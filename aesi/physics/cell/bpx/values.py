@@ -300,10 +300,19 @@ def _check_electrode(electrode: Electrode, what: str) -> None:
     _check_filling(electrode, what)
     inside = inside_window(electrode)
     _check_positive(electrode.diffusivity, inside, f"{what}: diffusivity", "")
+    for name, relation in (
+        ("the open-circuit potential", electrode.ocp),
+        ("OCP (lithiation) [V]", electrode.ocp_lithiation),
+        ("OCP (delithiation) [V]", electrode.ocp_delithiation),
+    ):
+        finite = np.isfinite(relation(inside)) if relation is not None else np.array([True])
+        if not finite.all():
+            x = inside[int(np.argmin(finite))]
+            raise CellError(f"{what}: {name} is not finite at a stoichiometry of {x:.3g}.")
+    decay = electrode.hysteresis_decay
+    if decay is not None and not 0.0 <= decay < np.inf:
+        raise CellError(f"{what}: OCP hysteresis decay constant = {decay:g} has to be a number from 0 on.")
     potential = electrode.ocp(inside)
-    if not np.isfinite(potential).all():
-        x = inside[int(np.argmin(np.isfinite(potential)))]
-        raise CellError(f"{what}: the open-circuit potential is not finite at a stoichiometry of {x:.3g}.")
     if potential[-1] > potential[0]:
         raise CellError(
             f"{what}: the open-circuit potential rises from {potential[0]:.4g} V at a stoichiometry of {inside[0]:.3g} "
