@@ -5,6 +5,8 @@ The check, the box of a fit, the range of a search and the table in the document
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -32,6 +34,7 @@ class Parameter:
     """One scalar parameter.
 
     default : a typical value where the effect is present.
+    unit : text that stands behind the value; "dimensionless" for a plain number, which SI's "1" becomes.
     bounds : (smallest, largest) value, in `unit`.  source : of the bounds.
     log : True for a logarithmic scale in fits and searches.
     even : True where the voltage depends on its square (a standard deviation). A fit then moves the square, since the
@@ -67,6 +70,18 @@ class Parameter:
 
     def __post_init__(self) -> None:
         low, high = self.bounds
+        if self.unit == "1":
+            object.__setattr__(self, "unit", "dimensionless")
+        if not isinstance(self.unit, str) or not re.search(r"[^\W\d_]|%", self.unit):
+            raise ParameterError(
+                f"the unit {self.unit!r} is none; give it as text, such as 'ohm', and 'dimensionless' for a plain "
+                "number."
+            )
+        if not (math.isfinite(low) and math.isfinite(high)):
+            raise ParameterError(
+                f"bounds [{low:g}, {high:g}] {self.unit} have no end; give the smallest and the largest value that a "
+                "fit may try."
+            )
         if not low < high:
             raise ParameterError(f"bounds [{low:g}, {high:g}] {self.unit} are empty; give low < high.")
         if self.log and low <= 0:

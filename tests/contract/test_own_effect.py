@@ -209,6 +209,12 @@ def test_an_effect_that_was_edited_in_a_saved_model_is_refused(file, cell, tmp_p
             r"on_voltage cannot be called .* \(parameters: lead_ohm\): missing .* 'lead'\.",
         ),
         ("(0.0, 0.01)", "(0.01, 0.0)", "give low < high\\.$"),
+        (
+            OWN[OWN.index("Parameter(1e-3") : OWN.index("}")],
+            "1e-3",
+            "parameters of EFFECT have to be a dict of",
+        ),
+        ('{"lead_ohm"', '{("lead_ohm",)', "parameters of EFFECT have to be a dict of names and"),
     ],
 )
 def test_a_file_that_cannot_be_used_is_told_when_it_is_read(tmp_path, was, now, sentence):
@@ -349,6 +355,10 @@ def test_what_an_effect_of_ones_own_raises_names_file_and_line(
             "",
             "parameter 'lead_ohm': TypeError: Parameter.__init__() missing 1 required positional",
         ),
+        ('"ohm", (', '"", (', "parameter 'lead_ohm': the unit '' is none; give it as text, such as 'ohm'"),
+        ('"ohm", (', "None, (", "parameter 'lead_ohm': the unit None is none; give it as text"),
+        ('"ohm", (', '"-", (', "parameter 'lead_ohm': the unit '-' is none; give it as text"),
+        ("(0.0, 0.01)", "(0.0, float('inf'))", "parameter 'lead_ohm': bounds [0, inf] ohm have no end; give"),
         (
             "Parameter(1e-3",
             "Parameter(1e-3 / 0",
@@ -365,6 +375,12 @@ def test_a_mistake_among_the_parameters_was_told_without_its_place(tmp_path, old
         InputError, match=re.escape(f"the effect file {path} fails in line {line}, {sentence}")
     ):
         load_effect(path)
+
+
+def test_a_plain_number_of_unit_1_was_shown_with_a_1_behind_it(tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text(OWN.replace('"ohm", (', '"1", ('))
+    assert load_effect(path).parameters["lead_ohm"].unit == "dimensionless"
 
 
 def test_a_failure_elsewhere_in_the_file_was_told_without_its_line(tmp_path):

@@ -7,7 +7,7 @@ import ast
 import inspect
 import re
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import get_args
 
 from aesi.errors import AesiError, InputError
@@ -31,14 +31,22 @@ def check_own(effect: Effect, path: str) -> None:
             f"{path}: EFFECT has no docstring; write one at the top of the file, what the effect is in its first line, "
             "its equation indented below."
         )
+    declared = effect.parameters
+    if not isinstance(declared, Mapping) or not all(
+        isinstance(name, str) and isinstance(p, Parameter) for name, p in declared.items()
+    ):
+        raise InputError(
+            f"{path}: the parameters of EFFECT have to be a dict of names and aesi.parameters.Parameter, as "
+            '{"lead_ohm": Parameter(1e-3, "ohm", bounds=(0.0, 0.01), source="a lead")}.'
+        )
     acting = {place: getattr(effect, place) for place in PLACES if getattr(effect, place) is not None}
     if not acting:
         raise InputError(f"{path}: EFFECT acts nowhere; give it one of {', '.join(PLACES)}.")
     for place, function in acting.items():
         try:
-            inspect.signature(function).bind(None, **dict.fromkeys(effect.parameters, 0.0))
+            inspect.signature(function).bind(None, **dict.fromkeys(declared, 0.0))
         except TypeError as error:
-            names = ", ".join(effect.parameters) or "none"
+            names = ", ".join(declared) or "none"
             raise InputError(
                 f"{path}: {place} cannot be called with what EFFECT declares (parameters: {names}): {error}."
             ) from None
