@@ -398,6 +398,7 @@ def _pulse_resistance(found: Calibration) -> dict[str, Any]:
         "soc": told.soc.tolist(),
         "rows": rows,
         "measured": measured,
+        "left_out": dict(told.left_out),
         "model_error_pct": None if told.model_error is None else 100.0 * told.model_error,
     }
 

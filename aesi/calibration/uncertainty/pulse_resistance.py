@@ -10,7 +10,7 @@ records. Without such pulses it leaves out what the model is off by.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import groupby
@@ -38,6 +38,10 @@ PULSE_S = (0.0, 1e-3, 2.0, 4.0, 6.0, 8.0, 10.0)
 """Rows of the pulse, s: the current steps up within the first interval."""
 NEAR_1C, STEADY_C = 0.1, 0.03
 """Largest deviation of a measured pulse's current from 1C, and within rest and pulse, in C. Conventions."""
+LATEST_S = 2.0
+"""Longest time, s, from the last row of rest to the first of a measured pulse, which may begin anywhere between: (1) is
+read low by 4 to 11 % where 5 s of its 10 s are missing, with the files of an LG M50, an LG 18650HG2 and a Panasonic
+NCR18650PF at 0 and 25 degC. It is 0.1 and 1.05 s in the pulse tests of the Panasonic and the LG M50T."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +50,7 @@ class PulseResistance:
 
     temperature_degc : (m,) degC.  soc : (k,) state of charge.  ohm, low_ohm, high_ohm : (m, k), value and 95 %
     interval; NaN where the cell cannot give the pulse.  measured : the pulses within the fitted records.
+    left_out : record -> number of its pulses whose beginning is not known to `LATEST_S`, of the records with such.
     model_error : RMS of ln(measured / predicted) over those of them that the cell can give; None without any, and then
     the intervals are without it.
     """
@@ -57,6 +62,7 @@ class PulseResistance:
     high_ohm: Array
     measured: tuple[MeasuredPulse, ...]
     model_error: float | None
+    left_out: Mapping[str, int]
 
 
 @dataclass(frozen=True)
@@ -90,7 +96,8 @@ def pulse_resistance(
     model_error = _model_error(found, measured)
     variance += (model_error or 0.0) ** 2
     ohm, factor = np.exp(at), np.exp(NINETY_FIVE * np.sqrt(variance))
-    return PulseResistance(degc, socs, ohm, ohm / factor, ohm * factor, measured, model_error)
+    left_out = {one.name: count for one in model.records if (count := late_pulses(found.cell, one.data))}
+    return PulseResistance(degc, socs, ohm, ohm / factor, ohm * factor, measured, model_error, left_out)
 
 
 def _fitted_pulses(found: Calibration, record: Prepared) -> Iterator[MeasuredPulse]:
@@ -144,27 +151,42 @@ def log_resistance(cell: Cell, temperature_degc: Array, soc: Array, model_name: 
 
 
 def measured_pulses(cell: Cell, record: Measurement, soc0: float, share: float = 1.0) -> tuple[Array, Array]:
-    """(states of charge (n,), resistances (1) in ohm (n,)) of the 1C discharges of 10 s and more from rest in a record.
+    """(states of charge (n,), resistances (1) in ohm (n,)) of the 1C discharges of 10 s and more from rest in a record
+    whose beginning is known to `LATEST_S`.
 
     soc0 : state of charge at its first row.  share : capacity of the cell at that time over that of its file. A rate is
     of the nominal capacity all the same: a cycler's schedule does not follow the ageing of the cell.
 
-    The 10 s count from the last row of rest. Where rows are seconds apart the pulse may begin later, and (1) is read
-    low: 5 s of it are 4 to 11 % less with the files of an LG M50, an LG 18650HG2 and a Panasonic NCR18650PF at 0 and
-    25 degC.
+    The 10 s count from the last row of rest.
     """
-    time_s, voltage_v, nominal_ah = record.time_s, record.voltage_v, cell.nominal_capacity_ah
+    voltage_v, nominal_ah = record.voltage_v, cell.nominal_capacity_ah
     c_rate = record.current_a / nominal_ah
     soc = soc0 - record.discharged_ah(record.hold_taken) / (share * cell.capacity_ah)
-    near_1c, between_s = np.abs(c_rate - 1.0) < NEAR_1C, 0.5 * (time_s[1:] + time_s[:-1])
     found = []
-    for k in np.flatnonzero((np.abs(c_rate[:-1]) < STEADY_C) & near_1c[1:]):
-        until_s = time_s[k] + PULSE_S[-1]
-        last = int(np.searchsorted(between_s, until_s))  # the row nearest to 10 s
-        last -= not near_1c[last]  # where a pulse ends after 10 s, that row may show the rest already
-        pulse = c_rate[k + 1 : last + 1]
-        if until_s <= time_s[-1] and len(pulse) > 1 and np.ptp(pulse[1:]) < STEADY_C:
-            current_a = nominal_ah * float(np.mean(pulse))
+    for k, last in _pulses(cell, record):
+        if not _begins_late(record, k):
+            current_a = nominal_ah * float(np.mean(c_rate[k + 1 : last + 1]))
             found.append((soc[k], (voltage_v[k] - voltage_v[last]) / current_a))
     socs, ohm = np.array(found, dtype=float).reshape(-1, 2).T
     return socs, ohm
+
+
+def late_pulses(cell: Cell, record: Measurement) -> int:
+    """Number of pulses that `measured_pulses` leaves out, since their beginning is not known to `LATEST_S`."""
+    return sum(_begins_late(record, k) for k, _ in _pulses(cell, record))
+
+
+def _begins_late(record: Measurement, k: int) -> bool:
+    return bool(record.time_s[k + 1] - record.time_s[k] > LATEST_S)
+
+
+def _pulses(cell: Cell, record: Measurement) -> Iterator[tuple[int, int]]:
+    """(last row of rest, row nearest to 10 s after it) of each 1C discharge of 10 s and more from rest."""
+    time_s, c_rate = record.time_s, record.current_a / cell.nominal_capacity_ah
+    near_1c, between_s = np.abs(c_rate - 1.0) < NEAR_1C, 0.5 * (time_s[1:] + time_s[:-1])
+    for k in np.flatnonzero((np.abs(c_rate[:-1]) < STEADY_C) & near_1c[1:]):
+        until_s = time_s[k] + PULSE_S[-1]
+        last = int(np.searchsorted(between_s, until_s))
+        last -= not near_1c[last]  # where a pulse ends after 10 s, that row may show the rest already
+        if until_s <= time_s[-1] and last > k + 1 and np.ptp(c_rate[k + 2 : last + 1]) < STEADY_C:
+            yield int(k), last

@@ -8,6 +8,7 @@ import pytest
 from aesi.calibration import calibrate
 from aesi.calibration.uncertainty.pulse_resistance import (
     PULSE_S,
+    late_pulses,
     log_resistance,
     measured_pulses,
     pulse_resistance,
@@ -83,6 +84,20 @@ def test_the_pulses_of_an_aged_cell_are_of_its_nominal_capacity(truth):
     drawn_ah = (30.0 + 5.0 + 60.0 - 30.0) / 3600.0 * truth.nominal_capacity_ah
     assert soc == pytest.approx([0.6, 0.6 - drawn_ah / (share * truth.capacity_ah)], abs=3e-4)
     assert ohm == pytest.approx(np.exp(log_resistance(aged, np.array([25.0]), soc))[0], rel=0.008)
+
+
+def test_a_pulse_that_begins_between_two_rows_seconds_apart_was_read_too_low(truth, start, records):
+    """The rest is last seen 4 s before the pulse begins, and 6 s of this were read as its 10 s."""
+    dense = pulse_test(truth)
+    kept = np.arange(len(dense.time_s)) % 5 == 1
+    sparse = Measurement(
+        dense.time_s[kept], dense.current_a[kept], dense.voltage_v[kept], name="sparse", hold="backward"
+    )
+    assert [len(found) for found in measured_pulses(truth, sparse, 0.6)] == [0, 0]
+    assert (late_pulses(truth, sparse), late_pulses(truth, dense)) == (2, 0)
+    got = pulse_resistance(calibrate(start, [records[0], sparse]), DEGC, SOC)
+    assert got.left_out == {"sparse": 2}
+    assert (got.measured, got.model_error) == ((), None)
 
 
 def test_a_record_without_pulses_shows_none(truth):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from aesi.pipeline.report.words.calibrations import _with_interval, open_line, to_text
+from aesi.pipeline.report.words.calibrations import _with_interval, open_line, pulse_sentence, to_text
 
 
 def content(weights: list[dict[str, float]], total: int) -> dict[str, object]:
@@ -32,6 +32,14 @@ def test_a_capacity_that_was_not_fitted_has_no_interval_without_a_width():
 def test_an_interval_is_told_with_the_digits_that_show_its_width():
     assert _with_interval({"value": 14.2999, "low": 14.297, "high": 14.3028}) == "14.2999 | 14.297 to 14.3028"
     assert _with_interval({"value": 1.061, "low": 1.044, "high": 1.077}) == "1.061 | 1.044 to 1.077"
+
+
+def test_pulses_that_are_not_read_are_told_with_their_records():
+    content = {"pulse_resistance": {"seconds": 10.0, "model_error_pct": None, "left_out": {"a": 2, "b": 1}}}
+    assert pulse_sentence(content).endswith(
+        "no record has such a pulse. Left out of them: 2 in a and 1 in b, since rows more than 2 s apart leave open "
+        "when the pulse begins, so that its resistance would be read too low; log a row a second there."
+    )
 
 
 @pytest.mark.parametrize(

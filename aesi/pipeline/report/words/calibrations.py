@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from aesi.advice import listed
 from aesi.calibration.result import until_words
 from aesi.calibration.uncertainty.health import HEALTH_WORDS
+from aesi.calibration.uncertainty.pulse_resistance import LATEST_S
 from aesi.over_time import range_words
 from aesi.physics.cell.energies import SPAN_K
 from aesi.physics.simulation import MODEL_WORDS
@@ -123,7 +125,18 @@ def pulse_sentence(content: Mapping[str, Any]) -> str:
     )
     return (
         f"Resistance of a discharge at 1C for {told['seconds']:g} s from rest, mohm, with 95 % intervals: what these "
-        f"records leave open, {off}."
+        f"records leave open, {off}.{_left_out(told.get('left_out', {}))}"
+    )
+
+
+def _left_out(pulses: Mapping[str, int]) -> str:
+    """A sentence, with a space before it, on the pulses that were not read, record -> their number; '' without such."""
+    if not pulses:
+        return ""
+    counted = listed([f"{count} in {record}" for record, count in pulses.items()])
+    return (
+        f" Left out of them: {counted}, since rows more than {LATEST_S:g} s apart leave open when the pulse begins, so "
+        "that its resistance would be read too low; log a row a second there."
     )
 
 
