@@ -11,6 +11,7 @@ from __future__ import annotations
 import datetime
 import zipfile
 from collections.abc import Collection, Iterable, Sequence
+from io import BytesIO
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -41,7 +42,9 @@ def open_sheet(path: Path, wanted: Collection[str]) -> FrameTable:
             f"{path.name} is an Excel workbook; install its reader (pip install openpyxl), or save the sheet as CSV."
         ) from None
     try:
-        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+        # By its content: of a name, openpyxl refuses a workbook that is called .csv.
+        content = BytesIO(path.read_bytes()) if zipfile.is_zipfile(path) else path
+        book = openpyxl.load_workbook(content, read_only=True, data_only=True)
     except Exception as error:
         # openpyxl raises what zipfile, its XML reader and its own checks raise.
         raise DataError(

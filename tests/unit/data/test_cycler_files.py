@@ -723,3 +723,11 @@ def test_a_sheet_with_a_number_that_no_float_holds_ended_in_an_overflow(tmp_path
         match=r"a\.xlsx, row 41 \(row 42 .*'current_a' holds a whole number of more than 308 digits; remove",
     ):
         read_measurement(tmp_path / "a.xlsx")
+
+
+def test_a_workbook_under_the_name_of_a_text_file_was_refused_by_that(tmp_path):
+    pytest.importorskip("openpyxl")
+    frame = pd.DataFrame({"time_s": TIME, "current_a": CURRENT, "voltage_v": VOLTAGE})
+    frame.to_excel(tmp_path / "a.xlsx", index=False)
+    (tmp_path / "a.xlsx").rename(tmp_path / "a.csv")
+    assert read_measurement(tmp_path / "a.csv").voltage_v == pytest.approx(VOLTAGE, abs=1e-12)

@@ -864,3 +864,12 @@ def test_the_state_of_charge_of_a_mean_stoichiometry_is_that_which_has_it(lg_m50
     soc = np.array([-0.1, 0.0, 0.37, 1.0, 1.2])
     mean_n, _ = lg_m50.stoichiometries(soc)
     assert lg_m50.soc_of(mean_n) == pytest.approx(soc, abs=1e-15)
+
+
+def test_a_cell_that_was_given_by_its_name_was_told_that_it_is_no_file_alone(tmp_path):
+    (tmp_path / "lg_m50_chen2020.bpx.json").write_text("{}")
+    with pytest.raises(
+        CellError, match=r"there is no cell file .*lg_m50; did you mean 'lg_m50_chen2020"
+    ) as told:
+        Cell.from_bpx(tmp_path / "lg_m50")
+    assert str(told.value).endswith("Give the path of a BPX file (.json).")

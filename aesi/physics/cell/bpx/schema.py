@@ -77,6 +77,11 @@ def _text_of(path: Path) -> str:
     """The text of a file.  Raises CellError for one that cannot be read or is not UTF-8."""
     try:
         return path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        beside = [one.name for one in path.parent.glob("*.json")]
+        raise CellError(
+            f"there is no cell file {path}{did_you_mean(path.name, beside)} Give the path of a BPX file (.json)."
+        ) from None
     except OSError as error:
         raise CellError(f"cannot read the cell file {path}: {error.strerror or error}.") from None
     except UnicodeDecodeError as error:
