@@ -213,6 +213,7 @@ def first_leaf_beyond(forest: dict) -> dict:
         ("spci_forest", (), first_split_to_itself, "a split leads to no node after it"),
         ("spci_forest", (), first_leaf_beyond, "a split leads to no leaf"),
         ("spci_forest", (), lambda m: {"grid": m["grid"][1:]}, "leaf_cdf has the shape"),
+        ("spci_forest", (), lambda m: {"start": m["start"][1:]}, "start has the shape"),
         ("spci_forest", (), lambda m: {"roots": m["roots"] + 10**6}, "roots holds 1e"),
     ],
 )

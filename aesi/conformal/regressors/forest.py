@@ -17,20 +17,27 @@ from aesi.numerics.trees.forest import Splits, check_splits, flatten, forest_qua
 from aesi.numerics.typing import Array, SavedState
 
 GRID_POINTS = 512
-"""Levels of probability at which a forest's quantiles are kept; between them they are interpolated."""
+"""Levels of probability at which a forest's quantiles are kept; between them they are interpolated, unless several
+levels have one value: an atom, of which rounded targets have many."""
 TAIL = 2e-4
 """The grid is even in probability between the tails and even in its logarithm within them."""
 MOST = 2.0**53
 """Bound of a saved number of a column, node or leaf: of whole numbers that a float holds."""
 
 
-def _grid(targets: Array) -> Array:
-    """Increasing values at which distributions are kept: quantiles of all targets, dense in the tails."""
+def _grid(targets: Array) -> tuple[Array, Array]:
+    """(grid, start) of `forest_quantiles`: quantiles of all targets, dense in the tails."""
     tail = np.geomspace(TAIL, 0.02, GRID_POINTS // 8, endpoint=False)
     levels = np.concatenate(
         [[0.0], tail, np.linspace(0.02, 0.98, 3 * GRID_POINTS // 4), 1 - tail[::-1], [1.0]]
     )
-    return np.unique(np.quantile(targets, levels))
+    grid, repeats = np.unique(np.quantile(targets, levels), return_counts=True)
+    return grid, np.where(repeats > 1, grid, _values_before(grid))
+
+
+def _values_before(grid: Array) -> Array:
+    """(g,) the grid value before each, for the first itself."""
+    return np.concatenate([grid[:1], grid[:-1]])
 
 
 def _leaf_distributions(forest: Any, grid: Array) -> Array:
@@ -50,10 +57,11 @@ def _leaf_distributions(forest: Any, grid: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class ForestQuantiles(QuantileModel):
-    """levels : (2 B,).  grid : (g,) V.  leaf_cdf : (n_leaves, g).  splits : the trees."""
+    """levels : (2 B,).  grid, start : (g,) V.  leaf_cdf : (n_leaves, g).  splits : the trees."""
 
     levels: Array
     grid: Array
+    start: Array
     leaf_cdf: Array
     splits: Splits
     kind: ClassVar[str] = "forest"
@@ -68,8 +76,8 @@ class ForestQuantiles(QuantileModel):
         )
         regressor.fit(task.rows, task.targets)
         splits = flatten(regressor.estimators_)
-        grid = _grid(task.targets)
-        return cls(task.levels, grid, _leaf_distributions(regressor, grid), splits)
+        grid, start = _grid(task.targets)
+        return cls(task.levels, grid, start, _leaf_distributions(regressor, grid), splits)
 
     def quantiles(self, rows: Array) -> Array:
         out = np.empty((len(rows), self.levels.size))
@@ -80,6 +88,7 @@ class ForestQuantiles(QuantileModel):
             single,
             self.levels,
             self.grid,
+            self.start,
             self.leaf_cdf,
             s.roots,
             s.feature,
@@ -94,13 +103,16 @@ class ForestQuantiles(QuantileModel):
         check_features(self.splits.feature, count)
 
     def to_state(self) -> SavedState:
-        return {"levels": self.levels, "grid": self.grid, "leaf_cdf": self.leaf_cdf, **vars(self.splits)}
+        own = {name: array for name, array in vars(self).items() if name != "splits"}
+        return own | vars(self.splits)
 
     @classmethod
     def from_state(cls, state: SavedState, kinds: Kinds) -> Self:
         levels = saved_array(state["levels"], "levels", (None,), 0.0, 1.0)
         grid = saved_array(state["grid"], "grid", (None,))
         leaf_cdf = saved_array(state["leaf_cdf"], "leaf_cdf", (None, len(grid)), 0.0, 1.0)
+        # Quantiles of a model saved without it are interpolated between all values.
+        start = saved_array(state.get("start", _values_before(grid)), "start", (len(grid),))
         threshold = saved_array(state["threshold"], "threshold", (None,))
         nodes = len(threshold)
         feature, left, right = (
@@ -110,4 +122,4 @@ class ForestQuantiles(QuantileModel):
         roots = saved_array(state["roots"], "roots", (None,), 0.0, nodes - 1.0).astype(np.int64)
         splits = Splits(roots, feature, threshold, left, right)
         check_splits(splits, len(leaf_cdf))
-        return cls(levels, grid, leaf_cdf, splits)
+        return cls(levels, grid, start, leaf_cdf, splits)

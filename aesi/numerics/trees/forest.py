@@ -5,6 +5,10 @@ distribution function on one common grid of values, so that the forest's conditi
 over trees of the leaf distributions, the weights of the source) is a sum of grid rows, and every quantile is
 one search. The grid costs resolution (half a grid step) and buys bounded memory and microseconds a row.
 
+Between grid values that leave out samples a quantile is interpolated, as of a continuous distribution. At an atom, a
+value of positive probability, the distribution function jumps, and all levels within the jump have that value for their
+quantile: one interpolated between two atoms leaves out the samples that lie on the one beyond it.
+
 Meinshausen, J. Machine Learning Research 7 (2006) 983.
 """
 
@@ -46,8 +50,8 @@ def leaf_of(
 
 
 @kept_njit()
-def _invert(cdf: Array, grid: Array, level: float) -> float:
-    """Linear interpolation of the inverse of a distribution function on a grid."""
+def _invert(cdf: Array, grid: Array, start: Array, level: float) -> float:
+    """Inverse of a distribution function on a grid; see `forest_quantiles`."""
     last = cdf.size - 1
     if level <= cdf[0]:
         return grid[0]
@@ -56,7 +60,7 @@ def _invert(cdf: Array, grid: Array, level: float) -> float:
     i = np.searchsorted(cdf, level)
     step = cdf[i] - cdf[i - 1]
     share = (level - cdf[i - 1]) / step if step > 0 else 1.0
-    return grid[i - 1] + share * (grid[i] - grid[i - 1])
+    return start[i] + share * (grid[i] - start[i])
 
 
 @kept_njit()
@@ -64,6 +68,7 @@ def forest_quantiles(
     rows: AnyArray,
     levels: Array,
     grid: Array,
+    start: Array,
     leaf_cdf: Array,
     roots: IntArray,
     feature: IntArray,
@@ -74,7 +79,8 @@ def forest_quantiles(
 ) -> None:
     """Fill out (n, L) with the conditional quantiles of rows (n, p) at `levels` (L,).
 
-    grid : (g,) increasing.  leaf_cdf : (n_leaves, g) distribution function of each leaf on the grid.
+    grid : (g,) increasing.  start : (g,) value from which quantiles up to each grid value are interpolated: the grid
+    value before it, or at an atom itself.  leaf_cdf : (n_leaves, g) distribution function of each leaf on the grid.
     """
     cdf = np.empty(grid.size)
     for k in range(rows.shape[0]):
@@ -85,7 +91,7 @@ def forest_quantiles(
                 cdf[g] += leaf_cdf[leaf, g]
         cdf /= roots.size
         for j in range(levels.size):
-            out[k, j] = _invert(cdf, grid, levels[j])
+            out[k, j] = _invert(cdf, grid, start, levels[j])
 
 
 def check_splits(splits: Splits, leaves: int) -> None:
