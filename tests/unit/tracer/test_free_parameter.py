@@ -154,9 +154,9 @@ def test_a_file_of_a_measured_cell_is_believed_where_its_instruments_are_not():
 
 
 def test_a_parameter_that_vanishes_outside_its_bounds_is_refused():
-    with pytest.raises(ParameterError, match=r"neutral = 0 1 is outside \[0.5, 2\]"):
+    with pytest.raises(ParameterError, match=r"neutral = 0 dimensionless is outside \[0.5, 2\]"):
         Parameter(1.0, "1", bounds=(0.5, 2.0), source="test", neutral=0.0)
-    with pytest.raises(ParameterError, match=r"neutral = 3 1 is outside \[0.5, 2\]"):
+    with pytest.raises(ParameterError, match=r"neutral = 3 dimensionless is outside \[0.5, 2\]"):
         Parameter(1.0, "1", bounds=(0.5, 2.0), source="test", log=True, neutral=3.0)
     # A logarithmic scale does not reach the zero at which a conductance, say, vanishes.
     assert Parameter(1.0, "1", bounds=(0.5, 2.0), source="test", log=True, neutral=0.0).neutral == 0.0
