@@ -223,9 +223,8 @@ class Store:
         """Where a run keeps its files, and what to do, if that folder is not on this machine; else ''."""
         if not str(run.info.artifact_uri).startswith("file:"):
             return ""
-        folder = _local(run.info.artifact_uri).parents[
-            1
-        ]  # of its experiment; that of a run without files is not made
+        # That of its experiment: that of a run without files is not made.
+        folder = _local(run.info.artifact_uri).parents[1]
         if folder.is_dir():
             return ""
         # Where the files of a moved database are looked for, see `follow`.

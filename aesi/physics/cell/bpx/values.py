@@ -300,19 +300,21 @@ def _check_electrode(electrode: Electrode, what: str) -> None:
     _check_filling(electrode, what)
     inside = inside_window(electrode)
     _check_positive(electrode.diffusivity, inside, f"{what}: diffusivity", "")
-    for name, relation in (
-        ("the open-circuit potential", electrode.ocp),
+    potential = electrode.ocp(inside)
+    potentials = {"the open-circuit potential": potential}
+    for name, branch in (
         ("OCP (lithiation) [V]", electrode.ocp_lithiation),
         ("OCP (delithiation) [V]", electrode.ocp_delithiation),
     ):
-        finite = np.isfinite(relation(inside)) if relation is not None else np.array([True])
-        if not finite.all():
-            x = inside[int(np.argmin(finite))]
+        if branch is not None:
+            potentials[name] = branch(inside)
+    for name, volts in potentials.items():
+        if not np.isfinite(volts).all():
+            x = inside[int(np.argmin(np.isfinite(volts)))]
             raise CellError(f"{what}: {name} is not finite at a stoichiometry of {x:.3g}.")
     decay = electrode.hysteresis_decay
     if decay is not None and not 0.0 <= decay < np.inf:
         raise CellError(f"{what}: OCP hysteresis decay constant = {decay:g} has to be a number from 0 on.")
-    potential = electrode.ocp(inside)
     if potential[-1] > potential[0]:
         raise CellError(
             f"{what}: the open-circuit potential rises from {potential[0]:.4g} V at a stoichiometry of {inside[0]:.3g} "
