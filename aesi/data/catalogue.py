@@ -34,8 +34,8 @@ class DataSet:
     """One cell and its tests.
 
     files : files that `get` fetches; empty where a program cannot.  how : how to get the set by hand and to read it.
-    published : pattern of a record's name in the path of its file in the published archive; its groups are joined by
-    `_`.
+    published : pattern of a record's name in the path of its file in the published archive; the groups that match are
+    joined by `_`.
     """
 
     name: str
@@ -48,9 +48,13 @@ class DataSet:
     published: str = ""
 
     def record_of(self, path: PurePath) -> str | None:
-        """Name of the record in a file of the unpacked archive, in lower case except `degC`; None for other files."""
+        """Name of the record in a file of the unpacked archive, in lower case except `degC` and with `n` for minus;
+        None for other files."""
         match = re.search(self.published, path.as_posix()) if self.published else None
-        return None if match is None else "_".join(match.groups()).lower().replace("degc", "degC")
+        if match is None:
+            return None
+        name = "_".join(filter(None, match.groups())).lower().replace("degc", "degC")
+        return re.sub("^-", "n", name)
 
 
 def _about_energy(name: str, path: str, sha256: str) -> Remote:
@@ -172,7 +176,8 @@ SETS = (
         "part at a time (--from-s, --to-s). Its spectra hold ActFreq (Hz), Zreal1 and Zimg1 (mOhm, which they do not "
         "say) and AhAccu (Ah, negative on discharge): write these as frequency_hz,z_real_mohm,z_imag_mohm and, with "
         "its sign turned, discharged_ah, beside the chamber's temperature_degc.",
-        published=r"[ _](n?\d+degC_\w+)_Pan18650PF\.mat$",
+        published=r"[ _](n?\d+degC_\w+)_Pan18650PF\.mat$"
+        r"|(-?\d+degC)/Charges and Pauses/(\d\d-\d\d-\d\d_\d\d\.\d\d) \d+_(Charge\w+)\.mat$",
     ),
     DataSet(
         M50T,

@@ -30,6 +30,7 @@ here."""
 HYBRID = "AESI I"
 BEGIN, END = "<!-- table of aesi bench cells -->", "<!-- end -->"
 ARCHIVE_MARKS = "<!-- table of aesi bench cells, archive -->", "<!-- end of archive -->"
+CHARGES_MARKS = "<!-- table of aesi bench cells, charges -->", "<!-- end of charges -->"
 
 
 def run(
@@ -38,24 +39,25 @@ def run(
     hybrid: bool = False,
     experiments: str = "experiments",
     archive: bool = False,
+    charges: bool = False,
     development: bool | None = None,
     porous: bool = False,
     write: str | None = None,
 ) -> Iterator[dict[str, Any]]:
     """One dict a record, and a last one with `summary`: true.
 
-    cells, only, archive, development, porous : see `aesi.bench.physics.cells.run`.  hybrid : add `hybrid_mv`, some
-    minutes.  experiments : folder of the experiment files.  write : a page whose part between the two marks becomes the
-    table.
+    cells, only, archive, charges, development, porous : see `aesi.bench.physics.cells.run`.  hybrid : add `hybrid_mv`,
+    some minutes.  experiments : folder of the experiment files.  write : a page whose part between the two marks
+    becomes the table.
     """
     rows = []
-    for row in physics.run(cells, only, archive, development, porous):
+    for row in physics.run(cells, only, archive, charges, development, porous):
         if hybrid and not row.get("summary") and row["cell"] in EXPERIMENTS and "error" not in row:
             row |= hybrid_figures(Path(experiments), row["cell"]).get(row["record"], {})
         rows.append(row)
         yield row
-    if write is not None and archive:
-        write_between(write, *ARCHIVE_MARKS, archive_table(rows[:-1]))
+    if write is not None and (archive or charges):
+        write_between(write, *(CHARGES_MARKS if charges else ARCHIVE_MARKS), archive_table(rows[:-1]))
     elif write is not None:
         write_between(write, BEGIN, END, table(rows[:-1]))
 

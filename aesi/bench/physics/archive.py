@@ -6,6 +6,8 @@ calibration and their constants were made, but for the development half of `aesi
 cold was fitted to two of that half.
 `aesi.data.catalogue.locate` finds the records in an unpacked archive by the names below. The day of a record is the
 first time stamp of its published file.
+
+Beside the drives the archive of the Panasonic has the charges between them, of which none entered a calibration.
 """
 
 from __future__ import annotations
@@ -97,12 +99,59 @@ ARCHIVE: Mapping[str, Mapping[str, str]] = {
 }
 """Data set -> record -> day of the test, YYYY-MM-DD."""
 
+CHARGES: Mapping[str, Mapping[str, str]] = {
+    PANASONIC: {
+        "25degC_03-12-17_11.58_charge_2": "2017-03-12",
+        "25degC_03-19-17_06.31_charge2": "2017-03-19",
+        "25degC_03-19-17_11.59_charge3": "2017-03-19",
+        "25degC_03-19-17_17.53_charge4": "2017-03-19",
+        "25degC_03-20-17_03.05_charge1": "2017-03-20",
+        "25degC_03-20-17_08.04_charge2": "2017-03-20",
+        "25degC_03-20-17_21.35_charge2": "2017-03-20",
+        "25degC_03-21-17_06.44_charge3": "2017-03-21",
+        "25degC_03-21-17_13.34_charge4": "2017-03-21",
+        "25degC_03-21-17_19.43_charge5": "2017-03-21",
+        "25degC_04-29-17_13.07_charge2a": "2017-04-29",
+        "10degC_03-28-17_09.49_charge2a": "2017-03-28",
+        "10degC_03-28-17_15.29_charge1": "2017-03-28",
+        "10degC_04-05-17_14.13_charge2": "2017-04-05",
+        "10degC_04-05-17_19.54_charge3": "2017-04-05",
+        "10degC_04-06-17_01.36_charge4": "2017-04-06",
+        "0degC_05-21-17_09.52_charge2a": "2017-05-21",
+        "0degC_05-30-17_07.44_charge2a": "2017-05-30",
+        "0degC_05-30-17_15.23_charge1": "2017-05-30",
+        "0degC_06-01-17_10.37_charge2": "2017-06-01",
+        "0degC_06-01-17_17.21_charge3": "2017-06-01",
+        "0degC_06-02-17_00.13_charge4": "2017-06-02",
+        "0degC_06-02-17_06.00_charge5": "2017-06-02",
+        "0degC_06-02-17_12.24_charge6": "2017-06-02",
+        "0degC_06-02-17_20.49_charge7": "2017-06-02",
+        "n10degC_06-08-17_10.21_charge1a": "2017-06-08",
+        "n10degC_06-10-17_05.35_charge2a": "2017-06-10",
+        "n10degC_06-10-17_13.07_charge1": "2017-06-10",
+        "n10degC_06-10-17_20.16_charge2": "2017-06-10",
+        "n10degC_06-11-17_03.15_charge3": "2017-06-11",
+        "n20degC_06-24-17_05.54_charge1": "2017-06-24",
+        "n20degC_06-24-17_13.23_charge2": "2017-06-24",
+        "n20degC_06-24-17_20.54_charge3": "2017-06-24",
+        "n20degC_06-25-17_04.26_charge4": "2017-06-25",
+        "n20degC_06-25-17_11.16_charge5": "2017-06-25",
+    },
+}
+"""Data set -> charge at 1C and then at 4.2 V -> day of the test, YYYY-MM-DD. Those that begin below 3.7 V and can
+be read whole. The chamber is that of the tests around it; it was warmed for the charge."""
+
+
+def archive_day(data: str, record: str) -> str | None:
+    """Day of the test of a record of an archive, YYYY-MM-DD; None for one that is not of the archives."""
+    return ARCHIVE.get(data, {}).get(record) or CHARGES.get(data, {}).get(record)
+
 
 def for_development(data: str, record: str) -> bool:
-    """Whether rules and constants may be chosen on a record of an archive: every second one of a cell, beginning with
-    the first. False for a record that is not of the archives."""
-    names = list(ARCHIVE.get(data, ()))
-    return record in names and names.index(record) % 2 == 0
+    """Whether rules and constants may be chosen on a record of an archive: every second drive or charge of a cell,
+    beginning with the first. False for a record that is not of the archives."""
+    of_one_kind = (list(kind.get(data, ())) for kind in (ARCHIVE, CHARGES))
+    return any(record in names and names.index(record) % 2 == 0 for names in of_one_kind)
 
 
 def chamber(record: str) -> str:

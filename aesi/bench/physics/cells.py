@@ -22,12 +22,13 @@ With `archive` the records are those of the published archives (`aesi.bench.phys
 those of other files of the cell at the measured temperature, where there are such: of the file that was fitted at 25
 degC alone (`alone`), and of the file that was also fitted to records of the archive in the cold (`cold`). Figures of a
 file on records that it was fitted to are marked and are left out of the medians. Rules may be chosen on every second
-record of an archive, beginning with the first (`development`).
+record of an archive, beginning with the first (`development`). With `charges` the records are the charges of the
+archives.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -35,7 +36,7 @@ from typing import Any
 import numpy as np
 
 from aesi.bench import some_chosen
-from aesi.bench.physics.archive import ARCHIVE, for_development
+from aesi.bench.physics.archive import ARCHIVE, CHARGES, archive_day, for_development
 from aesi.bench.physics.cells_table import tested_mv
 from aesi.bench.physics.tested import soh_on_its_day
 from aesi.constants import MV_PER_V
@@ -131,23 +132,29 @@ def run(
     cells: str = "experiments/cells",
     only: Sequence[str] | str = (),
     archive: bool = False,
+    charges: bool = False,
     development: bool | None = None,
     porous: bool = False,
 ) -> Iterator[dict[str, Any]]:
     """One row per record, and a last row with `summary`: true.
 
     cells : folder of the cell files.  only : names of data sets or records; empty takes all.  archive : take the
-    records of the published archives in place of those of the data sets.  development : of these, True takes those on
+    records of the published archives in place of those of the data sets.  charges : take the charges of the archives
+    in place of them.  development : of records of the archives, True takes those on
     which rules may be chosen, False the others.  porous : add `porous_mv`, the error of the porous-electrode model with
     the calibrated file at the measured temperature, which takes some seconds per record.
-    Raises InputError if a name in `only` is no data set and no record, and for `development` without `archive`.
+    Raises InputError if a name in `only` is no data set and no record, for `archive` with `charges`, and for
+    `development` without one of them.
     """
-    if development is not None and not archive:
+    if archive and charges:
+        raise InputError("cells: archive and charges are two sets of records; give one of them.")
+    if development is not None and not (archive or charges):
         raise InputError(
-            "cells: development chooses among the records of the archives; add --set archive=true."
+            "cells: development chooses among the records of the archives; add --set archive=true or --set "
+            "charges=true."
         )
     rows = []
-    records = _of_archive(development) if archive else RECORDS
+    records = _of_archive(CHARGES if charges else ARCHIVE, development) if archive or charges else RECORDS
     for record in _chosen([only] if isinstance(only, str) else only, records):
         row = judged(Path(cells), record, porous)
         rows.append(row)
@@ -167,11 +174,11 @@ def run(
     }
 
 
-def _of_archive(development: bool | None) -> list[MeasuredRecord]:
-    """The records of the archives: those for development, or the others; None takes all."""
+def _of_archive(kind: Mapping[str, Mapping[str, str]], development: bool | None) -> list[MeasuredRecord]:
+    """The records of one kind of the archives: those for development, or the others; None takes all."""
     return [
         MeasuredRecord(data, name)
-        for data, days in ARCHIVE.items()
+        for data, days in kind.items()
         for name in days
         if development is None or for_development(data, name) == development
     ]
@@ -233,7 +240,7 @@ def _figures(cells: Path, record: MeasuredRecord, porous: bool) -> dict[str, Any
         if soh is not None:
             out["soh"] = round(soh, 3)
             runs["aged"] = free_run(cell.with_soh(soh), data)
-        if measured is not None and record.name in ARCHIVE.get(record.data, {}):
+        if measured is not None and archive_day(record.data, record.name) is not None:
             others = _beside(cells, record.data, calibrated)
             runs |= {name: free_run(other, data) for name, other in others.items()}
             fitted = [name for name, other in others.items() if record.name in dict(other.fitted_at_k)]

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from datetime import date
 
-from aesi.bench.physics.archive import ARCHIVE
+from aesi.bench.physics.archive import archive_day
 from aesi.data.catalogue import HG2, PANASONIC
 from aesi.physics import Cell
 
@@ -56,7 +56,7 @@ TESTED = {
 def soh_on_its_day(cell: Cell, data: str, record: str) -> float | None:
     """State of health of the cell on the day of a record, as a share of the file's capacity; None if the day of the
     record is unknown or the file has no dated states of health."""
-    day = TESTED.get(data, {}).get(record) or ARCHIVE.get(data, {}).get(record)
+    day = TESTED.get(data, {}).get(record) or archive_day(data, record)
     known = [one for _, one in cell.tested_on]
     if day is None or not known:
         return None

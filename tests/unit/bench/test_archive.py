@@ -5,7 +5,7 @@ from pathlib import PurePath
 import pytest
 
 from aesi.bench.physics import cells
-from aesi.bench.physics.archive import ARCHIVE, chamber, chamber_degc
+from aesi.bench.physics.archive import ARCHIVE, CHARGES, archive_day, chamber, chamber_degc
 from aesi.bench.physics.cells import RECORDS
 from aesi.bench.physics.cells_table import archive_table
 from aesi.bench.physics.tested import TESTED
@@ -22,17 +22,26 @@ PUBLISHED = {
     ): ("25degC_hwftb"),
     ("lg_18650hg2", "LG_HG2/n20degC/611_Mixed3.csv"): "n20degC_611_mixed3",
     ("lg_18650hg2", "n10degC/602_Cap_1C.csv"): "n10degC_602_cap_1c",
+    ("panasonic_ncr18650pf", "-10degC/Charges and Pauses/06-10-17_13.07 3740_Charge1.mat"): (
+        "n10degC_06-10-17_13.07_charge1"
+    ),
 }
 
 
 @pytest.mark.parametrize(("data", "path"), PUBLISHED)
 def test_a_record_is_named_as_its_file_in_the_archive(data, path):
     assert catalogue.find_set(data).record_of(PurePath(path)) == PUBLISHED[data, path]
-    assert PUBLISHED[data, path] in ARCHIVE[data]
+    assert archive_day(data, PUBLISHED[data, path]) is not None
 
 
 @pytest.mark.parametrize(
-    "path", ["0degC/5 pulse/05-20-17_12.07 3619_dis5_10p.mat", "README.md", "25degC_us06.csv.gz"]
+    "path",
+    [
+        "0degC/5 pulse/05-20-17_12.07 3619_dis5_10p.mat",
+        "0degC/Charges and Pauses/06-01-17_13.37 3686_Pause3.mat",
+        "README.md",
+        "25degC_us06.csv.gz",
+    ],
 )
 def test_other_files_of_an_archive_are_no_records(path):
     assert all(catalogue.find_set(data).record_of(PurePath(path)) is None for data in ARCHIVE)
@@ -52,26 +61,44 @@ def test_a_record_is_found_in_an_unpacked_archive(tmp_path, monkeypatch):
 
 def test_no_record_of_an_archive_is_one_of_the_sets_or_entered_a_calibration():
     known = {(record.data, record.name) for record in RECORDS}
-    assert not known & {(data, name) for data, days in ARCHIVE.items() for name in days}
-    assert all(not set(days) & set(TESTED[data]) for data, days in ARCHIVE.items())
+    for kind in (ARCHIVE, CHARGES):
+        assert not known & {(data, name) for data, days in kind.items() for name in days}
+        assert all(not set(days) & set(TESTED[data]) for data, days in kind.items())
 
 
-def test_rules_are_chosen_on_one_half_of_an_archive_and_judged_on_the_other(tmp_path, monkeypatch):
+def test_the_day_of_a_charge_is_in_the_name_of_its_file():
+    for days in CHARGES.values():
+        for name, day in days.items():
+            year, month, of_month = day.split("-")
+            assert name.split("_")[1] == f"{month}-{of_month}-{year[2:]}"
+
+
+@pytest.mark.parametrize("kind", ["archive", "charges"])
+def test_rules_are_chosen_on_one_half_of_an_archive_and_judged_on_the_other(kind, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("AESI_DATA", str(tmp_path))  # no record is here, and each gets its row all the same
 
     def names(development):
         return [
             (row["cell"], row["record"])
-            for row in cells.run(archive=True, development=development)
+            for row in cells.run(**{kind: True}, development=development)
             if not row.get("summary")
         ]
 
     half, other = names(True), names(False)
     assert not set(half) & set(other)
     assert set(half) | set(other) == set(names(None))
-    assert ("lg_18650hg2", "40degC_556_us06") in half
-    assert ("panasonic_ncr18650pf", "25degC_hwftb") in other
+    first, second = {
+        "archive": (("lg_18650hg2", "40degC_556_us06"), ("panasonic_ncr18650pf", "25degC_hwftb")),
+        "charges": (
+            ("panasonic_ncr18650pf", "25degC_03-12-17_11.58_charge_2"),
+            ("panasonic_ncr18650pf", "25degC_03-19-17_06.31_charge2"),
+        ),
+    }[kind]
+    assert first in half
+    assert second in other
+    with pytest.raises(InputError, match="two sets of records"):
+        next(cells.run(archive=True, charges=True))
     with pytest.raises(InputError, match="add --set archive=true"):
         next(cells.run(development=True))
 

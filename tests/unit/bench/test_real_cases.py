@@ -9,6 +9,7 @@ import pytest
 
 from aesi.bench.detectable import seen_on_measured
 from aesi.bench.limit import NO_TIME, NOT_RUN
+from aesi.bench.physics.archive import ARCHIVE
 from aesi.bench.physics.cells import _of_archive
 from aesi.bench.real import chosen, judged, plan, summary, table, write_report
 from aesi.bench.real.answers import answer_scores, initial_state_row
@@ -61,7 +62,7 @@ def test_of_the_archives_a_temperature_is_withheld_wherever_it_is_given_beside_i
 
 
 def test_drives_that_the_energies_of_the_files_were_chosen_on_stood_as_unseen():
-    chose = {(record.data, record.name) for record in _of_archive(development=True)}
+    chose = {(record.data, record.name) for record in _of_archive(ARCHIVE, development=True)}
     unseen = [case for case in chosen(archive=True, development=False) if case.group == "withheld"]
     assert len(unseen) == 10
     assert not chose & {(case.take.set, case.take.file) for case in unseen}
