@@ -22,6 +22,7 @@ from aesi.calibration.fit_sentences import (
     moved_start_sentences,
     own_parameter_sentences,
     ran_out_sentences,
+    unfitted_rows_sentences,
 )
 from aesi.calibration.heat import case_records, with_fitted_heat
 from aesi.calibration.model import FitState, Model
@@ -109,6 +110,7 @@ def calibrate(
             *contradicted_prior_sentences(model, x),
             *own_parameter_sentences(model, x),
             *ran_out_sentences(model, runs),
+            *unfitted_rows_sentences(found, model, records, begun),
             *moved_start_sentences(model, begun),
             *ends[0].heat_sentences,
             *ends_sentences(

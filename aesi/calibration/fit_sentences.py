@@ -8,9 +8,16 @@ import numpy as np
 
 from aesi.calibration.model import FitState, Model
 from aesi.calibration.silicon import SILICON_V
-from aesi.constants import MILLI
+from aesi.calibration.start import flowing
+from aesi.constants import MILLI, MV_PER_V
+from aesi.errors import DataError
+from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
+from aesi.physics.cell import Cell
 from aesi.physics.depletion import ran_out
+from aesi.physics.initial_state import initial_state
+from aesi.physics.simulation import simulate
+from aesi.records import Measurement
 
 NOTED_ZERO = 0.02
 """Share of a record's typical current above which a note reports the offset of its cycler's current."""
@@ -99,3 +106,48 @@ def moved_start_sentences(model: Model, begun: Mapping[str, float]) -> tuple[str
         for name, soc in given
         if abs(begun[name] - soc) >= MOVED_SOC
     )
+
+
+def unfitted_rows_sentences(
+    found: Cell, model: Model, records: Sequence[Measurement], begun: Mapping[str, float]
+) -> tuple[str, ...]:
+    """A sentence with the error of the written file over the rows of each record that were not fitted, under current.
+
+    found : written cell.  records : whole, in the order of the model's.  begun : `Calibration.starts`.
+    Where the file runs out only the rows before count.
+    """
+    out = []
+    for whole, record in zip(records, model.records, strict=True):
+        fitted = record.data
+        left_out = (whole.time_s < fitted.time_s[0]) | (whole.time_s > fitted.time_s[-1])
+        left_out &= flowing(whole.current_a)
+        if not left_out.any():
+            continue
+        degc = whole.temperature_degc
+        if degc is None and fitted.temperature_degc is not None:
+            degc = np.full(len(whole), fitted.temperature_degc[0])  # stated, the same in every row
+        given = begun[record.name] if record.start.basis == "given" else None
+        try:
+            soc = initial_state(found, whole, given, whole.hold_taken, model=model.model_name).soc
+        except DataError:  # a simulation has to be given the start
+            continue
+        run = simulate(
+            found,
+            whole.time_s,
+            whole.current_a,
+            soc,
+            temperature_degc=degc,
+            hold=whole.hold_taken,
+            on_depletion="clip",
+            model=model.model_name,
+        )
+        depleted = run.series["depleted"] > 0.0
+        rows = left_out & (np.cumsum(depleted) == 0)
+        if rows.any():
+            error_v = (whole.voltage_v - run.voltage_v)[rows]
+            out.append(
+                f"{record.name}: over its rows under current that are not fitted the file errs by "
+                f"{MV_PER_V * rms(error_v):.2f} mV, {MV_PER_V * error_v.mean():+.2f} mV in the mean (measured minus "
+                "model); aesi discover on the whole record tells which effect explains that, a hysteresis or another."
+            )
+    return tuple(out)
