@@ -16,7 +16,7 @@ from aesi.calibration.records.zero import zero_of
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.numerics.typing import Array
 from aesi.over_time import stamp
-from aesi.physics import ActiveEffect, Cell, ModelName
+from aesi.physics import ActiveEffect, Cell, InitialState, ModelName
 from aesi.physics.cell import Soh
 from aesi.physics.model import HeatBalance, of_record
 from aesi.physics.simulation import MODEL_WORDS, model_with
@@ -206,12 +206,12 @@ def fitted_record_sentences(
     return tuple(said)
 
 
-def aged_sentences(cell: Cell, record: Measurement, soc0: float, soh: Soh | None) -> tuple[str, ...]:
-    """A sentence where a record shows less capacity than the cell's file has, unless a state of health is given or the
-    file knows that of the record (`fitted_record_sentences`).  soc0 : at the first row."""
+def aged_sentences(cell: Cell, record: Measurement, start: InitialState, soh: Soh | None) -> tuple[str, ...]:
+    """A sentence where a record shows another capacity than the cell's file has, unless a state of health is given or
+    the file knows that of the record (`fitted_record_sentences`).  start : of the record."""
     if soh is not None or record.name in dict(cell.capacity_shares):
         return ()
-    said = aged_sentence(cell, record, soc0) if np.all(np.isfinite(record.voltage_v)) else ""
+    said = aged_sentence(cell, record, start) if np.all(np.isfinite(record.voltage_v)) else ""
     return (said,) if said else ()
 
 

@@ -251,7 +251,7 @@ def _profiled_model(
             *saved_model_sentences(model, record),
             *fitted_record_sentences(model.cell, record, asked.soh, model.effects),
             start.sentence,
-            *aged_sentences(model.cell, record, start.soc, asked.soh),
+            *aged_sentences(model.cell, record, start, asked.soh),
             hold_sentence(record.name, hold, asked.hold is not None, why=saved),
             temperature_sentence(model.cell, record, model.effects),
             *temperature_range_sentences(model.cell, [record.temperature_degc], model.effects),

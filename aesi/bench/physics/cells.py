@@ -23,7 +23,8 @@ those of other files of the cell at the measured temperature, where there are su
 degC alone (`alone`), and of the file that was also fitted to records of the archive in the cold (`cold`). Figures of a
 file on records that it was fitted to are marked and are left out of the medians. Rules may be chosen on every second
 record of an archive, beginning with the first (`development`). With `charges` the records are the charges of the
-archives.
+archives, and a further figure is that at the state of health that the charge itself shows, since it ends full
+(`charged`; `aesi.calibration.records.sizes.charged_share`).
 """
 
 from __future__ import annotations
@@ -39,6 +40,7 @@ from aesi.bench import some_chosen
 from aesi.bench.physics.archive import ARCHIVE, CHARGES, archive_day, for_development
 from aesi.bench.physics.cells_table import tested_mv
 from aesi.bench.physics.tested import soh_on_its_day
+from aesi.calibration.records.sizes import charged_share
 from aesi.constants import MV_PER_V
 from aesi.data.catalogue import HG2, LFP, M50T, NMC, PANASONIC, locate
 from aesi.data.read import read_measurement
@@ -96,7 +98,7 @@ NOMINAL_AH = {PANASONIC: 2.9, HG2: 3.0}
 BESIDE = {"alone": "_25degc", "cold": "_cold"}
 """Figure -> suffix of the calibrated file that it is of: fitted at 25 degC alone, and also fitted to records of the
 archive in the cold."""
-MODELS = ("declared", "calibrated", "with_temperature", "porous", "aged", *BESIDE)
+MODELS = ("declared", "calibrated", "with_temperature", "porous", "aged", "charged", *BESIDE)
 """The figures of a record, each an entry `..._mv` of its row."""
 
 RECORDS = (
@@ -240,6 +242,10 @@ def _figures(cells: Path, record: MeasuredRecord, porous: bool) -> dict[str, Any
         if soh is not None:
             out["soh"] = round(soh, 3)
             runs["aged"] = free_run(cell.with_soh(soh), data)
+        charged = charged_share(cell, data, initial_state(cell, data))
+        if charged is not None:
+            out["charged_soh"], out["charged_soh_sd"] = round(charged.share, 3), round(charged.sd, 3)
+            runs["charged"] = free_run(cell.with_soh(charged.share), data)
         if measured is not None and archive_day(record.data, record.name) is not None:
             others = _beside(cells, record.data, calibrated)
             runs |= {name: free_run(other, data) for name, other in others.items()}

@@ -39,13 +39,14 @@ def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 HEADINGS = COLUMNS | {
     "porous_mv": "porous electrode",
+    "charged_mv": "as aged as it shows",
     "alone_mv": "fitted at 25 °C alone",
     "cold_mv": "fitted in the cold",
 }
-JUDGED = ("declared_mv", "alone_mv", "with_temperature_mv", "porous_mv", "aged_mv", "cold_mv")
+JUDGED = ("declared_mv", "alone_mv", "with_temperature_mv", "porous_mv", "aged_mv", "charged_mv", "cold_mv")
 """Keys of the columns for the records of the archives: start file, file fitted at 25 degC alone, calibrated file with
-the single-particle and with the porous-electrode model, calibrated file at the state of health of the day, file fitted
-in the cold as well."""
+the single-particle and with the porous-electrode model, calibrated file at the state of health of the day and at that
+which a charge to full shows, file fitted in the cold as well."""
 
 
 def archive_table(rows: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -1,18 +1,24 @@
-"""Whether the records of one run can be of one cell, by the charge that a full discharge takes.
+"""The capacity of a record's cell: by the charge that a full discharge takes, and by the one that fills it.
 
-It needs no model and no potential, but a test of the capacity: from full to empty, without a load that ends it early,
-and not in the cold.
+A full discharge needs no model and no potential, but is a test of the capacity: from full to empty, without a load that
+ends it early, and not in the cold. So it tells, too, whether the records of one run can be of one cell. A charge that
+ends at the upper cut-off voltage ends full by definition, at any rate and temperature; the state of charge that it
+begins at is read from its voltage.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from aesi.advice import listed
 from aesi.calibration.start import NEAR_THE_SIZE, charge_hold, emptied_ah, full_discharge_ah
+from aesi.errors import DataError
 from aesi.physics.cell import Cell
+from aesi.physics.cell.health import LEAST_SOH, MOST_SOH
+from aesi.physics.initial_state import REST_C_RATE, InitialState, initial_state
 from aesi.physics.record_checks import COLD_DEGC
 from aesi.records import Measurement
 
@@ -32,6 +38,9 @@ AGED = 0.92
 of their own cells, a Panasonic NCR18650PF and an LG 18650HG2, measured ones at 1C and C/20 show 0.934 to 1.044; the
 last 1C discharge of that Panasonic, which took 2.43 Ah after its drives and 2.80 Ah before, shows 0.89 and 0.91."""
 
+AGED_SDS = 2.0
+"""Deviations that the capacity of a charge to full is from the file's at least where a note tells it. A convention."""
+
 
 def capacity_test_ah(cell: Cell, record: Measurement) -> float | None:
     """Charge of a full discharge between the cut-offs of a cell that tells the capacity of the record's cell, Ah; None
@@ -40,13 +49,78 @@ def capacity_test_ah(cell: Cell, record: Measurement) -> float | None:
     return charge_ah if charge_ah is not None and _tells_capacity(record, charge_ah) else None
 
 
-def aged_sentence(cell: Cell, record: Measurement, soc0: float) -> str:
-    """A sentence where a discharge to empty shows less than `AGED` of the capacity in the cell's file; '' elsewhere,
-    where the load or the cold may have ended it (`capacity_test_ah`), and where it takes less than `NEAR_THE_SIZE` of
-    that capacity, which makes much of an error of the state of charge that it starts at.
+@dataclass(frozen=True)
+class ChargedShare:
+    """Capacity of a cell as a charge to full shows it.
 
-    soc0 : state of charge at the first row.
+    share, sd : of the capacity in the cell's file, and its standard deviation.  charge_ah : brought by the record, Ah.
     """
+
+    share: float
+    sd: float
+    charge_ah: float
+
+
+def charged_share(cell: Cell, record: Measurement, start: InitialState) -> ChargedShare | None:
+    """The capacity that a record shows which ends with a charge to full; None for other records.
+
+        share = charge brought / (capacity of the file (1 - state of charge at the first row))
+
+    start : of the record, in the windows of the file.
+    """
+    rests_at = _rest_of_full_cell(cell, record)
+    if rests_at is None or start.soc >= 1.0:
+        return None
+    charge_ah = -float(record.discharged_ah(record.hold_taken)[rests_at])
+    share = charge_ah / (cell.capacity_ah * (1.0 - start.soc))
+    full_sd = initial_state(cell, record.take(slice(rests_at, None))).sd
+    return ChargedShare(share, share * float(np.hypot(start.sd, full_sd)) / (1.0 - start.soc), charge_ah)
+
+
+def ends_full(cell: Cell, record: Measurement) -> bool:
+    """Whether a record ends with a charge to full, of which `charged_share` tells the capacity."""
+    return _rest_of_full_cell(cell, record) is not None
+
+
+def _rest_of_full_cell(cell: Cell, record: Measurement) -> int | None:
+    """Index of the first row of the rest that ends a record, where a charge to full came before; None elsewhere."""
+    flows = np.flatnonzero(np.abs(record.current_a) > REST_C_RATE * cell.capacity_ah)
+    if not len(flows) or flows[-1] + 1 == len(record) or record.current_a[flows[-1]] > 0.0:
+        return None
+    first = int(flows[-1]) + 1
+    try:
+        end = initial_state(cell, record.take(slice(first, None)))
+    except DataError:  # a voltage of no state of this cell
+        return None
+    return first if end.basis == "full charge" else None
+
+
+def aged_sentence(cell: Cell, record: Measurement, start: InitialState) -> str:
+    """A sentence where a record shows another capacity than the cell's file has; '' elsewhere.
+
+    A charge to full does where the two are more than `AGED_SDS` deviations apart. A discharge to empty does below
+    `AGED` of the file's, but not where the load or the cold may have ended it (`capacity_test_ah`), nor where it takes
+    less than `NEAR_THE_SIZE` of that capacity, which makes much of an error of the state of charge that it starts at.
+
+    start : of the record.
+    """
+    charged = charged_share(cell, record, start)
+    if charged is not None:
+        # Beyond these limits it is another cell's record, which other messages say.
+        apart = abs(charged.share - 1.0) > AGED_SDS * charged.sd and LEAST_SOH <= charged.share <= MOST_SOH
+        return _charged_sentence(cell, record, start, charged) if apart else ""
+    return _discharged_sentence(cell, record, start.soc)
+
+
+def _charged_sentence(cell: Cell, record: Measurement, start: InitialState, charged: ChargedShare) -> str:
+    return (
+        f"{record.name}: from a state of charge of {start.soc:.3f} it is full after {charged.charge_ah:.3g} Ah, as a "
+        f"cell with {charged.share:.3f} +/- {charged.sd:.3f} of the {cell.capacity_ah:.3g} Ah in the cell's file; if "
+        f"it has aged, --soh {charged.share:.3f} takes it so."
+    )
+
+
+def _discharged_sentence(cell: Cell, record: Measurement, soc0: float) -> str:
     taken_ah = record.discharged_ah(charge_hold(record))
     charge_ah = emptied_ah(cell, record, taken_ah, 0, len(record))
     if charge_ah is None or not _tells_capacity(record, charge_ah):

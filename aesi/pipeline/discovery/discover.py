@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 
 from aesi.advice import Reader, told
-from aesi.calibration.records.sizes import sizes_sentence
+from aesi.calibration.records.sizes import ends_full, sizes_sentence
 from aesi.constants import MILLI, MV_PER_V, ZERO_CELSIUS_K
 from aesi.numerics.files.whole import write_whole
 from aesi.physics.cell import Soh
 from aesi.physics.effects import CATALOGUE, Effect, known_effects, selected
 from aesi.physics.folded import folded
-from aesi.physics.initial_state import initial_state
+from aesi.physics.initial_state import InitialState, initial_state
 from aesi.physics.rest.open_circuit import GOOD_READING_V
 from aesi.physics.simulation import ModelName
 from aesi.pipeline.notes import (
@@ -159,12 +159,13 @@ class Case:
         )
 
     def _aged(self, given: HybridModel) -> Iterator[str]:
-        """Sentences on records that look as of a cell with less capacity than the file's, from the start that the
+        """Sentences on records that look as of a cell with another capacity than the file's, from the start that the
         search reads."""
         shared = len(self.measurements) > 1
+        full = InitialState(1.0, 0.0, "full charge", "")
         for m in self.measurements:
-            if not aged_sentences(given.cell, m, 1.0, self.soh):
-                continue  # nor is it with a start below full, which leaves more of the charge to the cell
+            if not (ends_full(given.cell, m) or aged_sentences(given.cell, m, full, self.soh)):
+                continue  # a start below full leaves more of a discharge to the cell
             start = initial_state(
                 given.cell,
                 m,
@@ -174,7 +175,7 @@ class Case:
                 shared=shared,
                 potentials_v=GOOD_READING_V,
             )
-            yield from aged_sentences(given.cell, m, start.soc, self.soh)
+            yield from aged_sentences(given.cell, m, start, self.soh)
 
     @property
     def notes(self) -> tuple[str, ...]:

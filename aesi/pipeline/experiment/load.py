@@ -394,7 +394,7 @@ def _on_grid(
             held,
             *sampled,
             with_keys(temperature_sentence(cell, measurement, given.effects)),
-            *map(with_keys, aged_sentences(cell, measurement, start.soc, config.cell.soh)),
+            *map(with_keys, aged_sentences(cell, measurement, start, config.cell.soh)),
             *map(with_keys, contradiction_sentences(given, measurement, start.soc, data.hold)),
             *map(with_keys, even.notes),
         ]

@@ -8,9 +8,9 @@ import pytest
 
 from aesi.calibration import Conditions
 from aesi.calibration.prepared_model import prepared_model
-from aesi.calibration.records.sizes import aged_sentence, capacity_test_ah, sizes_sentence
+from aesi.calibration.records.sizes import aged_sentence, capacity_test_ah, charged_share, sizes_sentence
 from aesi.errors import DataError
-from aesi.physics import Cell
+from aesi.physics import Cell, InitialState, initial_state, simulate
 from aesi.pipeline.calibrate import start_at_size
 from aesi.pipeline.discovery.discover import Case
 from aesi.pipeline.experiment.config import parse_experiment
@@ -131,8 +131,9 @@ def test_a_simulation_passed_over_the_age_that_its_record_shows(m50, tmp_path):
 )
 def test_a_discharge_that_shows_no_capacity_is_no_sign_of_age(m50, share, c_rate, degc, soc0, noted):
     record = discharge(m50, "one", share * m50.capacity_ah, c_rate, degc)
-    assert bool(aged_sentence(m50, record, soc0)) == noted
-    assert not aged_sentence(m50, record.take(slice(0, 200)), soc0)
+    start = InitialState(soc0, 0.0, "given", "")
+    assert bool(aged_sentence(m50, record, start)) == noted
+    assert not aged_sentence(m50, record.take(slice(0, 200)), start)
 
 
 def test_a_record_was_refused_for_the_size_that_another_one_gave_the_file(m50):
@@ -163,3 +164,54 @@ def test_an_experiment_took_a_record_of_another_cell_without_a_word(m50):
     assert [
         note for note in notes if note.startswith("small: a full discharge takes 2.75 Ah, and the file of")
     ]
+
+
+def charge(cell, soc0, degc, c_rate=1.0):
+    """A rest, a charge at c_rate to the upper cut-off and then at that voltage to C/60, and a rest."""
+    time_s, volts = list(np.arange(0.0, 1800.0, 60.0)), cell.upper_voltage_v
+    rate = [0.0] * len(time_s)
+    amperes, step_s = -c_rate * cell.capacity_ah, 120.0
+    while amperes < -cell.capacity_ah / 60.0:
+        time_s.append(time_s[-1] + step_s)
+        low, high = amperes, 0.0  # the largest current that does not pass the voltage
+
+        def ends_v(try_a):
+            run = simulate(cell, time_s, [*rate, try_a], soc0, (), degc, "backward", on_depletion="clip")
+            return run.voltage_v[-1]
+
+        if ends_v(amperes) > volts:
+            for _ in range(12):
+                middle = 0.5 * (low + high)
+                low, high = (middle, high) if ends_v(middle) > volts else (low, middle)
+            amperes = high
+        rate.append(amperes)
+    time_s += [time_s[-1] + 10.0, time_s[-1] + 20.0]
+    rate += [0.0, 0.0]
+    run = simulate(cell, time_s, rate, soc0, (), degc, "backward")
+    return Measurement(
+        np.array(time_s), np.array(rate), run.voltage_v, np.full(len(rate), degc), "charge", hold="backward"
+    )
+
+
+@pytest.mark.parametrize(("share", "soc0", "degc"), [(0.9, 0.2, 25.0), (1.04, 0.1, 25.0), (0.9, 0.15, 10.0)])
+def test_a_charge_to_full_told_no_capacity(m50, share, soc0, degc):
+    """At any rate and temperature, while a discharge in the cold or under a load tells none."""
+    record = charge(m50.with_soh(share), soc0, degc)
+    start = initial_state(m50, record)
+    shown = charged_share(m50, record, start)
+    assert shown.share == pytest.approx(share, abs=2.0 * shown.sd)
+    assert shown.sd < 0.03
+    (note,) = [note for note in Case(FILE, (record,)).assumed if "--soh" in note]
+    assert f"as a cell with {shown.share:.2f}" in note
+    assert not [note for note in Case(FILE, (record,), soh=share).assumed if "it is full after" in note]
+
+
+def test_a_charge_that_shows_the_capacity_of_the_file_or_does_not_end_full_is_not_noted(m50):
+    record = charge(m50, 0.2, 25.0)
+    start = initial_state(m50, record)
+    assert charged_share(m50, record, start).share == pytest.approx(1.0, abs=0.01)
+    assert aged_sentence(m50, record, start) == ""
+    flows = np.flatnonzero(record.current_a)
+    for part in (record.take(slice(0, flows[-8])), record.take(slice(0, 2))):
+        assert charged_share(m50, part, start) is None
+    assert charged_share(m50, record, replace(start, soc=1.0)) is None  # a cycle that began full
