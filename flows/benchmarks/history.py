@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -87,14 +87,49 @@ class Entry:
 
 
 def read_history(path: Path) -> list[Entry]:
-    """The entries of a history, oldest first; none where there is no file."""
+    """The entries of a history, oldest first; none where there is no file.
+
+    Raises InputError for a file that cannot be read, or that holds something else.
+    """
     if not path.exists():
         return []
     try:
-        entries = json.loads(path.read_text(encoding="utf-8"))["entries"]
-        return [Entry(**{**entry, "lines": tuple(entry["lines"])}) for entry in entries]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{path} is no history of benchmarks ({error}).") from None
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror or error}.") from None
+    except ValueError:
+        raise _no_history(path, "it is not one JSON object") from None
+    match content:
+        case {"entries": [*entries]}:
+            return [_entry(path, number, entry) for number, entry in enumerate(entries, 1)]
+    raise _no_history(path, "it has no list of 'entries'")
+
+
+def _entry(path: Path, number: int, content: object) -> Entry:
+    match content:
+        case {
+            "date": str(),
+            "commit": str(),
+            "machine": str(),
+            "load": int() | float() | None,
+            "lines": [*lines],
+        } if len(content) == len(fields(Entry)) and all(map(_is_line, lines)):
+            return Entry(**{**content, "lines": tuple(lines)})
+    raise _no_history(path, f"its entry {number} is none of a run of benchmarks")
+
+
+def _is_line(content: object) -> bool:
+    match content:
+        case {"bench": str()}:
+            return True
+    return False
+
+
+def _no_history(path: Path, why: str) -> InputError:
+    return InputError(
+        f"{path} is no history of benchmarks ({why}); give a file as docs/hooks/record.py writes it, such as "
+        "docs/benchmarks.json: what `aesi bench --json` prints is not yet one."
+    )
 
 
 def write_history(path: Path, entries: Sequence[Entry]) -> None:

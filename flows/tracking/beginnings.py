@@ -33,16 +33,24 @@ def noted_beginning(store: Store, experiment: str) -> Iterator[dict[str, str]]:
 
 
 def close_unrecorded(store: Store, say: Callable[[str], None]) -> None:
-    """Close as killed what was made in the store by a process that died before it wrote the run's record."""
+    """Close as killed what was made in the store by a process that died before it wrote the run's record; a note of
+    another version is named and left."""
     if not any(_folder().glob("*.json")):
         return
     with _alone() as lock:
         recorded = {record.run_id for record in records()}
         for note in _folder().glob("*.json") if lock.held else ():
-            content = json.loads(note.read_bytes())
-            found = store.find_experiment(content["experiment"])
+            content = _read(note)
+            if content is None:
+                say(
+                    f"{note} is no note of this version on a run that begins, so that a run that it may name stays "
+                    "RUNNING in its store: run a job with the version that wrote it, or delete the file."
+                )
+                continue
+            address, experiment = content
+            found = store.find_experiment(experiment)
             run = found and next(store.runs(found, f"tags.`{BEGUN}` = '{note.stem}'"), None)
-            if not run and content["store"] != without_login(store.uri):
+            if not run and address != without_login(store.uri):
                 continue  # it may be in that one
             if run and run.info.run_id not in recorded:
                 store.client.set_terminated(run.info.run_id, "KILLED")
@@ -59,6 +67,18 @@ def _alone() -> Iterator[ProcessLock]:
         yield lock
     finally:
         lock.release()
+
+
+def _read(note: Path) -> tuple[str, str] | None:
+    """The store and the experiment that a note names; None of what `noted_beginning` does not write."""
+    try:
+        content = json.loads(note.read_bytes())
+    except ValueError:
+        return None
+    match content:
+        case {"store": str(address), "experiment": str(experiment)}:
+            return address, experiment
+    return None
 
 
 def _folder() -> Path:

@@ -11,7 +11,7 @@ from flows.base import environment
 from flows.tracking.outbox import Item, OfAnotherVersion
 from flows.tracking.store import NUMBER, PARENT
 from flows.tracking.view import of_both_kinds
-from flows.tracking.whole_run import insert_run, new_artifact_uri
+from flows.tracking.whole_run import NestedRun, insert_run, new_artifact_uri
 
 if TYPE_CHECKING:
     from mlflow.entities import RunInfo
@@ -22,33 +22,31 @@ if TYPE_CHECKING:
 def _send_run(store: Store, item: Item, again: bool) -> None:
     """A finished nested run: parameters, metrics, files.  again : whether it may be there already, in whole or in
     part."""
-    found = store.child(item["experiment_id"], item["parent"], item["label"]) if again else None
-    tags = {PARENT: item["parent"], NUMBER: item["label"], **item["tags"]}
+    run = NestedRun.of(item)  # whole, before a part of it is anywhere
+    found = store.child(run.experiment_id, run.parent, run.label) if again else None
+    tags = {PARENT: run.parent, NUMBER: run.label, **run.tags}
     if found is None and store.local:
-        artifacts = new_artifact_uri(store.artifact_place(item["experiment_id"]))
-        _write_files(store, artifacts, item["files"])
-        insert_run(store.database, item, artifacts, tags)
+        artifacts = new_artifact_uri(store.artifact_place(run.experiment_id))
+        _write_files(store, artifacts, run.files)
+        insert_run(store.database, run, artifacts, tags)
     else:
-        _send_run_by_client(store, item, tags, found and found.info)
+        _send_run_by_client(store, run, tags, found and found.info)
 
 
-def _send_run_by_client(store: Store, item: Item, tags: Mapping[str, str], info: RunInfo | None) -> None:
+def _send_run_by_client(store: Store, run: NestedRun, tags: Mapping[str, str], info: RunInfo | None) -> None:
     """To a server, or the rest of what has arrived in part; info : of the run that is there already."""
     from mlflow.entities import Metric, Param, RunTag
 
-    there = info is not None
+    metrics = [Metric(k, v, run.end_ms, 0) for k, v in run.metrics.items()]
+    params = [Param(k, v) for k, v in run.params.items()]
+    late = [RunTag(k, v) for k, v in tags.items()] if info is not None else []
     if info is None:
         info = store.client.create_run(
-            item["experiment_id"], start_time=item["start_ms"], run_name=item["name"], tags=dict(tags)
+            run.experiment_id, start_time=run.start_ms, run_name=run.name, tags=dict(tags)
         ).info
-    store.client.log_batch(
-        info.run_id,
-        metrics=[Metric(k, v, item["end_ms"], 0) for k, v in item["metrics"].items()],
-        params=[Param(k, v) for k, v in item["params"].items()],
-        tags=[RunTag(k, v) for k, v in tags.items()] if there else [],
-    )
-    _write_files(store, info.artifact_uri, item["files"])
-    store.client.set_terminated(info.run_id, item["status"], item["end_ms"])
+    store.client.log_batch(info.run_id, metrics=metrics, params=params, tags=late)
+    _write_files(store, info.artifact_uri, run.files)
+    store.client.set_terminated(info.run_id, run.status, run.end_ms)
 
 
 def _write_files(store: Store, artifact_uri: str, files: Mapping[str, str]) -> None:

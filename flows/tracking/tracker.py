@@ -27,6 +27,7 @@ from flows.tracking.outbox import FLUSH_S, Outbox
 from flows.tracking.provenance import source_tags
 from flows.tracking.store import EXPERIMENT, JOB, KIND, Store, now_ms
 from flows.tracking.view import TRAINING
+from flows.tracking.whole_run import NestedRun
 
 PARAMETER_LIMIT = 6000  # MLflow cuts longer ones off
 CUT = "… sha256 "
@@ -176,22 +177,20 @@ class Tracker:
         self._tracked.add(label)
         end = now_ms()
         noted = {KIND: kind, **(tags or {})} | ({FAILED: failed[:5000]} if failed else {})
-        self._outbox.put(
-            {
-                "kind": "run",
-                "experiment_id": self.experiment_id,
-                "parent": self.run_id,
-                "label": label,
-                "name": _short(name),
-                "tags": noted,
-                "params": _texts(params),
-                "metrics": _finite(metrics),
-                "files": {name: json.dumps(content) for name, content in (files or {}).items()},
-                "status": "FAILED" if failed else "FINISHED",
-                "start_ms": end - int(1000 * seconds),
-                "end_ms": end,
-            }
+        run = NestedRun(
+            experiment_id=self.experiment_id,
+            parent=self.run_id,
+            label=label,
+            name=_short(name),
+            tags=noted,
+            params=_texts(params),
+            metrics=_finite(metrics),
+            files={name: json.dumps(content) for name, content in (files or {}).items()},
+            status="FAILED" if failed else "FINISHED",
+            start_ms=end - int(1000 * seconds),
+            end_ms=end,
         )
+        self._outbox.put({"kind": "run", **vars(run)})
 
     def mark(self, label: str, tags: Mapping[str, str]) -> None:
         """Tags of a nested run that is tracked already."""

@@ -9,6 +9,7 @@ what the client would have written and read, which `tests/flows/tracking/test_wh
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, fields
 from typing import Any
 from uuid import uuid4
 
@@ -19,8 +20,33 @@ USER = "unknown"
 """What the client writes where no tag names a user."""
 
 
-def insert_run(tracking: Any, item: Item, artifact_uri: str, tags: Mapping[str, str]) -> None:
-    """Write the run of an item with its parameters, metrics and tags, or nothing of it.
+@dataclass(frozen=True)
+class NestedRun:
+    """A finished run below another, as an item holds it beside its kind.
+
+    label : by which it is told from its siblings.  files : name -> text.  start_ms, end_ms : ms since the epoch.
+    """
+
+    experiment_id: str
+    parent: str
+    label: str
+    name: str
+    tags: Mapping[str, str]
+    params: Mapping[str, str]
+    metrics: Mapping[str, float]
+    files: Mapping[str, str]
+    status: str
+    start_ms: int
+    end_ms: int
+
+    @classmethod
+    def of(cls, item: Item) -> NestedRun:
+        """That of an item.  Raises OfAnotherVersion where the item lacks a part of it."""
+        return cls(**{part.name: item[part.name] for part in fields(cls)})
+
+
+def insert_run(tracking: Any, run: NestedRun, artifact_uri: str, tags: Mapping[str, str]) -> None:
+    """Write a nested run with its parameters, metrics and tags, or nothing of it.
 
     tracking : MLflow's SQLAlchemy store.  artifact_uri : where the run's files are; its id is the folder above.
     """
@@ -28,13 +54,13 @@ def insert_run(tracking: Any, item: Item, artifact_uri: str, tags: Mapping[str, 
 
     run_id = artifact_uri.split("/")[-2]
     metrics = [
-        {"run_uuid": run_id, "key": k, "value": v, "timestamp": item["end_ms"], "step": 0, "is_nan": False}
-        for k, v in item["metrics"].items()
+        {"run_uuid": run_id, "key": k, "value": v, "timestamp": run.end_ms, "step": 0, "is_nan": False}
+        for k, v in run.metrics.items()
     ]
     rows: dict[Any, list[dict[str, Any]]] = {
-        SqlRun: [_run(item, run_id, artifact_uri)],
-        SqlTag: _pairs(run_id, {**tags, RUN_NAME: item["name"]}),
-        SqlParam: _pairs(run_id, item["params"]),
+        SqlRun: [_run(run, run_id, artifact_uri)],
+        SqlTag: _pairs(run_id, {**tags, RUN_NAME: run.name}),
+        SqlParam: _pairs(run_id, run.params),
         SqlMetric: metrics,
         SqlLatestMetric: metrics,
     }
@@ -49,20 +75,20 @@ def new_artifact_uri(experiment_uri: str) -> str:
     return f"{experiment_uri.rstrip('/')}/{uuid4().hex}/artifacts"
 
 
-def _run(item: Item, run_id: str, artifact_uri: str) -> dict[str, Any]:
+def _run(run: NestedRun, run_id: str, artifact_uri: str) -> dict[str, Any]:
     return {
         "run_uuid": run_id,
-        "name": item["name"],
+        "name": run.name,
         "artifact_uri": artifact_uri,
-        "experiment_id": int(item["experiment_id"]),
+        "experiment_id": int(run.experiment_id),
         "source_type": "UNKNOWN",
         "source_name": "",
         "entry_point_name": "",
         "source_version": "",
         "user_id": USER,
-        "status": item["status"],
-        "start_time": item["start_ms"],
-        "end_time": item["end_ms"],
+        "status": run.status,
+        "start_time": run.start_ms,
+        "end_time": run.end_ms,
         "lifecycle_stage": "active",
     }
 

@@ -11,9 +11,18 @@ from aesi.data.readers.frame import FrameTable, table_of_columns
 from aesi.errors import DataError, first_line
 from aesi.numerics.typing import AnyArray
 
+BEGINNING = b"BIO-LOGIC MODULAR FILE"
+"""First bytes of every `.mpr` file."""
+
 
 def open_mpr(path: Path) -> FrameTable:
-    """The records of an `.mpr` file.  Raises DataError where galvani is not there or cannot read it."""
+    """The records of an `.mpr` file.  Raises DataError where it is none, or galvani is not there or cannot read it."""
+    with path.open("rb") as stream:
+        if stream.read(len(BEGINNING)) != BEGINNING:
+            raise DataError(
+                f"{path.name} does not begin as BioLogic's .mpr files do; copy it again from the cycler's computer, or "
+                "give it the ending of the kind of file that it is (.mpt for EC-Lab's text)."
+            )
     try:
         from galvani import BioLogic  # type: ignore[import-untyped]
     except ImportError:
@@ -26,7 +35,7 @@ def open_mpr(path: Path) -> FrameTable:
     except Exception as error:
         # It raises many kinds: of numpy, struct and its own.
         raise DataError(
-            f"{path.name} cannot be read by galvani: {first_line(error)}; export it as text (.mpt)."
+            f"{path.name} cannot be read by galvani: {first_line(error)}; copy it again, or export it as text (.mpt)."
         ) from None
     columns = {name: data[name] for name in data.dtype.names}
     notes = ["Read by galvani."]

@@ -408,9 +408,44 @@ def test_a_history_is_read_as_it_was_written(tmp_path):
     assert read_history(path) == []
     write_history(path, [entry(), entry("2026-02-01", ratio=150.0)])
     assert read_history(path) == [entry(), entry("2026-02-01", ratio=150.0)]
-    path.write_text("{}")
-    with pytest.raises(InputError, match="no history of benchmarks"):
-        read_history(path)
+
+
+ENTRY = {"date": "2026-01-01", "commit": "abc", "machine": "a machine", "load": None, "lines": [SPEED]}
+
+
+@pytest.mark.parametrize(
+    ("content", "why"),
+    [
+        ("", "it is not one JSON object"),
+        ("date,ratio\n", "it is not one JSON object"),
+        ("\xff", "it is not one JSON object"),
+        ('{"bench": "espm"}\n{"bench": "dfn"}\n', "it is not one JSON object"),
+        ('{"bench": "espm"}', "it has no list of 'entries'"),
+        ('{"entries": {}}', "it has no list of 'entries'"),
+        ("[1.0, 2.0]", "it has no list of 'entries'"),
+        (json.dumps({"entries": [ENTRY, 1]}), "its entry 2 is none of a run of benchmarks"),
+        (json.dumps({"entries": [{"date": "x"}]}), "its entry 1 is none of a run of benchmarks"),
+        (json.dumps({"entries": [ENTRY | {"lines": [1]}]}), "its entry 1 is none of a run of benchmarks"),
+        (json.dumps({"entries": [ENTRY | {"lines": [{}]}]}), "its entry 1 is none of a run of benchmarks"),
+        (json.dumps({"entries": [ENTRY | {"more": 1}]}), "its entry 1 is none of a run of benchmarks"),
+    ],
+)
+def test_another_file_than_a_history_was_told_in_the_words_of_libraries(
+    call, monkeypatch, tmp_path, content, why
+):
+    monkeypatch.setattr("flows.benchmarks.run", lambda name, **_: pytest.fail("it was started"))
+    path = tmp_path / "other.json"
+    path.write_text(content, encoding="latin-1")
+    code, _, err = call("bench", "espm", "--compare", path)
+    assert code == 2
+    assert err == (
+        f"aesi: {path} is no history of benchmarks ({why}); give a file as docs/hooks/record.py writes it, such as "
+        "docs/benchmarks.json: what `aesi bench --json` prints is not yet one.\n"
+    )
+    assert (
+        call("bench", "espm", "--compare", tmp_path)[2]
+        == f"aesi: {tmp_path} cannot be read: Is a directory.\n"
+    )
 
 
 @pytest.mark.parametrize(

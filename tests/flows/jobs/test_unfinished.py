@@ -14,6 +14,7 @@ from aesi.pipeline.experiment.sections import TrackingConfig
 from flows.base.console import Console
 from flows.jobs.run_request import RunRequest
 from flows.jobs.run_session import _close_killed, _unfinished, resume_key, tracked_job, working_on
+from flows.tracking.beginnings import close_unrecorded, noted_beginning
 from flows.tracking.leftovers import deliver_leftovers
 from flows.tracking.run_records import RunLock, RunRecord, RunTaken, records
 from flows.tracking.store import Store, StoreAway
@@ -343,6 +344,28 @@ def test_the_note_of_a_run_is_kept_until_the_store_that_may_hold_it_was_asked(st
         assert note.exists()
     with tracked_job(JOB, "title", Console()):
         assert not note.exists()
+
+
+@pytest.mark.parametrize(
+    "content", ['{"uri": "sqlite:///a.db"}', '{"store": 1, "experiment": "job"}', "[1]", "", "\xff"]
+)
+def test_a_note_of_another_version_ended_each_job_with_a_key_error(store, workspace, said, content):
+    folder = workspace / ".aesi" / "begun"
+    folder.mkdir(parents=True, exist_ok=True)
+    note = folder / "of_another_version.json"
+    note.write_text(content, encoding="latin-1")
+    with noted_beginning(store, "job") as tags:
+        run_id = store.create_run(store.experiment("job"), "killed", tags)
+        kept = (folder / f"{next(iter(tags.values()))}.json").read_bytes()
+    (folder / f"{next(iter(tags.values()))}.json").write_bytes(kept)
+    close_unrecorded(store, said.append)
+    assert store.run(run_id).info.status == "KILLED"  # the others are dealt with
+    assert [path.name for path in folder.glob("*.json")] == [note.name]
+    (told,) = [line for line in said if str(note) in line]
+    assert told == (
+        f"{note} is no note of this version on a run that begins, so that a run that it may name stays RUNNING in its "
+        "store: run a job with the version that wrote it, or delete the file."
+    )
 
 
 def test_a_process_that_died_as_it_closed_its_run_left_it_running_in_the_store(store, monkeypatch):

@@ -14,7 +14,7 @@ from flows.results.compare import PROGRAM, _judged_on, compare
 from flows.tracking.experiment_log import CODE
 from flows.tracking.store import JOB, KIND, Store
 from flows.tracking.tracker import _texts
-from flows.tracking.whole_run import insert_run
+from flows.tracking.whole_run import NestedRun, insert_run
 
 
 def run_of(number, **settings):
@@ -286,19 +286,23 @@ def test_five_hundred_runs_make_one_page_of_a_size_that_opens(tracked, tmp_path)
     experiment = store.experiment("study")
     for number in range(500):
         run = run_of(number, **{f"search.p{k}": "0.1" for k in range(60)})
-        item = {
-            "experiment_id": experiment,
-            "name": run.name,
-            "params": run.settings,
-            "metrics": dict(run.metrics) | {f"tables/m{k}": 0.5 for k in range(60)},
-            "status": "FINISHED",
-            "start_ms": number,
-            "end_ms": number + 1,
-        }
+        whole = NestedRun(
+            experiment_id=experiment,
+            parent="",
+            label="",
+            name=run.name,
+            tags={},
+            params=run.settings,
+            metrics=dict(run.metrics) | {f"tables/m{k}": 0.5 for k in range(60)},
+            files={},
+            status="FINISHED",
+            start_ms=number,
+            end_ms=number + 1,
+        )
         folder = tracked / "mlartifacts" / "study" / run.run_id / "artifacts"
         folder.mkdir(parents=True)
         (folder / "comparison.json").write_text(json.dumps(run.comparison))
-        insert_run(store.database, item, folder.as_uri(), {KIND: "run"})
+        insert_run(store.database, whole, folder.as_uri(), {KIND: "run"})
     found = compare(["study"], tmp_path / "page.html")
     assert len(found) == 500
     assert (tmp_path / "page.html").stat().st_size < 20e6

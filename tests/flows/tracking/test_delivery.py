@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from flows.tracking.delivery import deliver
+from flows.tracking.outbox import Item, OfAnotherVersion
 from flows.tracking.store import KIND
 from flows.tracking.view import (
     DISCOVERY_COLUMNS,
@@ -62,6 +63,20 @@ def test_sent_again_it_is_one_run(store, item):
     assert coefficients(store, run) == CONTENT
     assert run.data.metrics == {"fitness": 0.5, "loss/oob": 1e-9}
     assert (run.info.start_time, run.info.end_time) == (1_000, 2_000)
+
+
+@pytest.mark.parametrize("local", [True, False])
+@pytest.mark.parametrize("lacking", ["metrics", "params", "files", "status", "end_ms"])
+def test_a_run_whose_item_lacks_a_part_was_made_in_the_store_and_stayed_running(
+    store, item, monkeypatch, tracked, local, lacking
+):
+    monkeypatch.setattr(store, "local", local)
+    of_another_version = Item(item("candidate:1"))
+    del of_another_version[lacking]
+    with pytest.raises(OfAnotherVersion, match=f"it lacks '{lacking}'"):
+        deliver(store, of_another_version, again=False)
+    assert children(store, item) == {}
+    assert not list(tracked.rglob("coefficients.json"))
 
 
 def test_a_failed_candidate_has_neither_metrics_nor_files(store, item):

@@ -630,7 +630,7 @@ def test_a_unit_in_a_cell_is_told_where_it_belongs(tmp_path):
 )
 def test_without_the_reader_it_says_what_to_install(tmp_path, monkeypatch, name, module, package):
     path = tmp_path / name
-    path.write_bytes(b"PK\x03\x04" + b"x" * 50)
+    path.write_bytes((b"BIO-LOGIC MODULAR FILE" if module == "galvani" else b"PK\x03\x04") + b"x" * 50)
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(DataError, match=f"pip install {package}"):
         read_measurement(path)
@@ -646,6 +646,23 @@ def test_a_damaged_file_is_one_sentence(tmp_path, name, module):
     with pytest.raises(DataError, match=name.replace(".", r"\.")) as caught:
         read_measurement(path)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("content", [bytes(range(256)), b"EC-Lab ASCII FILE\n", b"BIO"])
+@pytest.mark.parametrize("module", ["galvani", None])
+def test_a_wrong_beginning_of_a_biologic_file_was_told_in_the_words_of_galvani(
+    tmp_path, monkeypatch, content, module
+):
+    if module is None:
+        monkeypatch.setitem(sys.modules, "galvani", None)
+    path = tmp_path / "test.mpr"
+    path.write_bytes(content)
+    with pytest.raises(DataError) as caught:
+        read_measurement(path)
+    assert str(caught.value) == (
+        "test.mpr does not begin as BioLogic's .mpr files do; copy it again from the cycler's computer, or give it the "
+        "ending of the kind of file that it is (.mpt for EC-Lab's text)."
+    )
 
 
 @pytest.mark.parametrize("name", ["cell.nda", "cell.ndax"])
