@@ -128,9 +128,10 @@ def _discharged_sentence(cell: Cell, record: Measurement, soc0: float) -> str:
     charge_ah = emptied_ah(cell, record, taken_ah, 0, len(record))
     if charge_ah is None or not _tells_capacity(record, charge_ah):
         return ""
-    share = charge_ah / (soc0 * cell.capacity_ah)
-    if charge_ah < NEAR_THE_SIZE * cell.capacity_ah or share >= AGED:
+    held_ah = soc0 * cell.capacity_ah  # 0 at the start of a charge from empty
+    if charge_ah < NEAR_THE_SIZE * cell.capacity_ah or charge_ah >= AGED * held_ah:
         return ""
+    share = charge_ah / held_ah
     return (
         f"{record.name}: from a state of charge of {soc0:.3f} it is empty after {charge_ah:.3g} Ah, as a cell with "
         f"{share:.2f} of the {cell.capacity_ah:.3g} Ah in the cell's file; if it has aged, --soh {share:.2f} takes it "

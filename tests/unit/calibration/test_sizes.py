@@ -136,6 +136,18 @@ def test_a_discharge_that_shows_no_capacity_is_no_sign_of_age(m50, share, c_rate
     assert not aged_sentence(m50, record.take(slice(0, 200)), start)
 
 
+def test_a_charge_from_empty_and_a_discharge_said_to_begin_there_divided_by_zero(m50):
+    full_discharge = discharge(m50, "one", m50.capacity_ah, 0.05)
+    charge = replace(
+        full_discharge,
+        current_a=-full_discharge.current_a,
+        voltage_v=full_discharge.voltage_v[::-1].copy(),
+    )
+    empty = InitialState(0.0, 0.0, "given", "")
+    assert aged_sentence(m50, charge, empty) == ""
+    assert aged_sentence(m50, full_discharge, empty) == ""
+
+
 def test_a_record_was_refused_for_the_size_that_another_one_gave_the_file(m50):
     """The message said that the file of an 18650 has 13.1 Ah, as a pouch cell has whose record was beside its own."""
     large = discharge(m50, "large", 13.1, 0.05)
