@@ -64,6 +64,8 @@ of 1C off takes half an hour for it. Hours of C/50 and C/55 either way from 0.02
 1.5 and 1.1 deviations; as one rest, whatever they move, by 17 points and 120 deviations."""
 STEP_SD = 12.0**-0.5
 """Standard deviation of a value that is rounded to steps of one."""
+GIVE_IT = "; give --soc0 if it is known"
+"""Advice at the end of a sentence on an uncertain reading, for who gave no state of charge."""
 OTHER_STATE = 0.05
 OTHER_STATE_LOADED = 0.15
 """A given state of charge further than this from that of a record's voltage is contradicted by it, at rest and under
@@ -167,7 +169,8 @@ def _given_beside_reading(record: Measurement, soc0: float, read: InitialState) 
 
 def _read_instead(read: InitialState, soc0: float) -> InitialState:
     """The reading, with a sentence that says why what was given for several records is not believed for this one."""
-    words = f"{read.sentence[:-1]}; not the {soc0:.4g} that was given, which its voltage contradicts."
+    said = read.sentence[:-1].replace(GIVE_IT, "")
+    words = f"{said}; not the {soc0:.4g} that was given, which its voltage contradicts."
     return InitialState(read.soc, read.sd, read.basis, words, True, read.rest_voltage_v)
 
 
@@ -286,7 +289,7 @@ class _StartReading:
         words += f": state of charge {soc:.4f} +/- {sd:.4f}"
         if self.open_circuit.potentials_v < READING_V:  # else it is taken for what a simulation starts from
             words += " by potentials that are fitted with it"
-        return f"{words}{'; give --soc0 if it is known' if sd > OTHER_STATE else ''}."
+        return f"{words}{GIVE_IT if sd > OTHER_STATE else ''}."
 
     def _rise_v(self, ocv_v: float, moved: float) -> float:
         """How far the open-circuit voltage was above `ocv_v`, V, before the share `moved` of the charge had flowed."""
@@ -327,10 +330,7 @@ class _StartReading:
         own_soc, sd, began_there = self.load.state_of_charge(first_v)
         soc = self._in_declared_windows(own_soc)
         likelier = "as if the current began there" if began_there else "as if it had flowed before"
-        words = (
-            f"{self.record.name} {said}, {likelier}: "
-            f"state of charge {soc:.3f} +/- {sd:.3f}; give --soc0 if it is known."
-        )
+        words = f"{self.record.name} {said}, {likelier}: state of charge {soc:.3f} +/- {sd:.3f}{GIVE_IT}."
         return InitialState(soc, sd, "load", words)
 
     def _charge_ended_before(self, begun_v: float, drop_v: float) -> bool:

@@ -68,7 +68,7 @@ def simulated_record_sentences(
     A record without a voltage has no error.
     """
     said = [
-        f"{record.name}: state of charge {soc[0]:.{SOC_DIGITS}f} at the start, {soc[-1]:.{SOC_DIGITS}f} at the end."
+        f"{record.name}: state of charge {soc[0]:z.{SOC_DIGITS}f} at the start, {soc[-1]:z.{SOC_DIGITS}f} at the end."
     ]
     if np.all(np.isfinite(record.voltage_v)):
         error = MV_PER_V * (record.voltage_v - voltage_v)
@@ -124,7 +124,12 @@ def _beyond_limits_clause(soc: Array) -> str:
     simulated."""
     said = []
     if (low := -float(np.min(soc))) > GIVEN_SD:
-        said.append(f"asks for more charge than the cell has, by {100 * low:.1f} % of its capacity")
+        asks = (
+            "starts with less charge than an empty cell"
+            if soc[0] == np.min(soc)
+            else "asks for more charge than the cell has"
+        )
+        said.append(f"{asks}, by {100 * low:.1f} % of its capacity")
     if (high := float(np.max(soc)) - 1.0) > GIVEN_SD:
         asks = "starts with" if soc[0] == np.max(soc) else "brings"
         said.append(f"{asks} more charge than the cell can hold, by {100 * high:.1f} %")

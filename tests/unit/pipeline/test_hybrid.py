@@ -1043,11 +1043,22 @@ def test_by_how_much_a_record_emptied_or_overfilled_a_cell_was_not_told(model, d
         ),
         (np.linspace(0.5, 1.04, len(data)), "brings more charge than the cell can hold, by 4.0 %."),
         (np.linspace(1.02, 0.5, len(data)), "starts with more charge than the cell can hold, by 2.0 %."),
+        (
+            np.linspace(-0.01, 0.9, len(data)),
+            "starts with less charge than an empty cell, by 1.0 % of its capacity.",
+        ),
     ):
         assert any(
             note.endswith(f": the record {words}")
             for note in simulated_record_sentences(model.cell, data, voltage, soc)
         )
+
+
+def test_a_charge_from_empty_was_told_to_start_at_minus_zero(model, data):
+    first, *_ = simulated_record_sentences(
+        model.cell, data, np.full(len(data), 3.9), np.linspace(-1e-9, 0.9, len(data))
+    )
+    assert first.endswith(": state of charge 0.000 at the start, 0.900 at the end.")
 
 
 def test_the_voltages_of_no_cell_were_in_the_range_of_a_run_that_ran_out():
