@@ -40,7 +40,7 @@ from aesi.bench import some_chosen
 from aesi.bench.physics.archive import ARCHIVE, CHARGES, archive_day, for_development
 from aesi.bench.physics.cells_table import tested_mv
 from aesi.bench.physics.tested import soh_on_its_day
-from aesi.calibration.records.sizes import charged_share
+from aesi.calibration.records.sizes import charged_share, ends_full
 from aesi.constants import MV_PER_V
 from aesi.data.catalogue import HG2, LFP, M50T, NMC, PANASONIC, locate
 from aesi.data.read import read_measurement
@@ -242,7 +242,7 @@ def _figures(cells: Path, record: MeasuredRecord, porous: bool) -> dict[str, Any
         if soh is not None:
             out["soh"] = round(soh, 3)
             runs["aged"] = free_run(cell.with_soh(soh), data)
-        charged = charged_share(cell, data, initial_state(cell, data))
+        charged = charged_share(cell, data, initial_state(cell, data)) if ends_full(cell, data) else None
         if charged is not None:
             out["charged_soh"], out["charged_soh_sd"] = round(charged.share, 3), round(charged.sd, 3)
             runs["charged"] = free_run(cell.with_soh(charged.share), data)

@@ -71,22 +71,25 @@ def charged_share(cell: Cell, record: Measurement, start: InitialState) -> Charg
 
     start : of the record, in the windows of the file.
     """
-    rests_at = _rest_of_full_cell(cell, record)
-    if rests_at is None or start.basis == "load" or start.soc >= 1.0:
+    full = _full_at_end(cell, record)
+    if full is None or start.basis == "load" or start.soc >= 1.0:
         return None
-    charge_ah = -float(record.discharged_ah(record.hold_taken)[rests_at])
+    row, full_sd = full
+    charge_ah = -float(record.discharged_ah(record.hold_taken)[row])
+    if charge_ah <= 0.0:
+        return None  # it ends no fuller than it began
     share = charge_ah / (cell.capacity_ah * (1.0 - start.soc))
-    full_sd = initial_state(cell, record.take(slice(rests_at, None))).sd
     return ChargedShare(share, share * float(np.hypot(start.sd, full_sd)) / (1.0 - start.soc), charge_ah)
 
 
 def ends_full(cell: Cell, record: Measurement) -> bool:
     """Whether a record ends with a charge to full, of which `charged_share` tells the capacity."""
-    return _rest_of_full_cell(cell, record) is not None
+    return _full_at_end(cell, record) is not None
 
 
-def _rest_of_full_cell(cell: Cell, record: Measurement) -> int | None:
-    """Index of the first row of the rest that ends a record, where a charge to full came before; None elsewhere."""
+def _full_at_end(cell: Cell, record: Measurement) -> tuple[int, float] | None:
+    """(index of the first row of the rest that ends a record, standard deviation of the state of charge of 1 there),
+    where a charge to full came before; None elsewhere."""
     flows = np.flatnonzero(np.abs(record.current_a) > REST_C_RATE * cell.capacity_ah)
     if not len(flows) or flows[-1] + 1 == len(record) or record.current_a[flows[-1]] > 0.0:
         return None
@@ -95,7 +98,7 @@ def _rest_of_full_cell(cell: Cell, record: Measurement) -> int | None:
         end = initial_state(cell, record.take(slice(first, None)))
     except DataError:  # a voltage of no state of this cell
         return None
-    return first if end.basis == "full charge" else None
+    return (first, end.sd) if end.basis == "full charge" else None
 
 
 def aged_sentence(cell: Cell, record: Measurement, start: InitialState) -> str:
