@@ -65,7 +65,7 @@ of 1C off takes half an hour for it. Hours of C/50 and C/55 either way from 0.02
 STEP_SD = 12.0**-0.5
 """Standard deviation of a value that is rounded to steps of one."""
 GIVE_IT = "; give --soc0 if it is known"
-"""Advice at the end of a sentence on an uncertain reading, for who gave no state of charge."""
+"""Clause at the end of a sentence on an uncertain reading, where no state of charge was given."""
 OTHER_STATE = 0.05
 OTHER_STATE_LOADED = 0.15
 """A given state of charge further than this from that of a record's voltage is contradicted by it, at rest and under
@@ -124,7 +124,8 @@ def initial_state(
     seen = _record_as_cell_saw(record, active, hold)
     if unknown.any():
         seen = seen.take(slice(0, int(np.argmax(unknown))))
-    start = _StartReading(cell, seen, hold, active, model, potentials_v, float(record.current_a[0]))
+    advice = GIVE_IT if soc0 is None else ""
+    start = _StartReading(cell, seen, hold, active, model, potentials_v, float(record.current_a[0]), advice)
     if soc0 is None:
         return start.read()
     try:
@@ -169,8 +170,7 @@ def _given_beside_reading(record: Measurement, soc0: float, read: InitialState) 
 
 def _read_instead(read: InitialState, soc0: float) -> InitialState:
     """The reading, with a sentence that says why what was given for several records is not believed for this one."""
-    said = read.sentence[:-1].replace(GIVE_IT, "")
-    words = f"{said}; not the {soc0:.4g} that was given, which its voltage contradicts."
+    words = f"{read.sentence[:-1]}; not the {soc0:.4g} that was given, which its voltage contradicts."
     return InitialState(read.soc, read.sd, read.basis, words, True, read.rest_voltage_v)
 
 
@@ -185,7 +185,8 @@ def _given(record: Measurement, soc0: float, other: InitialState | None) -> Init
 class _StartReading:
     """Reads the state of charge at the first row of one record, with the model of one cell and its effects.
 
-    record : as the cell saw it.  written_a : the first current as the file has it, A.
+    record : as the cell saw it.  written_a : the first current as the file has it, A.  advice : clause at the end of a
+    sentence on an uncertain reading.
     """
 
     def __init__(
@@ -197,13 +198,14 @@ class _StartReading:
         model_name: ModelName,
         potentials_v: float,
         written_a: float,
+        advice: str,
     ) -> None:
         self.declared, self.record, self.effects = cell, record, effects
         self.model = model_with(cell, effects)
         self.cell = self.model.cell
         self.current_a, self.written_a = float(record.current_a[0]), written_a
         self.open_circuit = OpenCircuit.at_start(self.cell, record, potentials_v)
-        self.model_name, self.hold = model_name, hold
+        self.model_name, self.hold, self.advice = model_name, hold, advice
         self.load = LoadedStart(self.open_circuit, record, hold, model_name)
 
     def read(self) -> InitialState:
@@ -289,7 +291,7 @@ class _StartReading:
         words += f": state of charge {soc:.4f} +/- {sd:.4f}"
         if self.open_circuit.potentials_v < READING_V:  # else it is taken for what a simulation starts from
             words += " by potentials that are fitted with it"
-        return f"{words}{GIVE_IT if sd > OTHER_STATE else ''}."
+        return f"{words}{self.advice if sd > OTHER_STATE else ''}."
 
     def _rise_v(self, ocv_v: float, moved: float) -> float:
         """How far the open-circuit voltage was above `ocv_v`, V, before the share `moved` of the charge had flowed."""
@@ -330,7 +332,7 @@ class _StartReading:
         own_soc, sd, began_there = self.load.state_of_charge(first_v)
         soc = self._in_declared_windows(own_soc)
         likelier = "as if the current began there" if began_there else "as if it had flowed before"
-        words = f"{self.record.name} {said}, {likelier}: state of charge {soc:.3f} +/- {sd:.3f}{GIVE_IT}."
+        words = f"{self.record.name} {said}, {likelier}: state of charge {soc:.3f} +/- {sd:.3f}{self.advice}."
         return InitialState(soc, sd, "load", words)
 
     def _charge_ended_before(self, begun_v: float, drop_v: float) -> bool:

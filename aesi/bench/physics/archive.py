@@ -13,6 +13,7 @@ Beside the drives the archive of the Panasonic has the charges between them, of 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from datetime import datetime
 
 from aesi.data.catalogue import HG2, PANASONIC
 
@@ -101,45 +102,48 @@ ARCHIVE: Mapping[str, Mapping[str, str]] = {
 
 CHARGES: Mapping[str, Mapping[str, str]] = {
     PANASONIC: {
-        "25degC_03-12-17_11.58_charge_2": "2017-03-12",
-        "25degC_03-19-17_06.31_charge2": "2017-03-19",
-        "25degC_03-19-17_11.59_charge3": "2017-03-19",
-        "25degC_03-19-17_17.53_charge4": "2017-03-19",
-        "25degC_03-20-17_03.05_charge1": "2017-03-20",
-        "25degC_03-20-17_08.04_charge2": "2017-03-20",
-        "25degC_03-20-17_21.35_charge2": "2017-03-20",
-        "25degC_03-21-17_06.44_charge3": "2017-03-21",
-        "25degC_03-21-17_13.34_charge4": "2017-03-21",
-        "25degC_03-21-17_19.43_charge5": "2017-03-21",
-        "25degC_04-29-17_13.07_charge2a": "2017-04-29",
-        "10degC_03-28-17_09.49_charge2a": "2017-03-28",
-        "10degC_03-28-17_15.29_charge1": "2017-03-28",
-        "10degC_04-05-17_14.13_charge2": "2017-04-05",
-        "10degC_04-05-17_19.54_charge3": "2017-04-05",
-        "10degC_04-06-17_01.36_charge4": "2017-04-06",
-        "0degC_05-21-17_09.52_charge2a": "2017-05-21",
-        "0degC_05-30-17_07.44_charge2a": "2017-05-30",
-        "0degC_05-30-17_15.23_charge1": "2017-05-30",
-        "0degC_06-01-17_10.37_charge2": "2017-06-01",
-        "0degC_06-01-17_17.21_charge3": "2017-06-01",
-        "0degC_06-02-17_00.13_charge4": "2017-06-02",
-        "0degC_06-02-17_06.00_charge5": "2017-06-02",
-        "0degC_06-02-17_12.24_charge6": "2017-06-02",
-        "0degC_06-02-17_20.49_charge7": "2017-06-02",
-        "n10degC_06-08-17_10.21_charge1a": "2017-06-08",
-        "n10degC_06-10-17_05.35_charge2a": "2017-06-10",
-        "n10degC_06-10-17_13.07_charge1": "2017-06-10",
-        "n10degC_06-10-17_20.16_charge2": "2017-06-10",
-        "n10degC_06-11-17_03.15_charge3": "2017-06-11",
-        "n20degC_06-24-17_05.54_charge1": "2017-06-24",
-        "n20degC_06-24-17_13.23_charge2": "2017-06-24",
-        "n20degC_06-24-17_20.54_charge3": "2017-06-24",
-        "n20degC_06-25-17_04.26_charge4": "2017-06-25",
-        "n20degC_06-25-17_11.16_charge5": "2017-06-25",
+        name: datetime.strptime(name.split("_")[1], "%m-%d-%y").date().isoformat()
+        for name in (
+            "25degC_03-12-17_11.58_charge_2",
+            "25degC_03-19-17_06.31_charge2",
+            "25degC_03-19-17_11.59_charge3",
+            "25degC_03-19-17_17.53_charge4",
+            "25degC_03-20-17_03.05_charge1",
+            "25degC_03-20-17_08.04_charge2",
+            "25degC_03-20-17_21.35_charge2",
+            "25degC_03-21-17_06.44_charge3",
+            "25degC_03-21-17_13.34_charge4",
+            "25degC_03-21-17_19.43_charge5",
+            "25degC_04-29-17_13.07_charge2a",
+            "10degC_03-28-17_09.49_charge2a",
+            "10degC_03-28-17_15.29_charge1",
+            "10degC_04-05-17_14.13_charge2",
+            "10degC_04-05-17_19.54_charge3",
+            "10degC_04-06-17_01.36_charge4",
+            "0degC_05-21-17_09.52_charge2a",
+            "0degC_05-30-17_07.44_charge2a",
+            "0degC_05-30-17_15.23_charge1",
+            "0degC_06-01-17_10.37_charge2",
+            "0degC_06-01-17_17.21_charge3",
+            "0degC_06-02-17_00.13_charge4",
+            "0degC_06-02-17_06.00_charge5",
+            "0degC_06-02-17_12.24_charge6",
+            "0degC_06-02-17_20.49_charge7",
+            "n10degC_06-08-17_10.21_charge1a",
+            "n10degC_06-10-17_05.35_charge2a",
+            "n10degC_06-10-17_13.07_charge1",
+            "n10degC_06-10-17_20.16_charge2",
+            "n10degC_06-11-17_03.15_charge3",
+            "n20degC_06-24-17_05.54_charge1",
+            "n20degC_06-24-17_13.23_charge2",
+            "n20degC_06-24-17_20.54_charge3",
+            "n20degC_06-25-17_04.26_charge4",
+            "n20degC_06-25-17_11.16_charge5",
+        )
     },
 }
-"""Data set -> charge at 1C and then at 4.2 V -> day of the test, YYYY-MM-DD. Those that begin below 3.7 V and can
-be read whole. The chamber is that of the tests around it; it was warmed for the charge."""
+"""Data set -> charge at 1C and then at 4.2 V -> day of the test, YYYY-MM-DD, as the name has it. Those that begin below
+3.7 V and can be read whole. The chamber is that of the tests around it; it was warmed for the charge."""
 
 
 def archive_day(data: str, record: str) -> str | None:

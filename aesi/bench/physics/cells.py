@@ -142,9 +142,9 @@ def run(
 
     cells : folder of the cell files.  only : names of data sets or records; empty takes all.  archive : take the
     records of the published archives in place of those of the data sets.  charges : take the charges of the archives
-    in place of them.  development : of records of the archives, True takes those on
-    which rules may be chosen, False the others.  porous : add `porous_mv`, the error of the porous-electrode model with
-    the calibrated file at the measured temperature, which takes some seconds per record.
+    in place of them.  development : of records of the archives, True takes those on which rules may be chosen, False
+    the others.  porous : add `porous_mv`, the error of the porous-electrode model with the calibrated file at the
+    measured temperature, which takes some seconds per record.
     Raises InputError if a name in `only` is no data set and no record, for `archive` with `charges`, and for
     `development` without one of them.
     """

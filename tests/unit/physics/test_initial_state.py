@@ -374,9 +374,8 @@ def test_a_given_state_of_several_records_was_not_believed_where_the_charge_leav
     assert "rather says" in found.sentence
     short = initial_state(LG_M50, data.take(slice(0, 60)), 1.0, shared=True)
     assert short.basis == "load"
-    assert (
-        "--soc0" not in short.sentence
-    )  # the one that was given is for all records, and not believed for this one
+    # The one that was given is for all records, and not believed for this one.
+    assert "--soc0" not in short.sentence
 
 
 def test_a_given_state_that_the_first_seconds_under_load_speak_against_was_taken_without_a_word():
