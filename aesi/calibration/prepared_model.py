@@ -65,9 +65,8 @@ def prepared_model(
     smaller = other_sizes(cell, records)
     of_size = (records[i] for i in full_discharges if records[i].name not in smaller)
     potential_sentences = filter(None, (other_materials_sentence(start, record) for record in of_size))
-    cut_names = [
-        r.name for r, whole in zip(at_temperatures, records, strict=True) if r.time_s[0] > whole.time_s[0]
-    ]
+    cut = [whole for r, whole in zip(at_temperatures, records, strict=True) if r.time_s[0] > whole.time_s[0]]
+    cut_names = [whole.name for whole in cut]
     model_name = conditions.model or "espm"
     rows = [thinned(data, start.capacity_ah) for data in at_temperatures]
     spectra, spectrum_sentences = fitted_spectra(start, conditions.spectra)
@@ -104,7 +103,7 @@ def prepared_model(
         *zero.sentences,
         *(sentence for _, branch_sentences in branches for sentence in branch_sentences),
         *temperature_sentences,
-        *(f"{name}: {OF_ROWS_LEFT_OUT}" for name in cut_names if conditions.soc0 is not None),
+        *(f"{r.name}: {OF_ROWS_LEFT_OUT}" for r in cut if conditions.soc0 is not None or r.soc0 is not None),
         *_small_span_sentences(span, len(prepared_records)),
         *activation_sentences(declared, start, energies, [f.name for f in free if f.given]),
         *(r.start.sentence for r in prepared_records if not r.start.against_voltage),  # those are warnings

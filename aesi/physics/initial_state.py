@@ -97,9 +97,11 @@ def initial_state(
     The first of these that applies: given; full, where the cell rests at its upper cut-off voltage after a charge; the
     open-circuit voltage of a rest; the open-circuit voltage under load, after the voltage drop of the model.
 
-    record : its temperature is used where it was measured.  soc0 : state of charge given by the user, 0 to 1.
+    record : its temperature is used where it was measured.  soc0 : state of charge given by the user, 0 to 1; None
+    takes that of the record (`Measurement.soc0`), where it is known.
     shared : True where `soc0` was given for several records; one whose voltage contradicts it is then read instead,
-    unless the charge that the record moves allows `soc0` and not the state of charge that is read.
+    unless the charge that the record moves allows `soc0` and not the state of charge that is read. What is known of
+    this record alone goes before it.
     hold : how the current runs between rows.  effects : active effects of cell and instruments, as in `simulate`.
     model : for the simulation of a start under load.  potentials_v : standard deviation of the file's open-circuit
     voltage, V; a fit that moves the potentials takes `GOOD_READING_V`.
@@ -113,6 +115,8 @@ def initial_state(
     check_choice("hold", hold, Hold)
     check_choice("model", model, ModelName)
     soc0 = checked_soc(soc0)
+    if record.soc0 is not None and (soc0 is None or shared):
+        soc0, shared = record.soc0, False
     if not len(record):
         raise DataError(f"{record.name} has no row to start from.")
     active = instruments_first(checked_effects(effects))

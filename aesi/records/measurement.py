@@ -99,6 +99,7 @@ class Measurement:
     notes : what a reader dropped, mapped or resampled, one sentence each.
     hold : declared course of the current between rows, or None; `hold_taken` says how it is taken then.
     examined_digest : content hash of the rows that a reader examined; empty where none did.
+    soc0 : state of charge at the first row, 0 to 1, where it is known; None where the voltage has to tell.
     """
 
     time_s: Array
@@ -110,6 +111,7 @@ class Measurement:
     notes: tuple[str, ...] = ()
     hold: Hold | None = None
     examined_digest: str = ""
+    soc0: float | None = None
 
     if TYPE_CHECKING:  # what is given need not be arrays yet
 
@@ -124,11 +126,12 @@ class Measurement:
             notes: tuple[str, ...] = (),
             hold: Hold | None = None,
             examined_digest: str = "",
+            soc0: float | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
         """Raises DataError, naming column and row, for columns that are not numbers or differ in length, for a name
-        that is no text, and for an unknown hold."""
+        that is no text, for an unknown hold, and for a soc0 that is no state of charge."""
         if not isinstance(self.name, str):
             raise DataError(
                 f"the name of a measurement is {self.name!r}, which is no text; leave it out, or give one."
@@ -136,6 +139,10 @@ class Measurement:
         if self.hold is not None and self.hold not in get_args(Hold):
             words = " or ".join(map(repr, get_args(Hold)))
             raise DataError(f"{self.name}: hold = {self.hold!r} is not known; give {words}, or leave it out.")
+        if self.soc0 is not None and not 0.0 <= self.soc0 <= 1.0:
+            raise DataError(
+                f"{self.name}: soc0 = {self.soc0!r} is no state of charge; give one from 0 (empty) to 1 (full)."
+            )
         for label in ("time_s", "current_a", "voltage_v"):
             if getattr(self, label) is None:
                 raise DataError(
@@ -226,15 +233,23 @@ class Measurement:
         """The record with this hold as the declared one; None declares none."""
         return replace(self, hold=hold)
 
+    def begun_at(self, soc0: float | None) -> Measurement:
+        """The record with this state of charge at its first row, 0 to 1, as the known one; None knows none."""
+        return replace(self, soc0=soc0)
+
     def take(self, rows: slice | Array) -> Measurement:
-        """The given rows, as a measurement of the same name."""
+        """The given rows, as a measurement of the same name; of a known state of charge at the first row only where
+        that row is among them."""
         temperature = None if self.temperature_degc is None else self.temperature_degc[rows]
+        time = self.time_s[rows]
+        begins = bool(len(time)) and time[0] == self.time_s[0]
         return replace(
             self,
-            time_s=self.time_s[rows],
+            time_s=time,
             current_a=self.current_a[rows],
             voltage_v=self.voltage_v[rows],
             temperature_degc=temperature,
+            soc0=self.soc0 if begins else None,
         )
 
     def between(self, start_s: float, stop_s: float) -> Measurement:

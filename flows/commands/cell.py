@@ -252,6 +252,7 @@ def calibrate(
     temperatures = record_options.numbers_by_record("--temperature", temperature, data)
     days, as_of_day = record_options.dates_by_record(dates, data), options.day("--as-of", as_of)
     ends_s = record_options.numbers_by_record("--until", until, data)
+    for_all, own_soc0 = record_options.initial_states(soc0, data)
     compared, fitted = record_options.spectra(impedance), record_options.spectra(fit_impedance)
     priors, cut_offs_v, body_mm = options.priors(prior), options.cut_offs(cut_offs), options.body(body)
     record_options.say_reading(data)
@@ -260,7 +261,7 @@ def calibrate(
     from flows.jobs.calibration import calibrate as flow
 
     request = Request(
-        Conditions(soc0, temperatures, days, as_of_day, model, spectra=fitted, priors=priors),
+        Conditions(for_all, temperatures, days, as_of_day, model, spectra=fitted, priors=priors),
         impedance=compared,
         cut_offs_v=cut_offs_v,
         posterior=posterior,
@@ -271,7 +272,7 @@ def calibrate(
         mass_g=mass,
     )
     check_request(cell, request)
-    records = record_options.measurements(data, reading, hold, ends_s)
+    records = record_options.measurements(data, reading, hold, ends_s, own_soc0)
     flow(cell, records, out, request)
 
 
@@ -421,7 +422,9 @@ def discover(
         raise InputError(
             "--set changes a key of an experiment file, and none is given; use the options instead."
         )
-    record_options.say_reading([*data, *(test or []), *(good or [])])
+    named = [*data, *(test or []), *(good or [])]
+    for_all, own_soc0 = record_options.initial_states(soc0, named)
+    record_options.say_reading(named)
     from aesi.pipeline.discovery.cases import case_of_files
     from flows.jobs.start import discover as flow
 
@@ -432,7 +435,8 @@ def discover(
         good=good or [],
         reading=reading,
         hold=hold,
-        soc0=soc0,
+        soc0=for_all,
+        known_soc0=own_soc0,
         holdout=holdout,
         max_effects=max_effects,
         seed=seed,

@@ -83,10 +83,15 @@ Soc0 = Annotated[
     ),
 ]
 RecordSoc0 = Annotated[
-    float | None,
-    typer.Option("--soc0", callback=share("--soc0"), help=f"{SOC0_HELP}."),
+    list[str] | None,
+    typer.Option(
+        "--soc0",
+        metavar="<soc|FILE=soc>",
+        help=f"{SOC0_HELP}. One number is for all records whose voltage does not contradict it; FILE=NUMBER, such as "
+        "drive.csv=0.8, is for that record and may be repeated.",
+    ),
 ]
-"""`Soc0` of a command whose records all have a voltage."""
+"""`--soc0` of a command whose records may be several, and all have a voltage."""
 SohOption = Annotated[
     str | None,
     typer.Option(

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 import typer
 
 from aesi.errors import InputError
-from flows.commands.options import finite_number
+from flows.commands.options import finite_number, share
 
 if TYPE_CHECKING:
     from aesi.data.reading import Reading
@@ -143,23 +143,22 @@ def _pairs(option: str, pairs: list[str] | None) -> dict[str, str]:
 
 
 def measurements(
-    paths: list[Path], reading: Reading, hold: Hold | None = None, until: dict[str, float] | None = None
+    paths: list[Path], reading: Reading, hold: Hold | None, until: dict[str, float], soc0: dict[str, float]
 ) -> tuple[Measurement, ...]:
     """The measurements in the files, with all their rows.
 
     reading : how the files are read.  hold : current between rows, None leaves it undeclared.  until : name of a record
-    -> time up to which it is read, s.
+    -> time up to which it is read, s.  soc0 : name of a record -> state of charge at its first row.
     """
     from aesi.data.read import read
     from aesi.data.reading import record_names
 
     out = []
     for path, name in zip(paths, record_names(paths), strict=True):
-        end = (until or {}).get(name)
+        end = until.get(name)
         told = reading if end is None else reading.but(stop_s=end)
-        out.append(
-            read(path, told, None, name).held(hold)
-        )  # all rows are read, as in Python: a fit thins them itself
+        # All rows are read, as in Python: a fit thins them itself.
+        out.append(read(path, told, None, name).held(hold).begun_at(soc0.get(name)))
     return tuple(out)
 
 
@@ -178,6 +177,25 @@ def numbers_by_record(option: str, pairs: list[str] | None, paths: list[Path]) -
     Raises InputError for a pair that cannot be read, an unknown file, and a record that is given twice.
     """
     return _values_by_record(option, pairs, paths, finite_number, "NUMBER")
+
+
+def initial_states(given: list[str] | None, paths: list[Path]) -> tuple[float | None, dict[str, float]]:
+    """(state of charge for all records, record -> state of charge of its own), from `--soc0 NUMBER` and
+    `--soc0 FILE=NUMBER`; None where no number is for all.
+
+    Raises InputError for what is no state of charge, for two that are for all, and as `numbers_by_record`.
+    """
+    alone = [text for text in given or [] if "=" not in text]
+    if len(alone) > 1:
+        raise InputError(f"--soc0 is there twice for all records ({', '.join(alone)}); give it once.")
+    try:
+        for_all = finite_number(alone[0]) if alone else None
+    except ValueError:
+        raise InputError(f"--soc0 {alone[0]}: has to read NUMBER or FILE=NUMBER.") from None
+    own = numbers_by_record("--soc0", [text for text in given or [] if "=" in text], paths)
+    for value in (for_all, *own.values()):
+        share("--soc0")(value)
+    return for_all, own
 
 
 def dates_by_record(pairs: list[str] | None, paths: list[Path]) -> dict[str, date]:

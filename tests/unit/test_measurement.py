@@ -15,6 +15,21 @@ from aesi.records.checked import checked_dt
 BPX = Path(__file__).resolve().parents[2] / "experiments" / "cells" / "nmc_30ah.bpx.json"
 
 
+def test_a_known_state_of_charge_is_that_of_the_first_row():
+    record = Measurement([0.0, 1.0, 2.0], np.zeros(3), np.full(3, 3.7)).begun_at(0.5)
+    assert (record.soc0, record.take(slice(0, 2)).soc0, record.held("linear").soc0) == (0.5, 0.5, 0.5)
+    assert (
+        record.take(slice(1, None)).soc0
+        is record.between(0.5, 3.0).soc0
+        is record.begun_at(None).soc0
+        is None
+    )
+    assert record.take(np.array([], dtype=int)).soc0 is None
+    for wrong in (50, -0.1, np.nan):
+        with pytest.raises(DataError, match="is no state of charge; give one from 0"):
+            record.begun_at(wrong)
+
+
 def test_the_charge_of_a_pulse_between_far_rows_depends_on_how_the_current_runs():
     """6 A for the first 10 min or as a triangle over 20 min, then 3 A of charge for half an hour."""
     record = Measurement([0.0, 600.0, 1200.0, 1201.0, 3001.0], [0.0, 6.0, 0.0, -3.0, -3.0], np.full(5, 3.7))

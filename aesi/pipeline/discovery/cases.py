@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 from aesi.advice import with_keys
 from aesi.data.read import Reading, read
@@ -28,6 +29,7 @@ def case_of_files(
     reading: Reading | None = None,
     hold: Hold | None = None,
     soc0: float | None = None,
+    known_soc0: Mapping[str, float] = MappingProxyType({}),
     holdout: float | None = None,
     max_effects: int = 3,
     seed: int = 0,
@@ -41,12 +43,16 @@ def case_of_files(
 
     data, tests, good : files of the records that are looked at, that choose nothing, and that are known to be good.
     reading, hold : how the files are read, and how the current runs between their rows; None tells by the rows.
+    known_soc0 : name of a record -> state of charge at its first row.
     All else as `Case` has it.
     Raises DataError where a file cannot be of the cell, at any temperature that is looked for.
     """
     paths = (*data, *tests, *good)
     named = zip(paths, record_names(paths), strict=True)
-    records = [read(path, reading or Reading(), None, name).held(hold) for path, name in named]
+    records = [
+        read(path, reading or Reading(), None, name).held(hold).begun_at(known_soc0.get(name))
+        for path, name in named
+    ]
     case = Case(
         cell,
         measurements=tuple(records[: len(data)]),

@@ -141,6 +141,21 @@ class ExperimentConfig(Section):
         return self
 
     @model_validator(mode="after")
+    def _begins_named_records(self) -> ExperimentConfig:
+        wanted = self.discover.listed if self.discover is not None else ()
+        places = [("", self.data, self.cell)]
+        if self.fallback is not None:
+            places.append(("fallback.", self.fallback.data, self.fallback.cell))
+        for where, data, cell in places:
+            named = (*data.listed, *wanted)
+            if unknown := [name for name in cell.soc0_of if name not in named]:
+                raise ValueError(
+                    f"{where}cell.soc0_of is about {unknown[0]}, which is no record here; there are: "
+                    f"{', '.join(dict.fromkeys(named)) or 'none'}"
+                )
+        return self
+
+    @model_validator(mode="after")
     def _horizons_in_whole_steps(self) -> ExperimentConfig:
         for data in (self.data, *([] if self.fallback is None else [self.fallback.data])):
             for horizon_s in self.conformal.horizons_s or ():

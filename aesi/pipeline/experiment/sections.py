@@ -29,6 +29,7 @@ from aesi.physics.cell import Soh, checked_soh
 from aesi.records import Hold
 
 Share = Annotated[float, Field(gt=0, lt=1)]
+StateOfCharge = Annotated[float, Field(ge=0, le=1)]
 Positive = Annotated[float, Field(gt=0)]
 Weight = Annotated[float, Field(ge=0)]
 LARGEST_COUNT = 10**9
@@ -268,6 +269,7 @@ class CellConfig(Section):
     set. `cell: PATH` is short for `cell: {bpx: PATH}`.
     soc0 : state of charge at the first row, 0 to 1; with several records, of all whose voltage does not contradict it.
     None reads it from the voltage.
+    soc0_of : the same of single records of which it is known, as `{record: state of charge}`.
     soh : state of health, as a share of the file's capacity or as the day of the measurement; None takes the file's
     capacity.
     model : `espm` (single particle) or `dfn` (porous electrode); None takes that of a saved model, or the one that the
@@ -279,7 +281,8 @@ class CellConfig(Section):
     """
 
     bpx: str = "catalogue"
-    soc0: Annotated[float, Field(ge=0, le=1)] | None = None
+    soc0: StateOfCharge | None = None
+    soc0_of: dict[str, StateOfCharge] = {}
     soh: Annotated[Soh, AfterValidator(checked_soh)] | None = None
     model: ModelName | None = None
     effects: dict[str, dict[str, float]] = {}

@@ -50,7 +50,7 @@ def sources_of(config: ExperimentConfig, cell: Path) -> Sources:
     where = _locator(config)
     roles: dict[Role, tuple[str, ...]] = {role: getattr(data, role) for role in ROLES}
     records = {
-        name: _record(path, data.reading(name), record_name)
+        name: _record(path, data.reading(name), record_name).begun_at(config.cell.soc0_of.get(name))
         for name, (path, record_name) in _files_and_names(where, data.listed).items()
     }
     train, valid, test = ([records[name] for name in roles[role]] for role in ROLES)
@@ -133,7 +133,8 @@ def discovery_records(
         path, record_name = placed[name]
         reading = config.data.reading(name)
         ends_s = [end_s for end_s in (reading.stop_s, until_s) if end_s is not None]
-        return _record(path, reading.but(stop_s=min(ends_s, default=None)), record_name).held(hold)
+        whole = _record(path, reading.but(stop_s=min(ends_s, default=None)), record_name)
+        return whole.held(hold).begun_at(config.cell.soc0_of.get(name))
 
     return (
         tuple(record(name, wanted.fit_until_s.get(name)) for name in wanted.fit),

@@ -256,7 +256,8 @@ def prepare_test(
 
 
 def joined(first: Measurement, second: Measurement) -> Measurement:
-    """The rows of `first` and then those of `second`, under the name of `second` and with all else of it."""
+    """The rows of `first` and then those of `second`, under the name of `second` and with all else of it but where it
+    begins."""
     temperatures = [t for t in (first.temperature_degc, second.temperature_degc) if t is not None]
     return replace(
         second,
@@ -264,6 +265,7 @@ def joined(first: Measurement, second: Measurement) -> Measurement:
         current_a=np.concatenate([first.current_a, second.current_a]),
         voltage_v=np.concatenate([first.voltage_v, second.voltage_v]),
         temperature_degc=np.concatenate(temperatures) if temperatures else None,
+        soc0=first.soc0,
     )
 
 

@@ -24,6 +24,7 @@ from flows.commands.record_options import dates_by_record
 
 LG_M50 = str(Path(__file__).resolve().parents[3] / "experiments" / "cells" / "lg_m50_chen2020.bpx.json")
 SIMULATE = ("simulate", "--cell", LG_M50, "--current", "i.csv", "--out", "o.csv")
+DISCOVER = ("discover", "--cell", LG_M50, "--data", "a.csv", "--test", "t.csv", "--out", "found")
 CALIBRATE = ("calibrate", "--cell", LG_M50, "--data", "d.csv", "--out", "n.json")
 
 
@@ -120,6 +121,14 @@ def test_usage_errors_are_exit_code_2(call, arguments):
         ([*SIMULATE, "--soh", "95"], "--soh 95: a state of health of 95: it is the share"),
         ([*SIMULATE, "--soh", "new"], "--soh new: a state of health of 'new': give the share"),
         ([*SIMULATE, "--soc0", "0.9", "--soc0", "0.8"], "--soc0 is there twice; give it once"),
+        (
+            [*DISCOVER, "--soc0", "0.9", "--soc0", "0.8"],
+            "--soc0 is there twice for all records (0.9, 0.8); give",
+        ),
+        ([*DISCOVER, "--soc0", "a=0.9", "--soc0", "a.csv=0.8"], "--soc0 is there twice for a; give it once"),
+        ([*DISCOVER, "--soc0", "full"], "--soc0 full: has to read NUMBER or FILE=NUMBER."),
+        ([*DISCOVER, "--soc0", "b.csv=0.9"], "--soc0 b.csv=...: there is no such record; there are a, t."),
+        ([*DISCOVER, "--soc0", "t.csv=90"], "--soc0 90: a state of charge is a share of the capacity"),
         (["data", "convert", "a.csv", "--out", "b.csv", "--out", "c.csv"], "--out is there twice"),
         ([*SIMULATE, "--effect", "series_resistance:"], "'' has to read parameter=number"),
         (

@@ -362,6 +362,15 @@ def test_a_given_state_of_charge_is_believed_for_one_record_and_checked_for_seve
     assert initial_state(LG_M50, data, 0.41, shared=True).basis == "given"
 
 
+def test_what_is_known_of_one_record_goes_before_what_is_given_for_several():
+    data = resting(float(LG_M50.rest_voltage_v(0.4)[0])).begun_at(0.7)
+    for given_for_all in (None, 0.9, 0.41):
+        found = initial_state(LG_M50, data, given_for_all, shared=True)
+        assert (found.soc, found.basis) == (0.7, "given"), given_for_all
+    assert initial_state(LG_M50, data, 0.9).soc == 0.9
+    assert initial_state(LG_M50, data.take(slice(1, None))).soc == pytest.approx(0.4, abs=5e-3)
+
+
 def test_a_given_state_of_several_records_was_not_believed_where_the_charge_leaves_no_other():
     """A full discharge behind the drop of leads, which the first voltages take for a cell that is half empty."""
     time = np.arange(0.0, 3240.0, 10.0)

@@ -167,6 +167,11 @@ def test_a_count_that_no_array_holds_was_told_by_an_overflow_or_not_at_all(key):
             {"data": FILES | {"from_s": {"c.csv": 60}}},
             "data.from_s cuts c.csv, which is no record here; there are: a",
         ),
+        (
+            {"data": FILES, "cell": {"bpx": "b", "soc0_of": {"c.csv": 0.5}}},
+            "cell.soc0_of is about c.csv, which is no record here; there are: a",
+        ),
+        ({"data": FILES, "cell": {"bpx": "b", "soc0_of": {"a.csv": 50}}}, "less than or equal to 1"),
         ({"data": {"kind": "virtual", "to_s": {"a.csv": 60}}}, "`to_s` is about files"),
         (
             {"data": FILES | {"from_s": {"a.csv": 60}, "to_s": {"a.csv": 60}}},

@@ -52,6 +52,18 @@ def test_the_name_of_a_test_file_changed_what_is_fitted(tmp_path, whole, most):
     assert [len(test) for test in judged[-1].tests] == [301, 1500]  # each by its own length
 
 
+def test_a_state_of_charge_of_one_record_is_not_that_of_the_others(tmp_path, whole, most):
+    most(2000)
+    other = write_record(tmp_path, "other.csv", seed=1)
+    case = case_of_files(BPX, [whole], [other], soc0=0.9, known_soc0={"other": 0.6})
+    assert (case.soc0, case.measurements[0].soc0, case.tests[0].soc0) == (0.9, None, 0.6)
+    # The test part that goes on from a fitted record begins where that did.
+    first, second = part(whole, "first.csv", 0, 600), part(whole, "second.csv", 600, 1200)
+    led = case_of_files(BPX, [first], [second], known_soc0={"first": 0.6, "second": 0.2})
+    test = prepare_test(Cell.from_bpx(BPX), led.tests[0], led.measurements, None)
+    assert (test.start.basis, test.soc0, test.continues) == ("given", 0.6, 0)
+
+
 def test_what_short_records_do_not_need_is_for_the_long_ones(tmp_path, whole, most):
     assert most_rows_each([10, 100, 5], 60) == 45
     assert most_rows_each([10, 20], 30) == 20
