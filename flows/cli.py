@@ -101,8 +101,9 @@ TAKE_LISTS = ("discover", "calibrate", "simulate", "impedance", "predict")
 """Commands that take several values after one option: those that read none by its place, or, with an experiment file,
 none beside such an option."""
 LISTS = (
-    *("--data", "--test", "--good", "--impedance", "--fit-impedance", "--effect-file", "--effect", "--only"),
-    *("--without", "--temperature", "--date", "--until", "--prior", "--column", "--unit", "--state-word"),
+    *("--data", "--test", "--good", "--impedance", "--fit-impedance", "--effect-file", "--effect"),
+    *("--only", "--without", "--temperature", "--date", "--until", "--prior", "--soc0"),
+    *("--column", "--unit", "--state-word"),
 )
 """Their options that may be given again; `--set` stands beside an experiment file, which can follow it."""
 

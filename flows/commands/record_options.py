@@ -143,7 +143,11 @@ def _pairs(option: str, pairs: list[str] | None) -> dict[str, str]:
 
 
 def measurements(
-    paths: list[Path], reading: Reading, hold: Hold | None, until: dict[str, float], soc0: dict[str, float]
+    paths: list[Path],
+    reading: Reading,
+    hold: Hold | None = None,
+    until: dict[str, float] | None = None,
+    soc0: dict[str, float] | None = None,
 ) -> tuple[Measurement, ...]:
     """The measurements in the files, with all their rows.
 
@@ -155,10 +159,10 @@ def measurements(
 
     out = []
     for path, name in zip(paths, record_names(paths), strict=True):
-        end = until.get(name)
+        end = (until or {}).get(name)
         told = reading if end is None else reading.but(stop_s=end)
         # All rows are read, as in Python: a fit thins them itself.
-        out.append(read(path, told, None, name).held(hold).begun_at(soc0.get(name)))
+        out.append(read(path, told, None, name).held(hold).begun_at((soc0 or {}).get(name)))
     return tuple(out)
 
 
