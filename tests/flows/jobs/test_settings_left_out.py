@@ -42,6 +42,7 @@ FULL = {
     "cell": {
         "bpx": "",
         "soc0": None,
+        "soc0_of": {},
         "soh": 0.98,
         "effects": {},
         "effect_files": [],
