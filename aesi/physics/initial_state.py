@@ -66,6 +66,10 @@ STEP_SD = 12.0**-0.5
 """Standard deviation of a value that is rounded to steps of one."""
 GIVE_IT = "; give --soc0 if it is known"
 """Clause at the end of a sentence on an uncertain reading, where no state of charge was given."""
+FLOWED_BEFORE = (
+    "as if a current had flowed before (the model begins at rest: if so, its first minutes are off)"
+)
+"""How a sentence calls a record that looks as if a current had flowed before it."""
 OTHER_STATE = 0.05
 OTHER_STATE_LOADED = 0.15
 """A given state of charge further than this from that of a record's voltage is contradicted by it, at rest and under
@@ -143,7 +147,7 @@ def initial_state(
     given_admitted, read_admitted = (least <= soc <= most for soc in (soc0, read.soc))
     if shared and (read_admitted or not given_admitted):
         return _read_instead(read, soc0)
-    return replace(_given(record, soc0, read), doubt=abs(read.soc - soc0))
+    return replace(_given(record, soc0, read, read.flowed), doubt=abs(read.soc - soc0))
 
 
 def _record_as_cell_saw(record: Measurement, effects: tuple[ActiveEffect, ...], hold: Hold) -> Measurement:
@@ -167,23 +171,27 @@ def _given_beside_reading(record: Measurement, soc0: float, read: InitialState) 
     """The given state of charge, which the reading does not contradict; `doubted` where it is notably off."""
     doubt = abs(read.soc - soc0)
     if doubt > OTHER_STATE and read.off(soc0) > DOUBTED_SDS * read.sd:
-        words = _given(record, soc0, read).sentence
-        return InitialState(soc0, GIVEN_SD, "given", words, doubt=doubt, doubted=True)
-    return replace(_given(record, soc0, None), doubt=doubt)
+        told = _given(record, soc0, read, read.flowed)
+        return replace(told, contradicted=False, doubt=doubt, doubted=True)
+    return replace(_given(record, soc0, None, read.flowed), doubt=doubt)
 
 
 def _read_instead(read: InitialState, soc0: float) -> InitialState:
     """The reading, with a sentence that says why what was given for several records is not believed for this one."""
     words = f"{read.sentence[:-1]}; not the {soc0:.4g} that was given, which its voltage contradicts."
-    return InitialState(read.soc, read.sd, read.basis, words, True, read.rest_voltage_v)
+    return InitialState(read.soc, read.sd, read.basis, words, True, read.rest_voltage_v, flowed=read.flowed)
 
 
-def _given(record: Measurement, soc0: float, other: InitialState | None) -> InitialState:
-    """The given state of charge.  other : what the voltage says instead, where it contradicts it."""
+def _given(
+    record: Measurement, soc0: float, other: InitialState | None, flowed: bool = False
+) -> InitialState:
+    """The given state of charge.  other : what the voltage says instead, where it contradicts it.  flowed : True where
+    a current has probably flowed before the record."""
     words = f"{record.name} starts at a state of charge of {soc0:.4g}, as given"
     if other is not None:
         words += f"; its first voltage ({record.voltage_v[0]:.3f} V) rather says {other.soc:.3f} +/- {other.sd:.3f}"
-    return InitialState(soc0, GIVEN_SD, "given", words + ".", other is not None)
+    words += f"; it looks {FLOWED_BEFORE}" if flowed else ""
+    return InitialState(soc0, GIVEN_SD, "given", words + ".", other is not None, flowed=flowed)
 
 
 class _StartReading:
@@ -335,9 +343,9 @@ class _StartReading:
         """
         own_soc, sd, began_there = self.load.state_of_charge(first_v)
         soc = self._in_declared_windows(own_soc)
-        likelier = "as if the current began there" if began_there else "as if it had flowed before"
+        likelier = "as if no current had flowed before" if began_there else FLOWED_BEFORE
         words = f"{self.record.name} {said}, {likelier}: state of charge {soc:.3f} +/- {sd:.3f}{self.advice}."
-        return InitialState(soc, sd, "load", words)
+        return InitialState(soc, sd, "load", words, flowed=not began_there)
 
     def _charge_ended_before(self, begun_v: float, drop_v: float) -> bool:
         """Has a charge ended before this load, also where the model drops by two of its deviations too much?

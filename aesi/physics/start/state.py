@@ -18,6 +18,8 @@ class InitialState:
     deviations, or None; on a flat potential far beyond soc -+ 2 sd.
     doubt : difference between a given state of charge and the one read from the voltage.  contradicted : True where
     this difference is large.  doubted : True where it exceeds the uncertainty of the reading without being that large.
+    flowed : True where a current has probably flowed before the first row: the model, which begins at rest, then lacks
+    what it left for some minutes.
     by_voltage : of a full charge alone, the state of charge by its rest voltage and the open-circuit potentials.
     """
 
@@ -31,6 +33,7 @@ class InitialState:
     ends: tuple[float, float] | None = None
     by_voltage: float | None = None
     doubted: bool = False
+    flowed: bool = False
 
     @property
     def read_sd(self) -> float:

@@ -136,7 +136,7 @@ def _prepared(
     thin_noise = noise_of(thin.take(slice(0, n_fit)), cell.nominal_capacity_ah)
     white = _white_v(record, noise, thin_noise)
     equivalent = _equivalent_white_v(record, noise, thin_noise, white, n_fit, quantum_v(fitted.voltage_v))
-    as_given = start.basis == "given" and not (start.contradicted or start.doubted)
+    as_given = start.basis == "given" and not (start.contradicted or start.doubted or start.flowed)
     start_note = () if as_given else (start.sentence,)
     return PreparedRecord(
         data=data,

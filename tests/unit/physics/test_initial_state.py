@@ -405,6 +405,23 @@ def test_a_given_state_that_the_first_seconds_under_load_speak_against_was_taken
     assert initial_state(LG_M50, data, given_soc, shared=True).basis == "given"
 
 
+def test_a_start_under_load_was_told_as_if_the_model_knew_the_current_before_it():
+    data, soc = cut_from_a_drive(1000)
+    off_mv = 1e3 * (
+        data.voltage_v - simulate(LG_M50, data.time_s, data.current_a, soc, hold="backward").voltage_v
+    )
+    assert np.abs(off_mv[:60]).max() > 10.0 > np.abs(off_mv[-60:]).max()
+    for given_soc in (None, soc):
+        start = initial_state(LG_M50, data, given_soc)
+        assert start.flowed
+        assert "the model begins at rest: if so, its first minutes are off" in start.sentence
+    begun = data.time_s < 900.0
+    new_v = simulate(LG_M50, data.time_s, np.full(len(begun), 2.5), soc, hold="backward").voltage_v
+    new = initial_state(LG_M50, record(data.time_s, np.full(len(begun), 2.5), new_v).take(begun))
+    assert not new.flowed
+    assert "as if no current had flowed before" in new.sentence
+
+
 def test_a_given_state_on_a_flat_potential_is_not_contradicted_by_what_two_deviations_of_the_voltage_span():
     lfp = Cell.from_bpx(CELLS / "lfp_prada2013.bpx.json")
     data = resting(float(lfp.rest_voltage_v(0.9)[0]) + 2.0 * READING_V)  # where it is steep
