@@ -247,8 +247,8 @@ def saved_model_sentences(model: HybridModel, record: Measurement) -> tuple[str,
         )
     if record.name in dict(model.fitted_to):
         return (
-            f"{record.name}: the saved model was fitted to a record of this name with other rows; if both are of one "
-            "test, its error there is not that of a held-out record.",
+            f"{record.name}: the saved model was fitted to a record of this name with other rows or columns; if both "
+            "are of one test, its error there is not that of a held-out record.",
         )
     return ()
 

@@ -19,6 +19,7 @@ from small_experiment import (
 )
 
 from aesi.data import read_measurement
+from aesi.data.reading import Reading
 from aesi.errors import FitError
 from aesi.physics import Cell, initial_state
 from aesi.physics.effects import CATALOGUE
@@ -26,7 +27,7 @@ from aesi.physics.folded import folded
 from aesi.pipeline.experiment.judging.evaluate import evaluate_models
 from aesi.pipeline.experiment.outputs import Result, hybrid, notes, write_outputs
 from aesi.pipeline.product.hybrid import HybridModel
-from aesi.pipeline.simulation import predict_file, simulate_file
+from aesi.pipeline.simulation import ProfileRequest, predict_file, simulate_file
 from aesi.pipeline.written import MODEL
 from aesi.sparse import Genome
 
@@ -74,13 +75,20 @@ def test_the_records_that_a_model_was_trained_on_were_nowhere_in_its_folder(reco
     whole = (
         "the saved model was fitted to this very record, or to a part of it: its error there is not that of"
     )
-    named = "the saved model was fitted to a record of this name with other rows; if both are of one test"
+    named = (
+        "the saved model was fitted to a record of this name with other rows or columns; if both are of one"
+    )
     for file, words in ((copied, whole), (other, named), (unseen, "")):
         said = []
         predict_file(tmp_path / "model", file, tmp_path / "o.csv", say_notes=said.extend)
         told = [note for note in said if "the saved model was fitted to" in note]
         assert len(told) == bool(words)
         assert all(note.startswith(f"{file.stem}: {words}") for note in told)
+    said, stated = [], Reading({"temperature_degc": "25"})  # of the very rows, at another temperature
+    predict_file(
+        tmp_path / "model", record, tmp_path / "o.csv", ProfileRequest(reading=stated), say_notes=said.extend
+    )
+    assert any(note.startswith(f"drive: {named}") for note in said)
     table = pd.read_csv(record).drop(columns="voltage_v")  # without a voltage nothing is judged
     table.to_csv(tmp_path / "drive.csv", index=False)
     said = []
