@@ -197,8 +197,9 @@ def initial_states(given: list[str] | None, paths: list[Path]) -> tuple[float | 
     except ValueError:
         raise InputError(f"--soc0 {alone[0]}: has to read NUMBER or FILE=NUMBER.") from None
     own = numbers_by_record("--soc0", [text for text in given or [] if "=" in text], paths)
-    for value in (for_all, *own.values()):
-        share("--soc0")(value)
+    share("--soc0")(for_all)
+    for name, value in own.items():
+        share(f"--soc0 {name} =")(value)
     return for_all, own
 
 
