@@ -32,7 +32,8 @@ TOLD_SD = 0.01
 class Baseline:
     """What a prediction is compared with.
 
-    name : of it in a sentence.  voltage_v : (n,) V, its prediction.  how : words that say how to have its error.
+    name : of it in a sentence.  voltage_v : (n,) V, its prediction; NaN where it has none.
+    how : words that say how to have its error.
     """
 
     name: str
@@ -64,18 +65,19 @@ def simulated_record_sentences(
 ) -> list[str]:
     """Sentences on a simulated record: where it ended, its error, and how much lies outside what the file declares.
 
-    voltage_v, soc : (n,) simulated.  baseline : what its error has to be below, where there is anything.
-    A record without a voltage has no error.
+    voltage_v, soc : (n,) simulated.  baseline : what its error has to be below, where there is anything; rows that it
+    does not predict count in no error. A record without a voltage has no error.
     """
     said = [
         f"{record.name}: state of charge {soc[0]:z.{SOC_DIGITS}f} at the start, {soc[-1]:z.{SOC_DIGITS}f} at the end."
     ]
-    if np.all(np.isfinite(record.voltage_v)):
-        error = MV_PER_V * (record.voltage_v - voltage_v)
+    compared = np.isfinite(record.voltage_v if baseline is None else record.voltage_v + baseline.voltage_v)
+    if np.all(np.isfinite(record.voltage_v)) and np.any(compared):
+        error = MV_PER_V * (record.voltage_v - voltage_v)[compared]
         said.append(
             f"{record.name}: against the measured voltage {rms(error):.2f} mV RMSE, "
             f"{np.mean(error):+.2f} mV in the mean (measured minus model), at most {np.max(np.abs(error)):.1f} mV"
-            f"{_baseline_clause(record, rms(error), baseline)}."
+            f"{_baseline_clause(record.voltage_v, rms(error), baseline)}."
         )
     beyond = (soc < -GIVEN_SD) | (soc > 1.0 + GIVEN_SD)  # as closely as any is known
     unseen_v = 0.5 * 10.0**-VOLTAGE_DIGITS  # a full cell at rest is at its limit, give or take microvolts
@@ -110,11 +112,12 @@ def baseline_of(prediction: Prediction, model: HybridModel) -> Baseline | None:
     return Baseline("the physics alone", prediction.physics_v, "without the correction")
 
 
-def _baseline_clause(record: Measurement, model_mv: float, baseline: Baseline | None) -> str:
-    """Clause, from '; ' on, on the error of the baseline, and on that being the smaller one."""
+def _baseline_clause(measured_v: Array, model_mv: float, baseline: Baseline | None) -> str:
+    """Clause, from '; ' on, on the error of the baseline where it predicts, and on that being the smaller one."""
     if baseline is None:
         return ""
-    theirs, ours = f"{rms(MV_PER_V * (record.voltage_v - baseline.voltage_v)):.2f}", f"{model_mv:.2f}"
+    error = MV_PER_V * (measured_v - baseline.voltage_v)
+    theirs, ours = f"{rms(error[np.isfinite(error)]):.2f}", f"{model_mv:.2f}"
     better = f": {baseline.how} the error on this record is lower" if float(theirs) < float(ours) else ""
     return f"; {baseline.name} {theirs} mV RMSE{better}"
 

@@ -12,7 +12,7 @@ import re
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any, get_args, get_origin
 
 from pydantic import BaseModel, Field, ValidationError, field_validator, model_validator
 
@@ -290,6 +290,7 @@ def _override(content: dict[str, Any], override: str) -> None:
     parts = [part.strip() for part in key.split(".")]
     if not equals or not all(parts):
         raise ConfigError(f"{told}: has to read key=value, for instance search.candidates=50.")
+    parts = _with_whole_names(parts)
     try:
         value = parse_yaml(text)
     except ValueError as error:
@@ -339,6 +340,22 @@ def _keys_at(location: Sequence[str]) -> list[str]:
             return []
         section = inner[0]
     return [name for name in section.model_fields if name != "base"]
+
+
+def _with_whole_names(parts: Sequence[str]) -> list[str]:
+    """The parts of a key, with what follows a mapping of single values in one: the name of a record may hold dots."""
+    section: type[BaseModel] = ExperimentConfig
+    for depth, part in enumerate(parts, start=1):
+        if (field := section.model_fields.get(part)) is None:
+            break
+        inner = [t for t in (field.annotation, *get_args(field.annotation)) if _is_section(t)]
+        if not inner:
+            values = get_args(field.annotation)[1:] if get_origin(field.annotation) is dict else ()
+            if depth < len(parts) and values and get_origin(values[0]) is not dict:
+                return [*parts[:depth], ".".join(parts[depth:])]
+            break
+        section = inner[0]
+    return list(parts)
 
 
 def _is_section(annotation: object) -> bool:

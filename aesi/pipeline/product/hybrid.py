@@ -398,7 +398,7 @@ class HybridModel:
             low, high = (np.where(step == 0, np.nan, bound[at]) for bound in (band.lower_v, band.upper_v))
         alpha = None if self.intervals is None else self.intervals.alpha
         found = Prediction.of(own, error[step], low, high, outside[step], weight[step], alpha)
-        repeated = np.where(step == 0, 0.0, known.error_v[np.maximum(step - 1, 0)])
+        repeated = np.where(step == 0, np.nan, known.error_v[np.maximum(step - 1, 0)])
         return replace(found, persistence_v=own.model_v + repeated)
 
 

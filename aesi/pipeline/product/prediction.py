@@ -28,7 +28,7 @@ class Prediction:
     diverged_s : time, s, from which a correction that feeds back is held, since it left ten times its trained range;
     None where it did not.
     persistence_v : (n,) V, one step ahead: the physics plus the last error that was known, which a prediction has to
-    beat; at the first sample the physics alone. None in free run.
+    beat; NaN at the first sample, before which none was known. None in free run.
     """
 
     time_s: Array

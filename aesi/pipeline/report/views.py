@@ -22,7 +22,8 @@ KIND_ORDER = ("physics", "parameter", "instrument")
 class ModelVoltage:
     """One model's voltage over one record, (n,) V each; None where it was not computed.
 
-    free_run_* : no measured voltage after the first sample.  one_step_* : the step before is given.
+    free_run_* : no measured voltage after the first sample.  one_step_* : the step before is given; None also of a
+    record without two rows a step apart.
     outside : (n,) True where an input of the free run lies outside the range that this model was trained on.
     """
 

@@ -248,6 +248,25 @@ def test_an_override_reaches_into_a_section_that_is_given_in_short(tmp_path):
     assert (cell.bpx, cell.soc0, cell.start) == ("my_cell.bpx.json", 0.8, "declared")
 
 
+def test_the_name_of_a_record_was_taken_apart_at_its_dots(tmp_path):
+    path = tmp_path / "one.yaml"
+    path.write_text(
+        "name: one\ndata: {kind: files, train: [a.csv], test: [b.csv.gz], from_s: {a.csv: 1}}\ncell: c.json\n",
+        encoding="utf-8",
+    )
+    said = [
+        "cell.soc0_of.b.csv.gz=0.6",
+        "data.from_s.a.csv=60",
+        "data.columns.time_s=t.s",
+        "search.candidates=4",
+    ]
+    config = read_experiment(path, said)
+    assert config.cell.soc0_of == {"b.csv.gz": 0.6}
+    assert (config.data.from_s, config.data.columns) == ({"a.csv": 60}, {"time_s": "t.s"})
+    nested = read_experiment(path, ["cell.effects.series_resistance.resistance_ohm=0.002"])
+    assert nested.cell.effects == {"series_resistance": {"resistance_ohm": 0.002}}
+
+
 def test_of_two_overrides_of_one_key_the_last_counted_and_nobody_was_told(tmp_path):
     path = tmp_path / "x.yaml"
     path.write_text("name: x\ndata: {kind: files, train: [a.csv], test: [b.csv]}\n")

@@ -1007,9 +1007,27 @@ def test_one_step_ahead_was_told_without_persistence(model, record, tmp_path, co
     )
     frame, measured_v = pd.read_csv(tmp_path / "o.csv"), pd.read_csv(record)["voltage_v"]
     error_mv = 1e3 * (measured_v - frame["physics_v"])
-    repeated = np.sqrt(np.mean((error_mv - error_mv.shift(fill_value=0.0)) ** 2))
+    repeated = np.sqrt(np.mean(error_mv.diff()[1:] ** 2))
     [line] = [note for note in said if "against the measured voltage" in note]
     assert f"; persistence (the last measured error again) {repeated:.2f} mV RMSE" in line
+
+
+def test_the_first_row_counted_as_one_step_ahead_although_nothing_before_it_was_measured(
+    model, data, tmp_path
+):
+    begun = replace(data, voltage_v=data.voltage_v - np.where(np.arange(len(data)) == 0, 0.2, 0.0))
+    file, said = tmp_path / "begun.csv", list[str]()
+    pd.DataFrame({"time_s": begun.time_s, "current_a": begun.current_a, "voltage_v": begun.voltage_v}).to_csv(
+        file, index=False
+    )
+    asked = ProfileRequest(soc0=0.9)
+    predict_file(
+        model.save(tmp_path / "model"), file, tmp_path / "o.csv", asked, measured=True, say_notes=said.extend
+    )
+    frame = pd.read_csv(tmp_path / "o.csv")
+    ahead_mv = 1e3 * (begun.voltage_v - frame["voltage_v"])[1:]
+    [line] = [note for note in said if "against the measured voltage" in note]
+    assert f" {np.sqrt(np.mean(ahead_mv**2)):.2f} mV RMSE, {np.mean(ahead_mv):+.2f} mV in the mean" in line
 
 
 def test_a_voltage_of_no_cell_was_told_without_when_it_left_the_limits(model, data):

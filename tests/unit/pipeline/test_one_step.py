@@ -127,3 +127,13 @@ def test_rows_further_apart_than_steps_were_judged_one_step_ahead(noisy):
     for each in rows:
         assert np.isnan([each["one_step"]["test_rmse_mv"], each["intervals"]["coverage_pct"]]).all()
         assert np.isfinite(each["free_run"]["test_rmse_mv"])
+
+
+def test_rows_five_steps_apart_were_drawn_as_predicted_one_step_ahead(record):
+    loaded, _, models = fitted(record)
+    slow, dense = loaded.split.test
+    slow = replace(slow, own=slow.take(slice(None, None, 5)))
+    traces = evaluate_models(models[:1], replace(loaded.split, test=(slow, dense))).traces
+    drawn = {trace.name: trace.predictions["ESPM"].one_step_v is not None for trace in traces}
+    assert not drawn[slow.name]
+    assert drawn[dense.name]
