@@ -12,7 +12,7 @@ import re
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args, get_origin
+from typing import TYPE_CHECKING, Any, TypeGuard, get_args, get_origin
 
 from pydantic import BaseModel, Field, ValidationError, field_validator, model_validator
 
@@ -332,31 +332,38 @@ def _keys_at(location: Sequence[str]) -> list[str]:
     """The keys of the section at a location; empty if there is no section."""
     section: type[BaseModel] = ExperimentConfig
     for part in location:
-        field = section.model_fields.get(part)
-        inner = (
-            [t for t in (field.annotation, *get_args(field.annotation)) if _is_section(t)] if field else []
-        )
-        if not inner:
+        inner = _section_at(section, part)
+        if inner is None:
             return []
-        section = inner[0]
+        section = inner
     return [name for name in section.model_fields if name != "base"]
 
 
 def _with_whole_names(parts: Sequence[str]) -> list[str]:
     """The parts of a key, with what follows a mapping of single values in one: the name of a record may hold dots."""
     section: type[BaseModel] = ExperimentConfig
-    for depth, part in enumerate(parts, start=1):
-        if (field := section.model_fields.get(part)) is None:
-            break
-        inner = [t for t in (field.annotation, *get_args(field.annotation)) if _is_section(t)]
-        if not inner:
-            values = get_args(field.annotation)[1:] if get_origin(field.annotation) is dict else ()
-            if depth < len(parts) and values and get_origin(values[0]) is not dict:
-                return [*parts[:depth], ".".join(parts[depth:])]
-            break
-        section = inner[0]
+    for depth, part in enumerate(parts[:-1], start=1):
+        inner = _section_at(section, part)
+        if inner is None:
+            single = part in section.model_fields and _holds_single_values(
+                section.model_fields[part].annotation
+            )
+            return [*parts[:depth], ".".join(parts[depth:])] if single else list(parts)
+        section = inner
     return list(parts)
 
 
-def _is_section(annotation: object) -> bool:
+def _section_at(section: type[BaseModel], key: str) -> type[BaseModel] | None:
+    """The section at a key of a section; None where the key is unknown or holds a value."""
+    field = section.model_fields.get(key)
+    types = (field.annotation, *get_args(field.annotation)) if field else ()
+    return next((one for one in types if _is_section(one)), None)
+
+
+def _holds_single_values(annotation: object) -> bool:
+    """Whether it is a mapping whose values are no mappings."""
+    return get_origin(annotation) is dict and get_origin(get_args(annotation)[1]) is not dict
+
+
+def _is_section(annotation: object) -> TypeGuard[type[BaseModel]]:
     return isinstance(annotation, type) and issubclass(annotation, BaseModel)

@@ -72,15 +72,15 @@ def _voltages(record: RecordPredictions) -> ModelVoltage:
     # A time of the even grid shows the prediction of the next measured row.
     at = np.minimum(np.searchsorted(ahead.stamps, np.arange(len(model_v))), len(ahead.stamps) - 1)
     free_v, step_v = model_v + record.free.error_v, model_v + ahead.predicted_v[at]
-    bands, intervals = record.bands, record.intervals
     drawn = not ahead.unscored.all()  # else each row is more than a step after the one before
+    bands, intervals = record.bands, record.intervals if drawn else None
     return ModelVoltage(
         free_run_v=free_v,
         free_run_lower_v=None if bands is None else free_v + bands.lower_v,
         free_run_upper_v=None if bands is None else free_v + bands.upper_v,
         one_step_v=step_v if drawn else None,
-        one_step_lower_v=step_v + intervals.lower_v[at] if drawn and intervals is not None else None,
-        one_step_upper_v=step_v + intervals.upper_v[at] if drawn and intervals is not None else None,
+        one_step_lower_v=None if intervals is None else step_v + intervals.lower_v[at],
+        one_step_upper_v=None if intervals is None else step_v + intervals.upper_v[at],
         diverged_at=record.free.diverged_at,
         outside=record.free.outside,
     )
