@@ -183,6 +183,4 @@ def check_dates(names: Sequence[str], dates: Mapping[str, date]) -> None:
     """Raises DataError for a date of a record that is not among the names."""
     for name in dates:
         if name not in names:
-            raise DataError(
-                f"the date of {name}: there is no such record; there are {', '.join(sorted(names))}."
-            )
+            raise DataError(f"the date of {name}: there is no such record among {', '.join(sorted(names))}.")

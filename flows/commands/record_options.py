@@ -250,7 +250,7 @@ def _record_of(option: str, file: str, paths: list[Path]) -> str:
             raise InputError(
                 f"{option} {file}=...: {len(found)} --data files are called so; give the path of one."
             )
-    raise InputError(f"{option} {file}=...: there is no such record; there are {', '.join(names)}.")
+    raise InputError(f"{option} {file}=...: there is no such record among {', '.join(names)}.")
 
 
 def spectra(paths: list[Path] | None) -> tuple[Spectrum, ...]:

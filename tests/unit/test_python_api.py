@@ -480,7 +480,7 @@ def test_a_day_that_is_text_or_a_number_is_told(cell, record, days, sentence):
             r"priors\['contact.resistance'\] = 0.01 is no pair of numbers; give a dict of",
         ),
         ({"priors": {"contacts": (0.01, 0.001)}}, "the prior of contacts: there is no such parameter"),
-        ({"temperatures_degc": {"nope": 10}}, "the temperature of nope: there is no such record; there are"),
+        ({"temperatures_degc": {"nope": 10}}, "the temperature of nope: there is no such record among"),
         ({"dates": {"nope": date(2019, 5, 31)}}, "the date of nope: there is no such record"),
         ({"dates": ["2019-05-31"]}, r"dates = \['2019-05-31'\] names no record; give a dict"),
         ({"temperatures_degc": {"drive": "room"}}, "the temperature of drive holds 'room', which is not a n"),

@@ -154,7 +154,7 @@ def with_temperatures(
     for name in degc:
         if name not in known:
             raise DataError(
-                f"the temperature of {name}: there is no such record; there are {', '.join(sorted(known))}."
+                f"the temperature of {name}: there is no such record among {', '.join(sorted(known))}."
             )
     out, notes = [], []
     for record in records:

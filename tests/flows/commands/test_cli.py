@@ -127,7 +127,7 @@ def test_usage_errors_are_exit_code_2(call, arguments):
         ),
         ([*DISCOVER, "--soc0", "a=0.9", "--soc0", "a.csv=0.8"], "--soc0 is there twice for a; give it once"),
         ([*DISCOVER, "--soc0", "full"], "--soc0 full: has to read NUMBER or FILE=NUMBER."),
-        ([*DISCOVER, "--soc0", "b.csv=0.9"], "--soc0 b.csv=...: there is no such record; there are a, t."),
+        ([*DISCOVER, "--soc0", "b.csv=0.9"], "--soc0 b.csv=...: there is no such record among a, t."),
         ([*DISCOVER, "--soc0", "t.csv=90"], "--soc0 t = 90: a state of charge is a share of the capacity"),
         (["data", "convert", "a.csv", "--out", "b.csv", "--out", "c.csv"], "--out is there twice"),
         ([*SIMULATE, "--effect", "series_resistance:"], "'' has to read parameter=number"),

@@ -67,7 +67,7 @@ def test_a_file_is_meant_by_its_path_its_name_or_its_record_s(files, said):
         (["drive=10"], "2 --data files are called so; give the path of one"),
         (
             ["10degC drive=10", "20degC/drive.csv=20"],
-            "no such record; there are W8_0.5C, W8_0.2C, 10degC drive",
+            "no such record among W8_0.5C, W8_0.2C, 10degC drive",
         ),
         (["W8_0.5C=10", "W8_0.5C.csv=20"], "is there twice for W8_0.5C"),
         (["W8_0.5C"], "has to read FILE=NUMBER"),
