@@ -26,7 +26,7 @@ from typing import cast
 import numpy as np
 
 from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K, ZERO_CELSIUS_K
-from aesi.errors import DataError, InputError, SimulationError
+from aesi.errors import DataError, InputError
 from aesi.numerics.typing import Array, ComplexArray, Numbers
 from aesi.physics.arguments import check_cell, check_choice, check_temperature, checked_effects, checked_soc
 from aesi.physics.balance import same_rest
@@ -68,7 +68,7 @@ def impedance(
     model : "espm" (default) or "dfn".
     Returns (n,) ohm, complex; the imaginary part is negative where capacitive.
     Raises DataError for frequencies that are not positive and for a state of charge outside the electrodes' range;
-    InputError for a wrong type of cell, effect, state of charge or temperature; SimulationError for lithium plating.
+    InputError for a wrong type of cell, effect, state of charge or temperature, and for lithium plating.
     """
     frequency = _checked_frequency(frequency_hz)
     active = checked_effects(effects)
@@ -76,7 +76,7 @@ def impedance(
     at_rest = _at_rest(cell, soc, temperature_degc, active)
     changed, rest, kelvin = at_rest.model, at_rest.rest, at_rest.kelvin
     if changed.negative.plating is not None:
-        raise SimulationError("lithium plating has no linear answer at rest; leave the effect out.")
+        raise InputError("lithium plating has no linear answer at rest; leave the effect out.")
     omega: Array = 2.0 * np.pi * frequency
     if model == "dfn":
         from aesi.physics.dfn.linear import porous_impedance

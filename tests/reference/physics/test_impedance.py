@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aesi.errors import DataError, SimulationError
+from aesi.errors import DataError, InputError
 from aesi.physics import Cell, impedance, simulate
 from aesi.physics.cell.relations import LookupTable
 from aesi.physics.effects import CATALOGUE
@@ -129,5 +129,5 @@ def test_frequencies_that_are_none_are_refused(frequency):
 def test_a_state_beyond_the_electrodes_and_plating_are_refused():
     with pytest.raises(DataError, match="state of charge"):
         impedance(NMC, [1.0], 1.5)
-    with pytest.raises(SimulationError, match="plating"):
+    with pytest.raises(InputError, match="plating"):
         impedance(NMC, [1.0], SOC, 25.0, [CATALOGUE["lithium_plating"].activate()])
