@@ -24,6 +24,7 @@ KEYS = {
     "--state-word": "data.state_words",
     "--duplicates": "data.duplicates",
     "--soc0": "cell.soc0",
+    "--soc0 FILE=SOC": "cell.soc0_of",
     "--step": "a file of its own, by `aesi data convert --step`",
     "--to-s": "data.to_s",
     "--from-s": "data.from_s",
@@ -61,10 +62,14 @@ OF_CALL = {
 }
 """Option of other commands -> the argument of the same meaning, in the functions that have one."""
 
-OF_PLAN = {"--soc0": "soc0", "--soh": "soh"}
+OF_RECORD = {"--soc0 FILE=SOC": "begun_at"}
+"""Option for one of several records -> the method of `aesi.Measurement` with the same meaning."""
+
+OF_PLAN = {"--soc0": "soc0", "--soc0 FILE=SOC": "soc0", "--soh": "soh"}
 """Option of other commands -> the column of a batch's table with the same meaning."""
 
-OPTION = re.compile(r"(?<![\w-])--[a-z][a-z0-9-]*")
+OPTION = re.compile(r"(?<![\w-])--[a-z][a-z0-9-]*(?: FILE=SOC)?")
+"""An option; one that is given for one of several records with what it takes."""
 TELLS_APART = ("in Python", "on the command line")
 """What a sentence holds that speaks to both readers by itself."""
 
@@ -93,6 +98,7 @@ def with_arguments(sentence: str) -> str:
     options = dict.fromkeys(OPTION.findall(sentence))
     of_reading = [OF_READING[option] for option in options if option in OF_READING]
     names = [OF_CALL[option] for option in options if option in OF_CALL]
+    names += [f"{OF_RECORD[option]} of aesi.Measurement" for option in options if option in OF_RECORD]
     if of_reading:
         names.append(f"{listed(of_reading)} of aesi.read_measurement")
     return f"{sentence.removesuffix('.')} (in Python: {'; '.join(names)})." if names else sentence

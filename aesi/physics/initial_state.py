@@ -64,8 +64,10 @@ of 1C off takes half an hour for it. Hours of C/50 and C/55 either way from 0.02
 1.5 and 1.1 deviations; as one rest, whatever they move, by 17 points and 120 deviations."""
 STEP_SD = 12.0**-0.5
 """Standard deviation of a value that is rounded to steps of one."""
-GIVE_IT = "; give --soc0 if it is known"
+GIVE_IT = "; give --soc0{} if it is known"
 """Clause at the end of a sentence on an uncertain reading, where no state of charge was given."""
+OF_ONE = " FILE=SOC"
+"""How the option in it is given for one of several records."""
 FLOWED_BEFORE = (
     "as if a current had flowed before (the model begins at rest: if so, its first minutes are off)"
 )
@@ -103,9 +105,9 @@ def initial_state(
 
     record : its temperature is used where it was measured.  soc0 : state of charge given by the user, 0 to 1; None
     takes that of the record (`Measurement.soc0`), where it is known.
-    shared : True where `soc0` was given for several records; one whose voltage contradicts it is then read instead,
-    unless the charge that the record moves allows `soc0` and not the state of charge that is read. What is known of
-    this record alone goes before it.
+    shared : True where there are several records, and `soc0`, if it was given, is for all of them; one whose voltage
+    contradicts it is then read instead, unless the charge that the record moves allows `soc0` and not the state of
+    charge that is read. What is known of this record alone goes before it.
     hold : how the current runs between rows.  effects : active effects of cell and instruments, as in `simulate`.
     model : for the simulation of a start under load.  potentials_v : standard deviation of the file's open-circuit
     voltage, V; a fit that moves the potentials takes `GOOD_READING_V`.
@@ -132,7 +134,7 @@ def initial_state(
     seen = _record_as_cell_saw(record, active, hold)
     if unknown.any():
         seen = seen.take(slice(0, int(np.argmax(unknown))))
-    advice = GIVE_IT if soc0 is None else ""
+    advice = GIVE_IT.format(OF_ONE if shared else "") if soc0 is None else ""
     start = _StartReading(cell, seen, hold, active, model, potentials_v, float(record.current_a[0]), advice)
     if soc0 is None:
         return start.read()

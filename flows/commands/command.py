@@ -10,9 +10,15 @@ import typer
 from typer.core import TyperCommand
 
 from aesi.errors import InputError, nearest_name, wanted
+from flows.commands.options import A_STATE, ITS_DEVIATION
 
-MEANT = {"--model": "a saved model is given with --cell"}
-"""Option with a list of choices -> end of the sentence on a value that is not one of them."""
+MEANT = {
+    "--model": "a saved model is given with --cell",
+    "--soc0": "one record is given, and its state of charge is a number from 0 (empty) to 1 (full), without FILE=",
+    "--soc": A_STATE,
+    "--soc0-sd": ITS_DEVIATION,
+}
+"""Option -> end of the sentence on a value that is none of its choices, or no number."""
 OF_RECORDS = ("current", "data")
 """Options, without their dashes, by which one command or another takes a record."""
 
@@ -86,7 +92,7 @@ class App(typer.Typer):
 
 
 def _sentence(option: str, fault: dict[str, Any]) -> str:
+    meant = f"; {MEANT[option]}" if option in MEANT else ""
     if fault["type"] == "value_error":  # from a list of choices; its message contains the value
-        meant = f"; {MEANT[option]}" if option in MEANT else ""
         return f"{option}: {str(fault['ctx']['error']).rstrip('.')}{meant}."
-    return f"{option} {fault['input']}: it {wanted(fault)}."
+    return f"{option} {fault['input']}: it {wanted(fault)}{meant}."

@@ -16,6 +16,7 @@ from typing import Any, Literal
 from aesi.errors import InputError
 from aesi.logins import without_login
 from aesi.pipeline.report import tables
+from aesi.pipeline.report.compare import differing_keys
 from aesi.pipeline.written import FIGURES, REPORT, SUMMARY
 from flows.tracking.experiment_log import CODE, FALLBACK, SETTING, UNFITTED
 from flows.tracking.store import KIND, Store, beginning, is_of_experiment
@@ -230,14 +231,11 @@ def _ids(runs: Sequence[Any]) -> str:
 
 def _set_otherwise(shown: Mapping[str, str], others: Sequence[Mapping[str, str]]) -> str:
     """Keys of the settings in which any of the others differs from what is shown."""
-    keys = dict.fromkeys(key for params in (shown, *others) for key in params)
     return _some(
         [
             key
-            for key in keys
-            if key not in NO_SETTING
-            and not key.startswith(NO_SETTINGS)
-            and any(params.get(key) != shown.get(key) for params in others)
+            for key in differing_keys((shown, *others))
+            if key not in NO_SETTING and not key.startswith(NO_SETTINGS)
         ]
     )
 

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 import aesi
-from aesi.advice import OF_CALL, OF_READING, told, with_arguments, with_columns, with_keys
+from aesi.advice import OF_CALL, OF_READING, OF_RECORD, told, with_arguments, with_columns, with_keys
 from aesi.errors import AesiError, DataError
 from aesi.pipeline.discovery.discover import Case
 
@@ -36,6 +36,13 @@ def refused(function, *arguments, **keywords):
 def test_a_state_of_charge_that_a_run_may_be_given_was_called_by_a_command_s_option():
     sentence = "drive starts under 1 A at 3.9 V: state of charge 0.7 +/- 0.1; give --soc0 if it is known."
     assert with_keys(sentence).endswith("if it is known (in an experiment file: cell.soc0).")
+
+
+def test_a_state_of_charge_of_one_of_several_records_is_advised_as_such():
+    sentence = "drive starts under 1 A: state of charge 0.7 +/- 0.1; give --soc0 FILE=SOC if it is known."
+    assert with_keys(sentence).endswith("(in an experiment file: cell.soc0_of).")
+    assert with_arguments(sentence).endswith("(in Python: begun_at of aesi.Measurement).")
+    assert with_columns(sentence).endswith("(the column soc0 of the batch's table).")
 
 
 def test_a_word_of_a_state_was_advised_as_the_column_of_the_state():
@@ -128,6 +135,7 @@ def test_the_arguments_that_are_named_exist():
     functions = (aesi.discover, aesi.calibrate, aesi.simulate, aesi.HybridModel.predict)
     taken = {name for function in functions for name in inspect.signature(function).parameters}
     assert set(OF_CALL.values()) <= taken
+    assert all(hasattr(aesi.Measurement, name) for name in OF_RECORD.values())
 
 
 def test_options_that_are_named_are_those_of_the_commands():

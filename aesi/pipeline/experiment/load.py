@@ -368,7 +368,6 @@ def _on_grid(
     Raises DataError if a record cannot be of the cell.
     """
     cell, data = given.cell, config.data
-    shared = config.cell.soc0 is not None and len(sources.records) > 1
     judging = set(sources.roles["test"]) - {*sources.roles["train"], *sources.roles["valid"]}
     records: dict[str, FitRecord] = {}
     starts: dict[str, InitialState] = {}
@@ -379,7 +378,8 @@ def _on_grid(
         except DataError as error:
             raise DataError(with_keys(str(error))) from None
         given_soc0 = sources.soc0.get(name) if config.cell.soc0 is None else config.cell.soc0
-        state_source = StateSource(measurement, given_soc0, shared)
+        for_all = given_soc0 is None or config.cell.soc0 is not None
+        state_source = StateSource(measurement, given_soc0, for_all and len(sources.records) > 1)
         start = starts[name] = state_source.initial_state(cell, given.effects, data.hold, given.model)
         held = hold_sentence(measurement.name, data.hold, data.declared_hold is not None, "data.hold: {}")
         # Resampling comes first, since it refuses a time step that would make too many rows, or none.

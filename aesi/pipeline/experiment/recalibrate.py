@@ -94,7 +94,7 @@ class StateSource:
     """From what the initial state of a record is read, for any cell.
 
     measured : the record as logged.  given : the given state of charge at its first row, 0 to 1, or None.
-    shared : whether it was given for several records.
+    shared : whether it was, or would be, given for several records.
     """
 
     measured: Measurement

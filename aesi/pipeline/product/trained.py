@@ -81,7 +81,7 @@ def trained_sentence(
     if kept is None:
         return f"{head}; {where}inputs beyond it are held at its edge." if share else f"{head}."
     if kept >= ALL_PCT:
-        return f"{head}."
+        return f"{head}; {where}all of the correction is applied." if where else f"{head}."
     if kept >= NONE_PCT:
         share_kept = percent_words(kept)
         return f"{head}; {where}the correction fades towards the physics, to {share_kept} of its size on average."

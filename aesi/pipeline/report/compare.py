@@ -50,6 +50,8 @@ JOB_WORDS = {
     "benchmark": ("benchmark", "benchmarks"),
 }
 """Kind of a tracked run -> what one is called, and what several are, in the order of the page."""
+EMPTY = ("{}", "null")
+"""What is tracked of a setting that is a mapping, where it holds nothing."""
 MOST_COLUMNS = 40
 """Most runs that are shown side by side; more are summed up in one column."""
 
@@ -166,10 +168,26 @@ def _tables(runs: Sequence[ComparedRun]) -> list[PageTable]:
     return tables
 
 
+def setting_keys(settings: Sequence[Mapping[str, str]]) -> list[str]:
+    """Keys of the settings of runs, in the order of the first. A mapping that some of them leave empty and others fill
+    is there by its entries alone."""
+    keys = dict.fromkeys(key for each in settings for key in each)
+    filled = {key[:end] for key in keys for end, letter in enumerate(key) if letter == "."}
+    return [
+        key
+        for key in keys
+        if key not in filled or any(each.get(key, EMPTY[0]) not in EMPTY for each in settings)
+    ]
+
+
+def differing_keys(settings: Sequence[Mapping[str, str]]) -> list[str]:
+    """Those of `setting_keys` that do not hold the same in all runs."""
+    return [key for key in setting_keys(settings) if len({each.get(key) for each in settings}) > 1]
+
+
 def differing_settings(runs: Sequence[ComparedRun]) -> list[str]:
-    """Keys that do not hold the same in all runs, in the order of the first."""
-    keys = dict.fromkeys(key for run in runs for key in run.settings)
-    return [key for key in keys if len({run.settings.get(key) for run in runs}) > 1]
+    """`differing_keys` of the runs."""
+    return differing_keys([run.settings for run in runs])
 
 
 def _finding(runs: Sequence[ComparedRun]) -> str:
@@ -254,7 +272,7 @@ def _settings(runs: Sequence[ComparedRun]) -> PageTable | None:
     if len(runs) < 2:
         return None
     keys = differing_settings(runs)
-    shared = len({key for run in runs for key in run.settings}) - len(keys)
+    shared = len(setting_keys([run.settings for run in runs])) - len(keys)
     told = (
         f"Only the settings that differ; {shared} are the same in all."
         if keys

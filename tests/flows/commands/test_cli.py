@@ -122,6 +122,15 @@ def test_usage_errors_are_exit_code_2(call, arguments):
         ([*SIMULATE, "--soh", "new"], "--soh new: a state of health of 'new': give the share"),
         ([*SIMULATE, "--soc0", "0.9", "--soc0", "0.8"], "--soc0 is there twice; give it once"),
         (
+            [*SIMULATE, "--soc0", "i.csv=0.9"],
+            "--soc0 i.csv=0.9: it has to be a valid number; one record is given, and its state of charge is a number "
+            "from 0 (empty) to 1 (full), without FILE=.\n",
+        ),
+        (
+            ["impedance", "--cell", LG_M50, "--soc", "half", "--frequencies", "1:10:3", "--out", "z.csv"],
+            "--soc half: it has to be a valid number; a state of charge is a share of the capacity",
+        ),
+        (
             [*DISCOVER, "--soc0", "0.9", "--soc0", "0.8"],
             "--soc0 is there twice for all records (0.9, 0.8); give",
         ),

@@ -42,6 +42,25 @@ def run_of(number, **settings):
     )
 
 
+def test_a_mapping_that_one_run_leaves_empty_is_shown_by_its_entries_alone(tmp_path):
+    """`data.from_s` and `data.from_s.drive` were both shown, and both named by `aesi tables`."""
+    runs = [
+        run_of(1, **{"data.from_s": "{}", "data.repeats": "null", "data.columns": "{}"}),
+        run_of(
+            2,
+            **{
+                "data.from_s.drive": "600.0",
+                "data.repeats.period_s": "1800.0",
+                "data.columns": '{"a:b": "c"}',
+            },
+        ),
+    ]
+    differing = ["seed", "data.columns", "data.from_s.drive", "data.repeats.period_s"]
+    assert differing_settings(runs) == differing
+    page = write_comparison(tmp_path / "page.html", runs).read_text()
+    assert "Only the settings that differ; 1 are the same in all." in page  # data.dt_s
+
+
 def test_only_settings_that_differ_are_shown(tmp_path):
     runs = [run_of(1), run_of(2, extra="yes")]
     assert differing_settings(runs) == ["seed", "extra"]

@@ -548,6 +548,13 @@ def test_a_rest_on_a_flat_potential_asks_for_the_state_of_charge():
     assert "--soc0" not in steep.sentence
 
 
+def test_one_of_several_records_asks_for_its_own_state_of_charge():
+    """It asked for `--soc0`, which is for all of them."""
+    lfp = Cell.from_bpx(CELLS / "lfp_prada2013.bpx.json")
+    flat = initial_state(lfp, resting(float(lfp.rest_voltage_v(0.5)[0])), shared=True)
+    assert flat.sentence.endswith("; give --soc0 FILE=SOC if it is known.")
+
+
 def test_a_rest_is_read_as_it_is_where_it_does_not_move():
     data = resting(3.7, rows=60)
     moving = replace(data, voltage_v=3.7 - 0.02 * np.exp(-np.arange(60.0) / 20.0))
