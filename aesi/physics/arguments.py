@@ -76,6 +76,17 @@ def checked_soc(soc: Any, name: str = "soc0", *, farthest: float = FARTHEST_SOC)
     return float(given)
 
 
+def checked_volts(voltage_v: Any, name: str) -> float:
+    """A voltage, V, as a float.  Raises InputError for what is no single number.
+
+    name : of the argument, for the sentence.
+    """
+    given = np.asarray(voltage_v)
+    if given.ndim or given.dtype.kind not in "iuf" or np.isnan(given):
+        raise InputError(f"{name} = {voltage_v!r} is not a voltage; give one number, in V.")
+    return float(given)
+
+
 def check_temperature(temperature_degc: Any, name: str = "temperature_degc") -> None:
     """Raises InputError for a temperature in degC, or an array of them, that no cell can have (one in kelvin).
 

@@ -25,8 +25,7 @@ HIGHEST_PLAIN_VOLT = 1000.0
 
 
 def of_columns(function: Callable[P, R]) -> Callable[P, R]:
-    """The function, which raises InputError, with how to call it, where a record or a table stands for its columns and
-    arguments are missing or too many for that."""
+    """The function, which raises InputError, with how to call it, where a record or a table stands for its columns."""
     taken = signature(function)
     needed = [one.name for one in taken.parameters.values() if one.default is one.empty]
     first = int(needed[0] == "self")
@@ -37,20 +36,17 @@ def of_columns(function: Callable[P, R]) -> Callable[P, R]:
 
     @wraps(function)
     def told(*args: P.args, **named: P.kwargs) -> R:
-        try:
-            taken.bind(*args, **named)
-        except TypeError:
-            given = [
-                one
-                for one in (*args[first:], *named.values())
-                if hasattr(one, "columns") or hasattr(one, "time_s")
-            ]
-            if given:
-                raise InputError(
-                    f"{called} takes columns, not an object of type {type(given[0]).__name__}; give them, as in "
-                    f"{called}({words})."
-                ) from None
-        return function(*args, **named)  # Python has words of its own for what else cannot be bound
+        given = [
+            one
+            for one in (*args[first:], *named.values())
+            if hasattr(one, "columns") or hasattr(one, "time_s")
+        ]
+        if given:
+            raise InputError(
+                f"{called} takes columns, not an object of type {type(given[0]).__name__}; give them, as in "
+                f"{called}({words})."
+            )
+        return function(*args, **named)
 
     return told
 
@@ -69,7 +65,9 @@ def numbers(values: object, name: str) -> Array:
                 f"{name} is masked in {row_words(int(masked[0, 0]))}; drop or fill what is masked first."
             )
     try:
-        kind = np.asarray(values).dtype.kind
+        # The column's own type first: dates with a time zone, and truth values with gaps, become objects in numpy.
+        kind = getattr(getattr(values, "dtype", None), "kind", "O")
+        kind = np.asarray(values).dtype.kind if kind == "O" else kind
     except ValueError:  # numpy's word for rows within a row that differ in length
         raise DataError(f"{name} holds rows of several lengths; give one row of numbers.") from None
     if kind == "b" or _has_truth_value(values):
@@ -78,7 +76,8 @@ def numbers(values: object, name: str) -> Array:
         )
     if kind in "mM":
         raise DataError(
-            f"{name} holds dates or durations; give numbers, as (dates - dates[0]).total_seconds() does."
+            f"{name} holds dates or durations; give numbers, as (dates - dates.min()) / np.timedelta64(1, 's') does "
+            "in seconds."
         )
     if kind == "c":
         raise DataError(f"{name} holds complex numbers; give real ones.")

@@ -246,6 +246,17 @@ def test_a_discovery_takes_files(cell, record, tmp_path, monkeypatch):
             {"time_s": pd.date_range("2024", periods=len(TIME), freq="s")},
             "time_s holds dates or durations; give",
         ),
+        (
+            {"time_s": pd.date_range("2024", periods=len(TIME), freq="s", tz="Europe/Berlin")},
+            "time_s holds dates or durations; give",
+        ),
+        (
+            {"current_a": pd.Series([True, None] * (len(TIME) // 2), dtype="boolean")},
+            "current_a holds truth values; give numbers",
+        ),
+        ({"soc0": None, "rest_voltage_v": "3.9"}, "rest_voltage_v = '3.9' is not a voltage; give one"),
+        ({"soc0": None, "rest_voltage_v": [3.9]}, r"rest_voltage_v = \[3.9\] is not a voltage; give one"),
+        ({"rest_voltage_v": 3.9}, "soc0 and rest_voltage_v both say where the cell starts; give one of them"),
         ({"current_a": ["rest"] * len(TIME)}, "current_a holds 'rest', which is not a number"),
         ({"current_a": 1j * TIME}, "current_a holds complex numbers"),
         (
