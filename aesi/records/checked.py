@@ -11,7 +11,7 @@ from typing import ParamSpec, TypeGuard, TypeVar
 import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
-from aesi.errors import DataError, InputError
+from aesi.errors import DataError, InputError, in_words
 from aesi.numerics.typing import Array, ComplexArray
 from aesi.over_time import stamp
 
@@ -84,7 +84,7 @@ def numbers(values: object, name: str) -> Array:
     try:
         return np.asarray(values, dtype=float)
     except (TypeError, ValueError):
-        raise DataError(f"{name} holds {_first_other(values)!r}, which is not a number.") from None
+        raise DataError(f"{name} holds {in_words(_first_other(values))}, which is not a number.") from None
     except OverflowError:
         raise DataError(
             f"{name} holds a whole number of more than 308 digits, which no float holds; correct it."
@@ -151,7 +151,7 @@ def check_plain_volts(voltage_v: Array, place: Callable[[int], str]) -> None:
 def checked_dt(dt_s: object) -> float:
     """A time step, s.  Raises InputError for what is no positive number."""
     if not (is_finite_number(dt_s) and dt_s > 0.0):
-        raise InputError(f"dt_s = {dt_s!r} has to be a positive number of seconds.")
+        raise InputError(f"dt_s = {in_words(dt_s)} has to be a positive number of seconds.")
     return float(dt_s)
 
 
@@ -160,7 +160,7 @@ def check_whole_number(name: str, value: object, least: int, most: float = np.in
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not whole or not least <= value <= most:  # type: ignore[operator]
         upper = f" up to {most:.0f}" if np.isfinite(most) else ""
-        raise InputError(f"{name} = {value!r} is not a whole number from {least}{upper}.")
+        raise InputError(f"{name} = {in_words(value)} is not a whole number from {least}{upper}.")
 
 
 def is_finite_number(value: object) -> TypeGuard[float]:

@@ -239,6 +239,7 @@ def test_a_discovery_takes_files(cell, record, tmp_path, monkeypatch):
         ({"soc0": np.array([0.8])}, r"soc0 = array\(\[0.8\]\) is not a state of charge"),
         ({"soc0": "full", "on_depletion": "clip"}, "soc0 = 'full' is not a state of charge"),
         ({"soc0": [0.8], "on_depletion": "clip"}, r"soc0 = \[0.8\] is not a state of charge"),
+        ({"soc0": np.linspace(4.0, 3.0, 600)}, r"^soc0 = array\(\[[^\n]{,40}\) is not a state of charge"),
         ({"soc0": True, "on_depletion": "clip"}, "soc0 = True is not a state of charge"),
         ({"soc0": float("nan"), "on_depletion": "clip"}, "soc0 = nan is not a state of charge"),
         ({"soc0": float("inf"), "on_depletion": "clip"}, "soc0 = inf is not a state of charge"),

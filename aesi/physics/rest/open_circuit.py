@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from aesi.constants import COLDEST_DEGC, WARMEST_DEGC, ZERO_CELSIUS_K
-from aesi.errors import CellError, DataError, InputError
+from aesi.errors import CellError, DataError, InputError, in_words
 from aesi.numerics.typing import Array
 from aesi.physics.arguments import check_cell, checked_volts
 from aesi.physics.balance import aged_range
@@ -54,7 +54,8 @@ def initial_soc(cell: Cell, voltage_v: float, kelvin: float | None = None) -> fl
     ):
         coldest, warmest = COLDEST_DEGC + ZERO_CELSIUS_K, WARMEST_DEGC + ZERO_CELSIUS_K
         raise InputError(
-            f"kelvin = {kelvin!r} is not from {coldest:g} to {warmest:g} K, where cells work; 25 degC is 298.15 K."
+            f"kelvin = {in_words(kelvin)} is not from {coldest:g} to {warmest:g} K, where cells work; 25 degC is "
+            "298.15 K."
         )
     return OpenCircuit(cell, kelvin).soc_at_rest(rest_v, rest_v)
 
