@@ -135,6 +135,11 @@ def test_a_discovery_takes_records_and_gives_table_plot_and_model(cell, record, 
     assert (named.parameter, named.unit) == ("resistance_ohm", "ohm")
     assert named.low <= 1e-3 <= named.high
     assert {trace.name for trace in found.plot("test").data} >= {"measured", "after", "as declared"}
+    for wrong in (lambda: found.rmse_mv("declared"), lambda: found.rmse_mv(part="valid")):
+        with pytest.raises(InputError, match="'(declared|valid)' is not known; give '"):
+            wrong()
+    with pytest.raises(InputError, match="part = 'valid' is not known; give 'fit' or 'test'"):
+        found.plot("valid")  # a sentence on nothing held out before
     assert found.model.cell.contact_resistance_ohm == pytest.approx(1e-3, rel=0.01), "a cell file can hold it"
     assert found.model.hold is None, "nobody declared one: the rows of the next record tell it"
     folder = found.save(tmp_path / "found")
