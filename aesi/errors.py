@@ -7,6 +7,7 @@ sentence and an exit code. An expected failure inside a search is a value, `aesi
 from __future__ import annotations
 
 import re
+import reprlib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -103,6 +104,11 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     """End of a sentence about an unknown name: the nearest known one, or a full stop."""
     near = nearest_name(name, known)
     return f"; did you mean {near!r}?" if near is not None else "."
+
+
+def in_words(value: object) -> str:
+    """A wrong value as a sentence holds it: its repr on one line, without the middle where it is long."""
+    return " ".join(reprlib.repr(value).split())
 
 
 OF_A_LIST = ("list_type", "tuple_type", "sequence_str", "is_instance_of")

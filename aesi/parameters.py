@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from aesi.errors import ParameterError, did_you_mean
+from aesi.errors import ParameterError, did_you_mean, in_words
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ def _number(name: str, value: object) -> float:
             raise TypeError
         return float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
-        raise ParameterError(f"{name} = {value!r} is not a number.") from None
+        raise ParameterError(f"{name} = {in_words(value)} is not a number.") from None
     except OverflowError:
         raise ParameterError(
             f"{name} is a whole number of more than 308 digits, which no parameter has; correct it."

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from aesi.constants import MV_PER_V
 from aesi.numerics.typing import Array, BoolArray
 
 
@@ -22,6 +25,11 @@ class Intervals:
 
     def __len__(self) -> int:
         return len(self.lower_v)
+
+    def __repr__(self) -> str:
+        width_mv = MV_PER_V * float(np.mean(self.width_v)) if len(self) else np.nan
+        width = f"{width_mv:.3g} mV wide in the mean"
+        return f"Intervals({len(self):,} samples, {width}, {np.sum(~self.warm):,} not calibrated)"
 
     @property
     def width_v(self) -> Array:

@@ -8,7 +8,7 @@ from typing import Any, get_args
 import numpy as np
 
 from aesi.constants import COLDEST_DEGC, WARMEST_DEGC
-from aesi.errors import InputError
+from aesi.errors import InputError, in_words
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Effect
 from aesi.records import Measurement
@@ -56,7 +56,7 @@ def check_choice(name: str, value: object, choices: Any) -> None:
     words = get_args(choices)
     if value not in words:
         allowed = " or ".join(repr(word) for word in words)
-        raise InputError(f"{name} = {value!r} is not known; give {allowed}.")
+        raise InputError(f"{name} = {in_words(value)} is not known; give {allowed}.")
 
 
 def checked_soc(soc: Any, name: str = "soc0", *, farthest: float = FARTHEST_SOC) -> float | None:
@@ -70,9 +70,20 @@ def checked_soc(soc: Any, name: str = "soc0", *, farthest: float = FARTHEST_SOC)
     number = given.ndim == 0 and given.dtype.kind in "iuf"
     if not (number and -farthest <= given <= 1.0 + farthest):  # this way round, NaN fails too
         raise InputError(
-            f"{name} = {soc!r} is not a state of charge; give a share of the capacity between 0 (empty) and 1 (full), "
-            "as one number, so 90 % is 0.9."
+            f"{name} = {in_words(soc)} is not a state of charge; give a share of the capacity between 0 (empty) and 1 "
+            "(full), as one number, so 90 % is 0.9."
         )
+    return float(given)
+
+
+def checked_volts(voltage_v: Any, name: str) -> float:
+    """A voltage, V, as a float.  Raises InputError for what is no single number.
+
+    name : of the argument, for the sentence.
+    """
+    given = np.asarray(voltage_v)
+    if given.ndim or given.dtype.kind not in "iuf" or np.isnan(given):
+        raise InputError(f"{name} = {in_words(voltage_v)} is not a voltage; give one number, in V.")
     return float(given)
 
 

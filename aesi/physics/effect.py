@@ -23,7 +23,7 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 
 from aesi.constants import COLDEST_DEGC, WARMEST_DEGC, ZERO_CELSIUS_K
-from aesi.errors import AesiError, NoNumberError, OwnEffectError, ParameterError
+from aesi.errors import AesiError, InputError, NoNumberError, OwnEffectError, ParameterError
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.over_time import stamp
 from aesi.parameters import Parameter, checked
@@ -215,6 +215,15 @@ class Effect:
         return f"Effect({self.id!r}, {self.kind}, parameters {', '.join(self.parameters) or 'none'})"
 
     @property
+    def where(self) -> str:
+        """How a sentence calls it: by the path of its file, or by its id."""
+        return self.file or f"the effect {self.id!r}"
+
+    @property
+    def _functions(self) -> tuple[Callable[..., Any] | None, ...]:
+        return self.on_model, self.on_record, self.on_voltage, self.on_reading
+
+    @property
     def restates_declared(self) -> bool:
         """Whether it moves parameters that cell files declare, with a tolerance."""
         return any(p.spread is not None for p in self.parameters.values())
@@ -227,8 +236,12 @@ class Effect:
     def activate(self, **values: float) -> ActiveEffect:
         """The active effect with the given parameter values, defaults for the others.
 
-        Raises ParameterError for an unknown name or a value out of bounds.
+        Raises ParameterError for an unknown name or a value out of bounds; InputError for an effect that acts nowhere.
         """
+        if not any(function is not None for function in self._functions):
+            raise InputError(
+                f"{self.where} acts nowhere; give it one of on_model, on_record, on_voltage, on_reading."
+            )
         try:
             return ActiveEffect(self, tuple(checked(self.parameters, values, self._wider).items()))
         except ParameterError as error:
@@ -310,16 +323,19 @@ class ActiveEffect:
     def act(self, function: Callable[..., Acted], given: object) -> Acted:
         """The result of one of the effect's functions for the input `given`.
 
-        For a user's own effect raises OwnEffectError where the function fails or returns something unusable, and
-        NoNumberError where a value is not finite, each with file and line; an AesiError that it raises itself passes.
+        For a user's own function raises OwnEffectError where it returns something unusable, and NoNumberError where a
+        value is not finite. Where one of a file fails, these two name file and line; one that was made in Python fails
+        with its own error. An AesiError that it raises itself passes.
         """
-        if self.effect.file is None:
+        if not _is_own(function):
             return function(given, **self.parameters)
         try:
             acted = function(given, **self.parameters)
         except AesiError:
             raise
         except (Exception, SystemExit) as error:
+            if self.effect.file is None:
+                raise
             arithmetic = isinstance(error, ArithmeticError)
             raise (NoNumberError if arithmetic else OwnEffectError)(
                 _failure(self.effect.file, error)
@@ -354,13 +370,18 @@ def as_cell_saw(record: Record, effects: Iterable[ActiveEffect]) -> Record:
     return record
 
 
+def _is_own(function: Callable[..., Any] | None) -> bool:
+    """Whether a function is a user's own, of a file or made in Python, and none of this package."""
+    return not str(getattr(function, "__module__", "")).startswith(f"{__name__.partition('.')[0]}.")
+
+
 def check_states(effect: Effect, added: Contribution, trace: Trace) -> None:
     """Raises OwnEffectError where a user's own effect returns a state with a name that the run has already."""
     taken = {*trace.series, *(one.name for one in fields(Run))}
     clash = [name for name in added.series if name in taken]
-    if clash and effect.file is not None:
+    if clash and _is_own(effect.on_voltage):
         raise OwnEffectError(
-            f"{effect.file}: on_voltage gives a state {clash[0]!r}, which the run has; name it otherwise."
+            f"{effect.where}: on_voltage gives a state {clash[0]!r}, which the run has; name it otherwise."
         )
 
 
@@ -388,7 +409,7 @@ def _check_acted(effect: Effect, function: Callable[..., Any], given: Any, acted
     place, wanted = places[type(given)]
     if not isinstance(acted, wanted):
         what = f"an object of type {type(acted).__name__}"
-        raise OwnEffectError(f"{effect.file}: {place} gives {what}, not {_article(wanted.__name__)}.")
+        raise OwnEffectError(f"{effect.where}: {place} gives {what}, not {_article(wanted.__name__)}.")
     if isinstance(acted, Record):
         rows = {"time_s": acted.time_s, "current_a": acted.current_a, "temperature_k": acted.temperature_k}
         rows["read_s"] = acted.read_s
@@ -402,7 +423,7 @@ def _check_acted(effect: Effect, function: Callable[..., Any], given: Any, acted
 def _check_possible(effect: Effect, acted: Record) -> None:
     """Raises OwnEffectError for times of a record that do not rise, and for a temperature that no cell has."""
     if np.any(np.diff(acted.time_s) <= 0.0):
-        raise OwnEffectError(f"{effect.file}: on_record gives times that do not rise from row to row.")
+        raise OwnEffectError(f"{effect.where}: on_record gives times that do not rise from row to row.")
     kelvin = acted.temperature_k
     if kelvin is None:
         return
@@ -410,7 +431,7 @@ def _check_possible(effect: Effect, acted: Record) -> None:
     absurd = (kelvin < low) | (kelvin > high)
     if np.any(absurd):
         raise OwnEffectError(
-            f"{effect.file}: on_record gives {kelvin[int(np.argmax(absurd))]:.5g} K, and a cell is at {low:g} to "
+            f"{effect.where}: on_record gives {kelvin[int(np.argmax(absurd))]:.5g} K, and a cell is at {low:g} to "
             f"{high:g} K; temperature_k is in kelvin."
         )
 
@@ -422,7 +443,7 @@ def _article(name: str) -> str:
 def _check_rows(effect: Effect, place: str, rows: Mapping[str, Any], time_s: Array) -> None:
     """Raises OwnEffectError for a row of another shape or not of numbers; NoNumberError where values lack."""
     for name, row in rows.items():
-        what = f"{effect.file}: {place}{f', {name},' if name else ''} gives"
+        what = f"{effect.where}: {place}{f', {name},' if name else ''} gives"
         if np.shape(row) != time_s.shape:
             raise OwnEffectError(f"{what} the shape {np.shape(row)}, where the record has {time_s.shape}.")
         if np.asarray(row).dtype.kind not in "biuf":

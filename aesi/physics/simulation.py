@@ -29,6 +29,7 @@ from aesi.physics.arguments import (
     check_temperature,
     checked_effects,
     checked_soc,
+    checked_volts,
 )
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
@@ -109,9 +110,10 @@ def simulate(
     Returns a Run with series c_sp, c_sn (mol/m3), c_e0, c_eL (mol/m3), soc, temperature_k.
     Raises SimulationError with time and electrode where the cell runs out, or where a clipped simulation has no
     solution; DataError for arrays that cannot be simulated, and for a rest voltage that no state of the cell has;
-    InputError for an unknown model, hold or on_depletion, for a wrong type of cell, effect, state of charge or
-    temperature, and for an effect that the model already contains; CellError for a potential, a rate or a film that the
-    models cannot tabulate, and for an effect that needs a value which the cell's file does not declare.
+    InputError for an unknown model, hold or on_depletion, for a wrong type of cell, effect, state of charge, rest
+    voltage or temperature, for both soc0 and rest_voltage_v, and for an effect that the model already contains;
+    CellError for a potential, a rate or a film that the models cannot tabulate, and for an effect that needs a value
+    which the cell's file does not declare.
     """
     check_cell(cell)
     check_choice("hold", hold, Hold)
@@ -128,6 +130,8 @@ def simulate(
         record = replace(record, unresolved_heat_w=_checked_heat(unresolved_heat_w, time))
     if soc0 is None:
         soc0 = _soc_from_rest(changed, active, record.temperature_k, rest_voltage_v)
+    elif rest_voltage_v is not None:
+        raise InputError("soc0 and rest_voltage_v both say where the cell starts; give one of them.")
     else:
         soc0 = same_rest(cell, changed.cell, soc0)
     backward = hold == "backward"
@@ -381,8 +385,9 @@ def _soc_from_rest(
     """State of charge from the rest voltage at the first temperature, without the part that effects add to it."""
     if rest_voltage_v is None:
         raise DataError("give soc0, or rest_voltage_v measured at rest before the record.")
+    read_v = checked_volts(rest_voltage_v, "rest_voltage_v")
     open_circuit = OpenCircuit(model.cell, None if kelvin is None else float(kelvin[0]))
-    terminal_v = freed_of_instruments(open_circuit, model, effects, rest_voltage_v)
+    terminal_v = freed_of_instruments(open_circuit, model, effects, read_v)
     return open_circuit.soc_at_rest(terminal_v, freed_of_series(open_circuit, model, effects, terminal_v))
 
 

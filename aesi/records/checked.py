@@ -11,7 +11,7 @@ from typing import ParamSpec, TypeGuard, TypeVar
 import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
-from aesi.errors import DataError, InputError
+from aesi.errors import DataError, InputError, in_words
 from aesi.numerics.typing import Array, ComplexArray
 from aesi.over_time import stamp
 
@@ -25,8 +25,7 @@ HIGHEST_PLAIN_VOLT = 1000.0
 
 
 def of_columns(function: Callable[P, R]) -> Callable[P, R]:
-    """The function, which raises InputError, with how to call it, where a record or a table stands for its columns and
-    arguments are missing or too many for that."""
+    """The function, which raises InputError, with how to call it, where a record or a table stands for its columns."""
     taken = signature(function)
     needed = [one.name for one in taken.parameters.values() if one.default is one.empty]
     first = int(needed[0] == "self")
@@ -37,20 +36,17 @@ def of_columns(function: Callable[P, R]) -> Callable[P, R]:
 
     @wraps(function)
     def told(*args: P.args, **named: P.kwargs) -> R:
-        try:
-            taken.bind(*args, **named)
-        except TypeError:
-            given = [
-                one
-                for one in (*args[first:], *named.values())
-                if hasattr(one, "columns") or hasattr(one, "time_s")
-            ]
-            if given:
-                raise InputError(
-                    f"{called} takes columns, not an object of type {type(given[0]).__name__}; give them, as in "
-                    f"{called}({words})."
-                ) from None
-        return function(*args, **named)  # Python has words of its own for what else cannot be bound
+        given = [
+            one
+            for one in (*args[first:], *named.values())
+            if hasattr(one, "columns") or hasattr(one, "time_s")
+        ]
+        if given:
+            raise InputError(
+                f"{called} takes columns, not an object of type {type(given[0]).__name__}; give them, as in "
+                f"{called}({words})."
+            )
+        return function(*args, **named)
 
     return told
 
@@ -69,7 +65,9 @@ def numbers(values: object, name: str) -> Array:
                 f"{name} is masked in {row_words(int(masked[0, 0]))}; drop or fill what is masked first."
             )
     try:
-        kind = np.asarray(values).dtype.kind
+        # The column's own type first: dates with a time zone, and truth values with gaps, become objects in numpy.
+        kind = getattr(getattr(values, "dtype", None), "kind", "O")
+        kind = np.asarray(values).dtype.kind if kind == "O" else kind
     except ValueError:  # numpy's word for rows within a row that differ in length
         raise DataError(f"{name} holds rows of several lengths; give one row of numbers.") from None
     if kind == "b" or _has_truth_value(values):
@@ -78,14 +76,15 @@ def numbers(values: object, name: str) -> Array:
         )
     if kind in "mM":
         raise DataError(
-            f"{name} holds dates or durations; give numbers, as (dates - dates[0]).total_seconds() does."
+            f"{name} holds dates or durations; give numbers, as (dates - dates.min()) / np.timedelta64(1, 's') does "
+            "in seconds."
         )
     if kind == "c":
         raise DataError(f"{name} holds complex numbers; give real ones.")
     try:
         return np.asarray(values, dtype=float)
     except (TypeError, ValueError):
-        raise DataError(f"{name} holds {_first_other(values)!r}, which is not a number.") from None
+        raise DataError(f"{name} holds {in_words(_first_other(values))}, which is not a number.") from None
     except OverflowError:
         raise DataError(
             f"{name} holds a whole number of more than 308 digits, which no float holds; correct it."
@@ -152,7 +151,7 @@ def check_plain_volts(voltage_v: Array, place: Callable[[int], str]) -> None:
 def checked_dt(dt_s: object) -> float:
     """A time step, s.  Raises InputError for what is no positive number."""
     if not (is_finite_number(dt_s) and dt_s > 0.0):
-        raise InputError(f"dt_s = {dt_s!r} has to be a positive number of seconds.")
+        raise InputError(f"dt_s = {in_words(dt_s)} has to be a positive number of seconds.")
     return float(dt_s)
 
 
@@ -161,7 +160,7 @@ def check_whole_number(name: str, value: object, least: int, most: float = np.in
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not whole or not least <= value <= most:  # type: ignore[operator]
         upper = f" up to {most:.0f}" if np.isfinite(most) else ""
-        raise InputError(f"{name} = {value!r} is not a whole number from {least}{upper}.")
+        raise InputError(f"{name} = {in_words(value)} is not a whole number from {least}{upper}.")
 
 
 def is_finite_number(value: object) -> TypeGuard[float]:

@@ -24,7 +24,8 @@ class Run:
     negative and the positive current collector, mol/m3), soc, temperature_k (of the winding); effects add their own.
     profiles : name -> array across the electrodes; empty where they were not asked for. x_m (places,) is the distance
     from the negative collector; (n, places) have surface_stoichiometry, reaction_a_m2 (per particle surface,
-    delithiation positive), electrolyte_mol_m3, and potential_v of the solid against the electrolyte.
+    delithiation positive), electrolyte_mol_m3, and potential_v of the solid against the electrolyte. Through the
+    separator as well run electrolyte_nodes_mol_m3 (n, nodes) at the distances electrolyte_x_m (nodes,).
     hold : how the current was taken to run between the samples.
     """
 

@@ -12,11 +12,12 @@ Rudy, Alla, Brunton & Kutz, SIAM J. Appl. Dyn. Syst. 18 (2019) 643, doi:10.1137/
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Real
 
 import numpy as np
 from scipy.linalg import lapack
 
-from aesi.errors import DataError, ParameterError
+from aesi.errors import DataError, ParameterError, in_words
 from aesi.numerics.typing import Array, IntArray, Numbers
 from aesi.records.checked import numbers, row_words
 
@@ -36,6 +37,11 @@ class STRidge:
     max_iter: int = 20
 
     def __post_init__(self) -> None:
+        for name in ("lambda1", "lambda2"):
+            if not isinstance(getattr(self, name), Real):
+                raise ParameterError(f"{name} = {in_words(getattr(self, name))} is not a number; give one.")
+        if not isinstance(self.max_iter, int | np.integer):
+            raise ParameterError(f"max_iter = {in_words(self.max_iter)} is not a whole number; give one.")
         if not (0 <= self.lambda1 < np.inf and 0 <= self.lambda2 < np.inf and self.max_iter >= 1):
             raise ParameterError(
                 f"lambda1 = {self.lambda1:g} and lambda2 = {self.lambda2:g} must not be negative and must be finite, "

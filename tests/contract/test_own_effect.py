@@ -4,6 +4,7 @@ import pickle
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -456,3 +457,31 @@ def test_two_effects_of_one_id_are_two_effects(cell):
         for ohm in (0.0, 0.02)
     )
     assert fresh - worn == pytest.approx(0.1, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("place", "function", "words"),
+    [
+        ("on_record", lambda record: replace(record, current_a=record.current_a[1:]), "the shape .59,."),
+        ("on_record", lambda record: replace(record, time_s=record.time_s[::-1]), "times that do not rise"),
+        (
+            "on_voltage",
+            lambda trace: Contribution(trace.current_a, {"soc": trace.current_a}),
+            "a state 'soc', which the run has; name it otherwise",
+        ),
+        ("on_voltage", lambda trace: Contribution(trace.current_a, {"own": [1.0]}), "state 'own', gives"),
+        ("on_voltage", lambda trace: Contribution(1j * trace.current_a), "of type complex128, not numbers"),
+        ("on_model", lambda model: model.cell, "an object of type Cell, not an EspmModel"),
+    ],
+)
+def test_an_effect_made_in_python_went_on_with_what_one_of_a_file_is_refused_for(
+    cell, place, function, words
+):
+    own = Effect("own", "physics", "Own.", {}, **{place: function})
+    with pytest.raises(OwnEffectError, match=f"the effect 'own': {place}.*{words}"):
+        aesi.simulate(cell, np.arange(60.0), np.ones(60), 0.5, effects=[own.activate()])
+
+
+def test_an_effect_made_in_python_that_acts_nowhere_was_simulated_without_a_word():
+    with pytest.raises(InputError, match="the effect 'own' acts nowhere; give it one of on_model"):
+        Effect("own", "physics", "Own.").activate()

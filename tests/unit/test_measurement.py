@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import aesi
@@ -184,6 +185,10 @@ def test_a_record_and_a_spectrum_changed_with_the_arrays_that_they_were_made_of(
             "simulate(cell, data.time_s, data.current_a)",
         ),
         (
+            lambda cell, data: aesi.simulate(cell, data, 0.8),
+            "simulate(cell, data.time_s, data.current_a)",
+        ),
+        (
             lambda cell, data: aesi.cross_check(cell, data, soc0=0.8),
             "cross_check(cell, data.time_s, data.current_a, soc0)",
         ),
@@ -205,6 +210,16 @@ def test_a_record_or_a_table_given_for_columns_ended_in_a_type_error(called, wor
         InputError, match=rf"takes columns, not an object of type {kind}; .*{re.escape(words)}\.$"
     ):
         called(cell, record if of == "record" else record.to_frame())
+
+
+def test_the_advice_for_dates_did_not_hold_for_a_column_of_a_table():
+    dates = pd.Series(pd.date_range("2024", periods=3, freq="s", tz="UTC"), index=[5, 6, 7])
+    for given in (dates, pd.DatetimeIndex(dates), dates.dt.tz_localize(None).to_numpy()):
+        with pytest.raises(DataError, match="holds dates or durations") as refused:
+            Measurement(given, [0.0] * 3, [3.7] * 3)
+        advised = str(refused.value).split(", as ")[1].removesuffix(" does in seconds.")
+        time_s = eval(advised, {"dates": given, "np": np})
+        assert list(Measurement(time_s, [0.0] * 3, [3.7] * 3).time_s) == [0.0, 1.0, 2.0]
 
 
 def test_other_missing_arguments_are_pythons_own():

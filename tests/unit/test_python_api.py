@@ -135,6 +135,11 @@ def test_a_discovery_takes_records_and_gives_table_plot_and_model(cell, record, 
     assert (named.parameter, named.unit) == ("resistance_ohm", "ohm")
     assert named.low <= 1e-3 <= named.high
     assert {trace.name for trace in found.plot("test").data} >= {"measured", "after", "as declared"}
+    for wrong in (lambda: found.rmse_mv("declared"), lambda: found.rmse_mv(part="valid")):
+        with pytest.raises(InputError, match="'(declared|valid)' is not known; give '"):
+            wrong()
+    with pytest.raises(InputError, match="part = 'valid' is not known; give 'fit' or 'test'"):
+        found.plot("valid")  # a sentence on nothing held out before
     assert found.model.cell.contact_resistance_ohm == pytest.approx(1e-3, rel=0.01), "a cell file can hold it"
     assert found.model.hold is None, "nobody declared one: the rows of the next record tell it"
     folder = found.save(tmp_path / "found")
@@ -239,6 +244,7 @@ def test_a_discovery_takes_files(cell, record, tmp_path, monkeypatch):
         ({"soc0": np.array([0.8])}, r"soc0 = array\(\[0.8\]\) is not a state of charge"),
         ({"soc0": "full", "on_depletion": "clip"}, "soc0 = 'full' is not a state of charge"),
         ({"soc0": [0.8], "on_depletion": "clip"}, r"soc0 = \[0.8\] is not a state of charge"),
+        ({"soc0": np.linspace(4.0, 3.0, 600)}, r"^soc0 = array\(\[[^\n]{,40}\) is not a state of charge"),
         ({"soc0": True, "on_depletion": "clip"}, "soc0 = True is not a state of charge"),
         ({"soc0": float("nan"), "on_depletion": "clip"}, "soc0 = nan is not a state of charge"),
         ({"soc0": float("inf"), "on_depletion": "clip"}, "soc0 = inf is not a state of charge"),
@@ -246,6 +252,17 @@ def test_a_discovery_takes_files(cell, record, tmp_path, monkeypatch):
             {"time_s": pd.date_range("2024", periods=len(TIME), freq="s")},
             "time_s holds dates or durations; give",
         ),
+        (
+            {"time_s": pd.date_range("2024", periods=len(TIME), freq="s", tz="Europe/Berlin")},
+            "time_s holds dates or durations; give",
+        ),
+        (
+            {"current_a": pd.Series([True, None] * (len(TIME) // 2), dtype="boolean")},
+            "current_a holds truth values; give numbers",
+        ),
+        ({"soc0": None, "rest_voltage_v": "3.9"}, "rest_voltage_v = '3.9' is not a voltage; give one"),
+        ({"soc0": None, "rest_voltage_v": [3.9]}, r"rest_voltage_v = \[3.9\] is not a voltage; give one"),
+        ({"rest_voltage_v": 3.9}, "soc0 and rest_voltage_v both say where the cell starts; give one of them"),
         ({"current_a": ["rest"] * len(TIME)}, "current_a holds 'rest', which is not a number"),
         ({"current_a": 1j * TIME}, "current_a holds complex numbers"),
         (

@@ -11,7 +11,7 @@ from aesi.conformal.intervals import Intervals
 from aesi.conformal.online.records import checked_current, checked_record
 from aesi.conformal.online.scale import Scale
 from aesi.conformal.online.tracker import adapt_log_ratio, initial_log_ratio, replay, scaled_band
-from aesi.errors import InputError
+from aesi.errors import InputError, in_words
 from aesi.numerics.drive import N_RECENT
 from aesi.numerics.typing import Array, SavedState
 
@@ -110,12 +110,16 @@ class Stream:
         self._pending: _Pending | None = None
         self._warm = False
 
+    def __repr__(self) -> str:
+        return f"Stream({self._calibrated!r}, {len(self._past.values)} residuals known)"
+
     def interval(self, current_a: float | None = None) -> tuple[float, float]:
         """(low, high) V of the next residual.
 
         current_a : A, current at that sample; needed where `needs_current`. It may be called again before `update`,
-        also with another current.
+        also with another current.  Raises InputError for what is no number.
         """
+        current_a = None if current_a is None else _number(current_a, "current_a")
         pending = self._pending
         if pending is None or pending.current_a != current_a:
             pending = self._pending = self._make_interval(current_a)
@@ -131,8 +135,10 @@ class Stream:
     def update(self, error_v: float) -> None:
         """Add the residual of the sample of the last interval, V; NaN or infinity where it is missing.
 
-        Raises InputError where `interval` was not called for this sample although it needs the current.
+        Raises InputError where `interval` was not called for this sample although it needs the current, and for what is
+        no number, which changes nothing.
         """
+        error_v = _number(error_v, "error_v")
         calibrated = self._calibrated
         low, high = self.interval() if self._pending is None else (self._pending.low, self._pending.high)
         pending, self._pending = self._pending, None
@@ -174,6 +180,14 @@ class Stream:
             return _Pending(current_a, *calibrated.marginal_v, group, held=False, warm=False)
         low, high, held = scaled_band(raw[0], raw[1], self._log_ratio[group], calibrated.floor_v)
         return _Pending(current_a, low, high, group, held, warm=True)
+
+
+def _number(value: float, name: str) -> float:
+    """One number as a float.  Raises InputError for anything else, which a stream has no sample for."""
+    given = np.asarray(value)
+    if given.ndim or given.dtype.kind not in "iuf":
+        raise InputError(f"{name} = {in_words(value)} is not a number; give that of one sample.")
+    return float(value)
 
 
 @dataclass(frozen=True)

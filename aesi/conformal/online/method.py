@@ -14,7 +14,7 @@ from aesi.conformal.bands.narrowest import level_pairs
 from aesi.conformal.online.calibrated import Calibrated
 from aesi.conformal.online.records import checked_currents, checked_records
 from aesi.conformal.online.scale import Scale
-from aesi.errors import FitError, InputError
+from aesi.errors import FitError, InputError, in_words
 from aesi.numerics.quantiles import check_miss_rate, conformal_quantile
 from aesi.numerics.typing import Array
 
@@ -51,14 +51,14 @@ class Method(ABC):
         residuals: Sequence[Array],
         alpha: float = 0.1,
         window: int = 200,
-        rng: np.random.Generator | None = None,
+        rng: np.random.Generator | int | None = None,
         current_a: Sequence[Array] | None = None,
     ) -> Calibrated:
         """The method calibrated on out-of-sample residuals: held out or out of bag, never those of the fit.
 
         residuals : one (n_i,) array per continuous record, V, all at one sampling rate; NaN where missing.
         alpha : miss rate, in (0, 1).  window : samples of history.
-        rng : for randomised regressors only; the default has seed 0.
+        rng : generator, or its seed, for randomised regressors only; the default has seed 0.
         current_a : one (n_i,) array per record, A, discharge positive. A method that uses it needs it to predict, too.
 
         Raises InputError for an inadmissible alpha, window or current; FitError for too few or constant residuals.
@@ -69,7 +69,7 @@ class Method(ABC):
         floor = width_floor(records, marginal)
         marginal = _widened(floor, marginal)
         currents = checked_currents(current_a, records)
-        rng = rng or np.random.default_rng(0)
+        rng = np.random.default_rng(0 if rng is None else rng)
         band, scale = self.band(CalibrationData(records, currents, alpha, window, marginal, floor, rng))
         return Calibrated(self.name, alpha, window, band, scale, self.rate, marginal, floor)
 
@@ -86,7 +86,7 @@ def check_settings(alpha: float, window: int) -> None:
     """Raises InputError for an alpha outside (0, 1), and for a window that is no whole number or too short."""
     check_miss_rate(alpha)
     if not isinstance(window, int | np.integer):
-        raise InputError(f"window = {window!r} is not a number of samples; give a whole one.")
+        raise InputError(f"window = {in_words(window)} is not a number of samples; give a whole one.")
     if window < MIN_WINDOW:
         raise InputError(f"window = {window} samples is too short a history; give {MIN_WINDOW} or more.")
 

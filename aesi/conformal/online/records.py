@@ -8,12 +8,13 @@ import numpy as np
 
 from aesi.errors import InputError
 from aesi.numerics.typing import Array
-from aesi.records.checked import row_words
+from aesi.records.checked import numbers, row_words
 
 
 def checked_record(residuals: Array) -> Array:
-    """(n,) V as contiguous floats, missing values (NaN, infinity) as NaN; raises InputError for another shape."""
-    record = np.asarray(residuals, dtype=float)
+    """(n,) V as contiguous floats, missing values (NaN, infinity) as NaN; raises InputError for another shape, and
+    for what are no numbers."""
+    record = numbers(residuals, "residuals")
     if record.ndim != 1:
         raise InputError(f"residuals have shape {record.shape}; give one (n,) array a continuous record.")
     return np.where(np.isinf(record), np.nan, record)
@@ -21,7 +22,7 @@ def checked_record(residuals: Array) -> Array:
 
 def checked_current(current_a: Array, n: int) -> Array:
     """(n,) A, finite; raises InputError naming the first sample that is not."""
-    current = np.ascontiguousarray(current_a, dtype=float)
+    current = np.ascontiguousarray(numbers(current_a, "current_a"))
     if current.shape != (n,):
         raise InputError(
             f"current_a has shape {current.shape}, the residuals ({n},); give one value a sample."

@@ -6,14 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from aesi.constants import ZERO_CELSIUS_K
-from aesi.errors import CellError, DataError
+from aesi.constants import COLDEST_DEGC, WARMEST_DEGC, ZERO_CELSIUS_K
+from aesi.errors import CellError, DataError, InputError, in_words
 from aesi.numerics.typing import Array
+from aesi.physics.arguments import check_cell, checked_volts
 from aesi.physics.balance import aged_range
 from aesi.physics.cell import Cell
 from aesi.physics.espm.plain import shifted_ocp
 from aesi.records import Measurement
-from aesi.records.checked import check_plain_volts
+from aesi.records.checked import check_plain_volts, is_finite_number
 
 GIVEN_SD = 0.0005
 """Standard deviation of a state of charge that the user gives, and the smallest of any."""
@@ -43,9 +44,20 @@ def initial_soc(cell: Cell, voltage_v: float, kelvin: float | None = None) -> fl
     """State of charge of a cell that rests at `voltage_v` (V): 1 for a full charge, else by the open-circuit voltage.
 
     kelvin : temperature, K; None takes the cell file's initial temperature.
-    Voltages up to `BEYOND_V` beyond full and empty are accepted. Raises DataError outside, naming the range.
+    Voltages up to `BEYOND_V` beyond full and empty are accepted. Raises DataError outside, naming the range;
+    InputError for what is no Cell, no voltage or no temperature of a cell.
     """
-    return OpenCircuit(cell, kelvin).soc_at_rest(voltage_v, voltage_v)
+    check_cell(cell)
+    rest_v = checked_volts(voltage_v, "voltage_v")
+    if kelvin is not None and not (
+        is_finite_number(kelvin) and COLDEST_DEGC <= kelvin - ZERO_CELSIUS_K <= WARMEST_DEGC
+    ):
+        coldest, warmest = COLDEST_DEGC + ZERO_CELSIUS_K, WARMEST_DEGC + ZERO_CELSIUS_K
+        raise InputError(
+            f"kelvin = {in_words(kelvin)} is not from {coldest:g} to {warmest:g} K, where cells work; 25 degC is "
+            "298.15 K."
+        )
+    return OpenCircuit(cell, kelvin).soc_at_rest(rest_v, rest_v)
 
 
 class OpenCircuit:

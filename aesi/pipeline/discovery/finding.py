@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aesi.errors import InputError
+from aesi.physics.arguments import check_choice
 from aesi.pipeline.discovery.discover import (
     Case,
     case_model,
@@ -83,8 +84,10 @@ class Finding:
         """RMS voltage error of a model, mV; NaN where there is no such part, or the model cannot be simulated on it.
 
         state : "before", the declared model; "recalibrated"; or "after", the written model.
-        part : "test", to which nothing was fitted, or "fit".
+        part : "test", to which nothing was fitted, or "fit".  Raises InputError for other words.
         """
+        check_choice("state", state, State)
+        check_choice("part", part, Part)
         return float(self.content[state][part].get("rmse_mv", float("nan")))
 
     @cached_property
@@ -112,8 +115,9 @@ class Finding:
     def plot(self, part: Part = "test") -> Figure:
         """Measured voltage, current, and the residual of each model over time: a plotly figure.
 
-        Raises InputError for the test part of a search that held none out.
+        Raises InputError for the test part of a search that held none out, and for another word than "test" or "fit".
         """
+        check_choice("part", part, Part)
         from aesi.pipeline.report.plots.records import residual_figure
 
         traces = discovery_view(self.found, self.content, "").of(part)

@@ -18,7 +18,7 @@ import numpy as np
 from aesi.advice import advises_python
 from aesi.conformal import WHOLE_DRIVE, Calibrated, FreeRunBands, calibrated_from_dict
 from aesi.data.resample import is_even, is_sparse, to_even
-from aesi.errors import CellError, DataError, InputError, SimulationError
+from aesi.errors import CellError, DataError, InputError, SimulationError, in_words
 from aesi.numerics.typing import Array, BoolArray, Numbers
 from aesi.numerics.visited import Visited
 from aesi.over_time import stamp
@@ -278,7 +278,7 @@ class HybridModel:
     def _check_start(self, error0_v: float | None, soc0_sd: float, one_step: bool) -> None:
         """Raises InputError for the start of a prediction that is none, or that this model has no use for."""
         if error0_v is not None and not is_finite_number(error0_v):
-            raise InputError(f"error0_v = {error0_v!r} is no voltage; give volts, or leave it out.")
+            raise InputError(f"error0_v = {in_words(error0_v)} is no voltage; give volts, or leave it out.")
         if error0_v is not None and not one_step and self.correction is None:
             raise InputError(
                 f"error0_v = {error0_v:g} V is where a correction starts, and this model has none: physics alone has "
@@ -286,7 +286,7 @@ class HybridModel:
             )
         if not (is_finite_number(soc0_sd) and 0.0 <= soc0_sd <= 1.0):
             raise InputError(
-                f"soc0_sd = {soc0_sd!r} is no standard deviation of a state of charge; give 0 to 1."
+                f"soc0_sd = {in_words(soc0_sd)} is no standard deviation of a state of charge; give 0 to 1."
             )
 
     @property

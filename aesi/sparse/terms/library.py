@@ -22,9 +22,10 @@ from itertools import combinations, permutations, product
 
 import numpy as np
 
-from aesi.errors import InputError
+from aesi.errors import InputError, in_words
 from aesi.numerics.files.restored import saved_count
 from aesi.numerics.typing import Array, BoolArray, IntArray
+from aesi.records.checked import numbers
 from aesi.sparse.terms.basis import FUNCTIONS, MAX_ORDER, SPECIAL, slopes, values
 
 ERROR = "e"
@@ -85,9 +86,12 @@ class Library:
 
         p_c : highest order of a polynomial, 0 to 5.  d : highest total degree.  factors : most variables in a
         product.  special : with trigonometric and hyperbolic functions.  mixed : and their products with T1.
-        Raises InputError for an order or a degree that there is none of, and for inputs that are no list of different
-        names other than `e`.
+        Raises InputError for an order or a degree that there is none of or that is no whole number, and for inputs that
+        are no list of different names other than `e`.
         """
+        for name, value in (("p_c", p_c), ("d", d), ("factors", factors)):
+            if not isinstance(value, int | np.integer):
+                raise InputError(f"{name} = {in_words(value)} is not a whole number; give one.")
         if not 0 <= p_c <= MAX_ORDER or d < 0:
             raise InputError(f"p_c = {p_c} must lie in 0 to {MAX_ORDER}, and d = {d} must not be negative.")
         if isinstance(inputs, str):
@@ -134,6 +138,9 @@ class Library:
     def __len__(self) -> int:
         return len(self.terms)
 
+    def __repr__(self) -> str:
+        return f"Library({len(self)} terms over {', '.join(self.variables)})"
+
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Readable names, one a term."""
@@ -174,8 +181,15 @@ class Library:
         """Every term along scaled data.
 
         scaled : (n, 1 + n_inputs), the error first.  Returns (n, m), stored by columns.
+        Raises InputError for another shape, and for what are no numbers.
         """
-        return evaluate_terms(self.terms, scaled).T
+        rows = numbers(scaled, "scaled")
+        if rows.ndim != 2 or rows.shape[1] != len(self.variables):
+            raise InputError(
+                f"scaled has the shape {rows.shape}; give (n, {len(self.variables)}), a column for each of "
+                f"{', '.join(self.variables)}."
+            )
+        return evaluate_terms(self.terms, rows).T
 
 
 def evaluate_terms(terms: Sequence[Term], scaled: Array, overshoot: Array | None = None) -> Array:

@@ -4,8 +4,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aesi.conformal import METHODS
+from aesi.conformal import METHODS, Intervals
 from aesi.conformal.bands.narrowest import level_pairs, narrowest
+from aesi.errors import InputError
 
 
 @pytest.fixture(scope="module")
@@ -17,6 +18,48 @@ def test_asking_twice_gives_the_same_interval(calibrated) -> None:
     stream = calibrated.stream()
     stream.update(1e-4)
     assert stream.interval() == stream.interval()
+
+
+@pytest.mark.parametrize("wrong", ["0.1", None, np.array([1e-4]), [1e-4], True])
+def test_an_error_that_is_no_number_moved_the_scale_before_it_failed(wrong) -> None:
+    stream = METHODS["aci"].fit([1e-4 * np.random.default_rng(0).standard_normal(300)]).stream()
+    stream.update(1e-4)
+    before = stream.interval()
+    with pytest.raises(InputError, match=r"error_v = .* is not a number; give that of one sample"):
+        stream.update(wrong)
+    assert stream.interval() == before
+
+
+def test_a_current_that_is_no_number_ended_in_a_type_error() -> None:
+    errors, currents = np.random.default_rng(0).standard_normal((2, 3000))
+    stream = METHODS["spci_linear"].fit([1e-4 * errors], current_a=[currents]).stream()
+    for wrong in ("3", [3.0]):
+        with pytest.raises(InputError, match=r"current_a = .* is not a number; give that of one sample"):
+            stream.interval(wrong)
+    assert stream.interval(np.float32(3.0)) == stream.interval(np.array(3.0))
+
+
+def test_a_stream_and_intervals_print_what_they_are(calibrated) -> None:
+    stream = calibrated.stream()
+    stream.update(1e-4)
+    assert repr(stream) == "Stream(Calibrated(spci_linear, 90 %, window 200), 1 residuals known)"
+    told = repr(Intervals(np.full(2000, -1e-3), np.full(2000, 2e-3), np.arange(2000) >= 10))
+    assert told == "Intervals(2,000 samples, 3 mV wide in the mean, 10 not calibrated)"
+
+
+def test_a_seed_for_a_generator_ended_in_an_attribute_error() -> None:
+    residuals = [1e-4 * np.random.default_rng(0).standard_normal(300)]
+    by_seed, by_generator = (
+        METHODS["spci_forest"].fit(residuals, window=20, rng=rng).intervals(residuals[0])
+        for rng in (5, np.random.default_rng(5))
+    )
+    np.testing.assert_array_equal(by_seed.lower_v, by_generator.lower_v)
+
+
+def test_masked_residuals_were_calibrated_on() -> None:
+    masked = np.ma.masked_array(1e-4 * np.random.default_rng(0).standard_normal(300), np.arange(300) == 4)
+    with pytest.raises(InputError, match="residuals is masked in row 5, counted from 1"):
+        METHODS["split"].fit([masked])
 
 
 def test_a_gap_brings_back_the_marginal_interval(calibrated) -> None:

@@ -10,7 +10,7 @@ import bpx
 import numpy as np
 import pytest
 
-from aesi.errors import CellError, DataError
+from aesi.errors import CellError, DataError, InputError
 from aesi.physics import Cell, initial_soc
 from aesi.physics.cell import read_soh
 
@@ -715,6 +715,20 @@ def test_the_rest_voltage_leads_back_to_the_state_of_charge(lg_m50, soc):
 def test_a_rest_voltage_out_of_range_says_which_range(lg_m50):
     with pytest.raises(DataError, match=r"5\.0000 V lies outside"):
         initial_soc(lg_m50, 5.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"cell": "cell.bpx.json"}, "cell is the text 'cell.bpx.json', not a Cell"),
+        ({"voltage_v": "3.7"}, "voltage_v = '3.7' is not a voltage; give one number, in V"),
+        ({"voltage_v": [3.7, 3.8]}, r"voltage_v = \[3.7, 3.8\] is not a voltage"),
+        ({"kelvin": 25.0}, "kelvin = 25.0 is not from 213.15 to 423.15 K, where cells work"),
+    ],
+)
+def test_a_state_from_what_is_no_rest_voltage_ended_in_a_type_error_or_at_25_kelvin(lg_m50, given, words):
+    with pytest.raises(InputError, match=words):
+        initial_soc(**({"cell": lg_m50, "voltage_v": 3.7} | given))
 
 
 @pytest.mark.parametrize("path", sorted(CELLS.glob("*.bpx.json")), ids=lambda path: path.name)

@@ -104,3 +104,23 @@ def test_terms_go_on_along_the_slope_of_each_function():
 def test_inputs_that_are_one_text_are_refused():
     with pytest.raises(InputError, match=r"give their names as a list, as in \['c_sp'\]"):
         Library.build("c_sp")
+
+
+@pytest.mark.parametrize(
+    ("shape", "words"), [((4, 2), r"\(4, 2\)"), ((4, 6), r"\(4, 6\)"), ((3,), r"\(3,\)"), ((), r"\(\)")]
+)
+def test_columns_too_many_were_left_out_without_a_word_and_too_few_ended_in_an_index_error(shape, words):
+    library = Library.build(["i", "soc"], p_c=1, d=1)
+    with pytest.raises(InputError, match=f"the shape {words}; give .n, 3., a column for each of e, i, soc"):
+        library.evaluate(np.zeros(shape))
+    assert library.evaluate([[0, 0, 0]]).shape == (1, len(library))
+
+
+@pytest.mark.parametrize("changes", [{"p_c": "2"}, {"p_c": 1.5}, {"d": None}, {"factors": 2.0}])
+def test_an_order_that_is_no_whole_number_ended_in_a_type_error(changes):
+    with pytest.raises(InputError, match="is not a whole number; give one"):
+        Library.build(["i"], **({"p_c": 2, "d": 2} | changes))
+
+
+def test_a_library_prints_its_variables_and_not_its_terms():
+    assert repr(Library.build(["i", "soc"], p_c=1, d=1)) == "Library(22 terms over e, i, soc)"

@@ -97,3 +97,16 @@ def test_what_no_problem_can_be_posed_with_is_refused(theta, y, words):
 def test_weights_of_no_row_or_of_no_size_ended_in_lapack_or_were_spread_over_all(weights, words):
     with pytest.raises(DataError, match=words):
         STRidge(1e-3, 1e-2).fit(np.eye(4), np.ones(4), weights)
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        (("1e-3", 0.0), "lambda1 = '1e-3' is not a number"),
+        ((1e-3, None), "lambda2 = None is not a number"),
+        ((1e-3, 0.0, 2.5), "max_iter = 2.5 is not a whole number"),
+    ],
+)
+def test_a_setting_that_is_no_number_ended_in_a_type_error(settings, words):
+    with pytest.raises(ParameterError, match=words):
+        STRidge(*settings)
