@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args
 
 from aesi.data.readers.formats.format import Sign
 from aesi.data.state import Direction
-from aesi.errors import DataError
+from aesi.errors import DataError, in_words
 from aesi.records.checked import is_finite_number
 
 Duplicates = Literal["refuse", "first", "last"]
@@ -110,7 +110,7 @@ def by_quantity(name: str, given: Any, of: str = "quantities") -> dict[str, Any]
         return {}
     if not isinstance(given, Mapping):
         raise DataError(
-            f"{name} = {given!r} names no {of}; give a dict from each to its value, as in {EXAMPLES[name]}."
+            f"{name} = {in_words(given)} names no {of}; give a dict from each to its value, as in {EXAMPLES[name]}."
         )
     return dict(given)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from aesi.data.reading import record_name
 from aesi.errors import DataError
 from aesi.numerics.typing import AnyArray, Array
 from aesi.records import Spectrum
+from aesi.records.checked import row_words
 
 LABEL = "spectrum"
 STATES = ("soc", "discharged_ah")
@@ -51,7 +52,11 @@ def read_spectra(path: str | Path) -> tuple[Spectrum, ...]:
     if not (columns["frequency_hz"] > 0.0).all():
         raise DataError(f"{table.path.name}, column frequency_hz: a frequency has to be positive.")
     _check_temperature(columns, table)
-    _check_capacitive(columns, table)
+    _check_capacitive(
+        columns["frequency_hz"],
+        columns["z_imag_ohm"],
+        lambda row: f"{table.path.name}, {table.where(row)}, column z_imag_ohm",
+    )
     named = LABEL in table.header
     labels = np.array(table.read_text((table.header.index(LABEL),))[0]) if named else None
     pieces = _pieces(columns, labels)
@@ -115,13 +120,25 @@ def _check_temperature(columns: dict[str, Array], table: TableFile) -> None:
         )
 
 
-def _check_capacitive(columns: dict[str, Array], table: TableFile) -> None:
-    """Raises DataError where the imaginary part is positive in all rows up to SLOW_HZ: it is -Im then, as in plots."""
-    slow = np.flatnonzero(columns["frequency_hz"] <= SLOW_HZ)
-    if slow.size and (columns["z_imag_ohm"][slow] > 0.0).all():
+def check_spectrum(spectrum: Spectrum) -> None:
+    """Raises DataError for a spectrum, made of arrays, of whose imaginary part a file would be refused for its sign."""
+    _check_capacitive(
+        spectrum.frequency_hz,
+        spectrum.z_ohm.imag,
+        lambda row: f"{spectrum.name}, {row_words(row)}, imaginary part of z_ohm",
+    )
+
+
+def _check_capacitive(frequency_hz: Array, z_imag_ohm: Array, place: Callable[[int], str]) -> None:
+    """Raises DataError where the imaginary part is positive in all rows up to SLOW_HZ: it is -Im then, as in plots.
+
+    place : row from 0 -> how the sentence calls it.
+    """
+    slow = np.flatnonzero(frequency_hz <= SLOW_HZ)
+    if slow.size and (z_imag_ohm[slow] > 0.0).all():
         raise DataError(
-            f"{table.path.name}, {table.where(int(slow[0]))}, column z_imag_ohm: it is positive in all rows up to "
-            f"{SLOW_HZ:g} Hz, where a cell is capacitive and it has to be negative; if it holds -Im(Z), turn its sign."
+            f"{place(int(slow[0]))}: it is positive in all rows up to {SLOW_HZ:g} Hz, where a cell is capacitive and "
+            "it has to be negative; if it holds -Im(Z), turn its sign."
         )
 
 

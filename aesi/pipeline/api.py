@@ -17,8 +17,8 @@ from aesi.calibration import Calibration, Conditions
 from aesi.constants import LARGEST_SEED
 from aesi.data.read import Reading, examined, read
 from aesi.data.reading import record_names
-from aesi.data.spectra import read_spectra
-from aesi.errors import DataError, InputError
+from aesi.data.spectra import check_spectrum, read_spectra
+from aesi.errors import DataError, InputError, in_words
 from aesi.over_time import stamp
 from aesi.physics import ModelName
 from aesi.physics.arguments import check_choice, checked_soc
@@ -163,7 +163,7 @@ def calibrate(
     check_whole_number("starts", starts, 1)
     check_whole_number("seed", seed, 0, LARGEST_SEED)
     if cut_offs_v is not None and not _is_pair(cut_offs_v):
-        raise InputError(f"cut_offs_v = {cut_offs_v!r}: give (lower, upper) V, as in (2.5, 4.2).")
+        raise InputError(f"cut_offs_v = {in_words(cut_offs_v)}: give (lower, upper) V, as in (2.5, 4.2).")
     given = declared_model(cell)
     conditions = Conditions(
         soc0,
@@ -188,12 +188,14 @@ def calibrate(
 
 
 def _read_spectra(given: Spectra) -> tuple[Spectrum, ...]:
-    """The spectra, read from files or given as such.  Raises InputError for any other object."""
+    """The spectra, read from files or given as such.  Raises InputError for any other object, and for a spectrum that a
+    file would be refused for."""
     several = isinstance(given, Sequence) and not isinstance(given, str)
     found: list[Spectrum] = []
     listed = list(given) if several else [given]  # type: ignore[arg-type]
     for one in listed:
         if isinstance(one, Spectrum):
+            check_spectrum(one)
             found.append(one)
         elif isinstance(one, str | PathLike):
             found += read_spectra(Path(one))
@@ -222,8 +224,8 @@ def _check_asked(holdout: object, max_effects: int, seed: int) -> None:
     """Raises InputError for a number that a search cannot use."""
     if holdout is not None and not (isinstance(holdout, Real) and 0.0 <= float(holdout) <= MOST_HOLDOUT):
         raise InputError(
-            f"holdout = {holdout!r} is not a share of the record, from 0 to {MOST_HOLDOUT:g}, to be kept back; 30 % "
-            "is 0.3."
+            f"holdout = {in_words(holdout)} is not a share of the record, from 0 to {MOST_HOLDOUT:g}, to be kept back; "
+            "30 % is 0.3."
         )
     check_whole_number("max_effects", max_effects, 0, MOST_EFFECTS)
     check_whole_number("seed", seed, 0, LARGEST_SEED)
@@ -232,14 +234,14 @@ def _check_asked(holdout: object, max_effects: int, seed: int) -> None:
 def _check_by_name(what: str, given: object) -> None:
     """Raises InputError where an argument is no dict by record names."""
     if given is not None and not isinstance(given, Mapping):
-        raise InputError(f"{what} = {given!r} names no record; give a dict by the records' names.")
+        raise InputError(f"{what} = {in_words(given)} names no record; give a dict by the records' names.")
 
 
 def _check_priors(priors: object) -> None:
     """Raises InputError where `priors` is no dict of (value, standard deviation) by parameter."""
     form = "a dict of (value, standard deviation) by the parameters' names in the report"
     if priors is not None and not isinstance(priors, Mapping):
-        raise InputError(f"priors = {priors!r} names no parameter; give {form}.")
+        raise InputError(f"priors = {in_words(priors)} names no parameter; give {form}.")
     for name, prior in (priors or {}).items():
         if not _is_pair(prior):
             raise InputError(f"priors[{name!r}] = {prior!r} is no pair of numbers; give {form}.")

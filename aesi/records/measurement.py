@@ -10,10 +10,18 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
-from aesi.errors import DataError
+from aesi.errors import DataError, in_words
 from aesi.numerics.typing import AnyArray, Array, ComplexArray, Numbers
 from aesi.over_time import extent, over_time, range_words, stamp
-from aesi.records.checked import check_row, check_times, complex_numbers, numbers, of_columns, row_words
+from aesi.records.checked import (
+    check_row,
+    check_times,
+    complex_numbers,
+    is_finite_number,
+    numbers,
+    of_columns,
+    row_words,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -136,12 +144,11 @@ class Measurement:
             raise DataError(
                 f"the name of a measurement is {self.name!r}, which is no text; leave it out, or give one."
             )
-        if self.hold is not None and self.hold not in get_args(Hold):
-            words = " or ".join(map(repr, get_args(Hold)))
-            raise DataError(f"{self.name}: hold = {self.hold!r} is not known; give {words}, or leave it out.")
-        if self.soc0 is not None and not 0.0 <= self.soc0 <= 1.0:
+        if self.hold is not None:
+            self._check_hold(self.hold, ", or leave it out")
+        if self.soc0 is not None and not (is_finite_number(self.soc0) and 0.0 <= self.soc0 <= 1.0):
             raise DataError(
-                f"{self.name}: soc0 = {self.soc0!r} is no state of charge; give one from 0 (empty) to 1 (full)."
+                f"{self.name}: soc0 = {in_words(self.soc0)} is no state of charge; give one from 0 (empty) to 1 (full)."
             )
         for label in ("time_s", "current_a", "voltage_v"):
             if getattr(self, label) is None:
@@ -183,14 +190,21 @@ class Measurement:
         """(n,) Ah, charge taken out since the first row, minus the charge put in.
 
         Exact for a current that runs as `hold` says. This matters where rows are minutes apart: straight lines turn a
-        pulse into a triangle.
+        pulse into a triangle.  Raises DataError for an unknown hold.
         """
         return np.concatenate([[0.0], np.cumsum(self.steps_as(hold))]) / SECONDS_PER_HOUR
 
     def steps_as(self, hold: Hold) -> Array:
-        """(n - 1,) A s, charge taken out between rows; `discharged_ah` is their sum."""
+        """(n - 1,) A s, charge taken out between rows; `discharged_ah` is their sum.  Raises DataError for an unknown
+        hold."""
+        self._check_hold(hold)
         mean = self.current_a[1:] if hold == "backward" else 0.5 * (self.current_a[1:] + self.current_a[:-1])
         return mean * np.diff(self.time_s)
+
+    def _check_hold(self, hold: Hold, otherwise: str = "") -> None:
+        if hold not in get_args(Hold):
+            words = " or ".join(map(repr, get_args(Hold)))
+            raise DataError(f"{self.name}: hold = {in_words(hold)} is not known; give {words}{otherwise}.")
 
     def __repr__(self) -> str:
         warm = "" if self.temperature_degc is None else ", with temperature"

@@ -43,6 +43,8 @@ def test_the_charge_of_a_pulse_between_far_rows_depends_on_how_the_current_runs(
         "in straight lines, where all else took it as a logger's"
     )
     assert straight[-1] == pytest.approx(record.held("linear").charge_ah)
+    with pytest.raises(DataError, match=r"hold = 'straight' is not known; give 'linear' or 'backward'[.]"):
+        record.discharged_ah("straight")  # taken as linear before
 
 
 def test_a_range_was_told_by_two_figures_that_read_the_same():

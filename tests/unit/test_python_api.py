@@ -136,7 +136,7 @@ def test_a_discovery_takes_records_and_gives_table_plot_and_model(cell, record, 
     assert named.low <= 1e-3 <= named.high
     assert {trace.name for trace in found.plot("test").data} >= {"measured", "after", "as declared"}
     for wrong in (lambda: found.rmse_mv("declared"), lambda: found.rmse_mv(part="valid")):
-        with pytest.raises(InputError, match="'(declared|valid)' is not known; give '"):
+        with pytest.raises(InputError, match=r"'(declared|valid)' is not known; give '"):
             wrong()
     with pytest.raises(InputError, match="part = 'valid' is not known; give 'fit' or 'test'"):
         found.plot("valid")  # a sentence on nothing held out before
@@ -543,6 +543,9 @@ def test_spectra_were_fitted_by_the_command_line_alone(cell, record, tmp_path, m
     milliohm = replace(read, z_ohm=1e3 * read.z_ohm)
     with pytest.raises(DataError, match="as of no cell"):
         aesi.calibrate(cell, record, spectra=milliohm)
+    turned = replace(read, z_ohm=read.z_ohm.conj())
+    with pytest.raises(DataError, match="imaginary part of z_ohm: it is positive in all rows up to"):
+        aesi.calibrate(cell, record, spectra=turned)  # only files were refused for it
 
 
 def test_arrays_in_another_unit_were_told_options_of_the_command_line_alone(cell, record):
