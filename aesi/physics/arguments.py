@@ -12,7 +12,7 @@ from aesi.errors import InputError, in_words
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Effect
 from aesi.records import Measurement
-from aesi.records.checked import numbers
+from aesi.records.checked import is_one_number, numbers
 
 FARTHEST_SOC = 1.0
 """Largest distance of a state of charge from [0, 1]: a value beyond it is a percentage or a voltage."""
@@ -66,14 +66,12 @@ def checked_soc(soc: Any, name: str = "soc0", *, farthest: float = FARTHEST_SOC)
     """
     if soc is None:
         return None
-    given = np.asarray(soc)
-    number = given.ndim == 0 and given.dtype.kind in "iuf"
-    if not (number and -farthest <= given <= 1.0 + farthest):  # this way round, NaN fails too
+    if not (is_one_number(soc) and -farthest <= soc <= 1.0 + farthest):  # this way round, NaN fails too
         raise InputError(
             f"{name} = {in_words(soc)} is not a state of charge; give a share of the capacity between 0 (empty) and 1 "
             "(full), as one number, so 90 % is 0.9."
         )
-    return float(given)
+    return float(soc)
 
 
 def checked_volts(voltage_v: Any, name: str) -> float:
@@ -81,10 +79,9 @@ def checked_volts(voltage_v: Any, name: str) -> float:
 
     name : of the argument, for the sentence.
     """
-    given = np.asarray(voltage_v)
-    if given.ndim or given.dtype.kind not in "iuf" or np.isnan(given):
+    if not is_one_number(voltage_v) or np.isnan(voltage_v):
         raise InputError(f"{name} = {in_words(voltage_v)} is not a voltage; give one number, in V.")
-    return float(given)
+    return float(voltage_v)
 
 
 def check_temperature(temperature_degc: Any, name: str = "temperature_degc") -> None:

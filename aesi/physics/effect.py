@@ -36,8 +36,8 @@ Measurable = Literal["temperature"]
 """Quantities that a record may hold in addition to current and voltage."""
 Refinement = Literal["discretisation", "reduction"]
 """Approximations between the declared porous electrode and the equations that are solved."""
-
-
+PLACES = ("on_model", "on_record", "on_voltage", "on_reading")
+"""Where an effect may act: names of the functions of an `Effect`."""
 SAME_INSTANT_S = 1e-6
 """A reading this close to a row, s, belongs to that row: t - lag has round-off, and a current that jumps at the row has
 two values there."""
@@ -220,8 +220,10 @@ class Effect:
         return self.file or f"the effect {self.id!r}"
 
     @property
-    def _functions(self) -> tuple[Callable[..., Any] | None, ...]:
-        return self.on_model, self.on_record, self.on_voltage, self.on_reading
+    def acting(self) -> dict[str, Callable[..., Any]]:
+        """Place -> the function that it has there, in the order of `PLACES`."""
+        functions = {place: getattr(self, place) for place in PLACES}
+        return {place: function for place, function in functions.items() if function is not None}
 
     @property
     def restates_declared(self) -> bool:
@@ -238,10 +240,8 @@ class Effect:
 
         Raises ParameterError for an unknown name or a value out of bounds; InputError for an effect that acts nowhere.
         """
-        if not any(function is not None for function in self._functions):
-            raise InputError(
-                f"{self.where} acts nowhere; give it one of on_model, on_record, on_voltage, on_reading."
-            )
+        if not self.acting:
+            raise InputError(f"{self.where} acts nowhere; give it one of {', '.join(PLACES)}.")
         try:
             return ActiveEffect(self, tuple(checked(self.parameters, values, self._wider).items()))
         except ParameterError as error:

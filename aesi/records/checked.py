@@ -163,6 +163,12 @@ def check_whole_number(name: str, value: object, least: int, most: float = np.in
         raise InputError(f"{name} = {in_words(value)} is not a whole number from {least}{upper}.")
 
 
+def is_one_number(value: object) -> bool:
+    """Whether an argument is one number, of Python or numpy; NaN and infinity are, a truth value and a list are not."""
+    given = np.asarray(value)
+    return given.ndim == 0 and given.dtype.kind in "iuf"
+
+
 def is_finite_number(value: object) -> TypeGuard[float]:
     """Whether a single argument is a number, and finite; a truth value is none."""
     if isinstance(value, bool) or not isinstance(value, Real):

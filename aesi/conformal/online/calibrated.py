@@ -14,6 +14,7 @@ from aesi.conformal.online.tracker import adapt_log_ratio, initial_log_ratio, re
 from aesi.errors import InputError, in_words
 from aesi.numerics.drive import N_RECENT
 from aesi.numerics.typing import Array, SavedState
+from aesi.records.checked import is_one_number
 
 SCHEMA = "aesi.conformal/1"
 
@@ -184,8 +185,7 @@ class Stream:
 
 def _number(value: float, name: str) -> float:
     """One number as a float.  Raises InputError for anything else, which a stream has no sample for."""
-    given = np.asarray(value)
-    if given.ndim or given.dtype.kind not in "iuf":
+    if not is_one_number(value):
         raise InputError(f"{name} = {in_words(value)} is not a number; give that of one sample.")
     return float(value)
 

@@ -5,7 +5,6 @@ Sign convention of the whole package: current is positive on discharge.
 
 from __future__ import annotations
 
-import reprlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import pi, prod
@@ -16,7 +15,7 @@ from typing import Any, Self
 import numpy as np
 
 from aesi.constants import CM_PER_M, MILLI
-from aesi.errors import CellError
+from aesi.errors import CellError, in_words
 from aesi.physics.cell.bpx.read import read_bpx
 from aesi.physics.cell.bpx.values import check_values
 from aesi.physics.cell.bpx.write import write_bpx
@@ -61,7 +60,7 @@ class Cell(CellParameters):
         """
         for which, volts in (("lower", lower_v), ("upper", upper_v)):
             if not is_finite_number(volts):
-                raise CellError(f"{self.name}: {reprlib.repr(volts)} V as the {which} cut-off is no number.")
+                raise CellError(f"{self.name}: {in_words(volts)} V as the {which} cut-off is no number.")
         cell = replace(self, lower_voltage_v=lower_v, upper_voltage_v=upper_v)
         check_values(cell, self.name)
         return cell
@@ -82,7 +81,7 @@ class Cell(CellParameters):
         if mass_g is None:
             return cell
         if not is_finite_number(mass_g):
-            raise CellError(f"a mass of {reprlib.repr(mass_g)} g is no number.")
+            raise CellError(f"a mass of {in_words(mass_g)} g is no number.")
         if cell.volume_m3 is None:
             raise CellError(
                 f"{self.name}: a mass of {mass_g:g} g makes no density without a volume; give the size of the body, "

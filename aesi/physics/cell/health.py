@@ -14,13 +14,12 @@ file's own state where no record has that day.
 
 from __future__ import annotations
 
-import reprlib
 from collections.abc import Iterable, Mapping
 from datetime import date, datetime
 
 import numpy as np
 
-from aesi.errors import CellError
+from aesi.errors import CellError, in_words
 from aesi.numerics.typing import Array
 from aesi.records.checked import is_finite_number
 
@@ -62,7 +61,7 @@ def checked_soh(soh: Soh) -> Soh:
         return day_of(soh)
     given: object = soh
     if not (is_finite_number(given) and LEAST_SOH <= given <= MOST_SOH):
-        told = f"{given:g}" if is_finite_number(given) else reprlib.repr(given)
+        told = f"{given:g}" if is_finite_number(given) else in_words(given)
         raise CellError(
             f"a state of health of {told}: it is the share of the cell file's capacity that the cell had, from "
             f"{LEAST_SOH:g} to {MOST_SOH:g}; 97 % is 0.97."

@@ -12,11 +12,10 @@ from typing import get_args
 
 from aesi.errors import AesiError, InputError
 from aesi.parameters import Parameter
-from aesi.physics.effect import Effect, Kind
+from aesi.physics.effect import PLACES, Effect, Kind
 
 Place = tuple[int, int]
 """(line, counted from 1; column) in a source text."""
-PLACES = ("on_model", "on_record", "on_voltage", "on_reading")
 
 
 def check_own(effect: Effect, path: str) -> None:
@@ -39,10 +38,9 @@ def check_own(effect: Effect, path: str) -> None:
             f"{path}: the parameters of EFFECT have to be a dict of names and aesi.parameters.Parameter, as "
             '{"lead_ohm": Parameter(1e-3, "ohm", bounds=(0.0, 0.01), source="a lead")}.'
         )
-    acting = {place: getattr(effect, place) for place in PLACES if getattr(effect, place) is not None}
-    if not acting:
+    if not effect.acting:
         raise InputError(f"{path}: EFFECT acts nowhere; give it one of {', '.join(PLACES)}.")
-    for place, function in acting.items():
+    for place, function in effect.acting.items():
         try:
             inspect.signature(function).bind(None, **dict.fromkeys(declared, 0.0))
         except TypeError as error:

@@ -377,9 +377,9 @@ def _on_grid(
             check_measured(cell, [measurement])
         except DataError as error:
             raise DataError(with_keys(str(error))) from None
-        given_soc0 = sources.soc0.get(name) if config.cell.soc0 is None else config.cell.soc0
-        for_all = given_soc0 is None or config.cell.soc0 is not None
-        state_source = StateSource(measurement, given_soc0, for_all and len(sources.records) > 1)
+        own_soc0 = sources.soc0.get(name) if config.cell.soc0 is None else None
+        given_soc0 = config.cell.soc0 if own_soc0 is None else own_soc0
+        state_source = StateSource(measurement, given_soc0, own_soc0 is None and len(sources.records) > 1)
         start = starts[name] = state_source.initial_state(cell, given.effects, data.hold, given.model)
         held = hold_sentence(measurement.name, data.hold, data.declared_hold is not None, "data.hold: {}")
         # Resampling comes first, since it refuses a time step that would make too many rows, or none.

@@ -10,7 +10,6 @@ from __future__ import annotations
 import copy
 import json
 import re
-import reprlib
 import warnings
 from collections.abc import Mapping
 from difflib import get_close_matches
@@ -20,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from aesi.errors import CellError, did_you_mean, wanted
+from aesi.errors import CellError, did_you_mean, in_words, wanted
 from aesi.physics.cell.relations import relation
 
 STANDIN_TABLE = {"x": [0.0, 1.0], "y": [1.0, 0.0]}
@@ -260,7 +259,7 @@ def _fault_sentence(error: Any) -> str:
         return f"{place!r} is no field of BPX there{more}{hint}"
     if first["type"] == "value_error":
         return f"{place or 'the file'}: {str(first['ctx']['error']).rstrip('.')}{more}."
-    return f"{place or 'the file'} = {reprlib.repr(first['input'])} {wanted(first)}{more}."
+    return f"{place or 'the file'} = {in_words(first['input'])} {wanted(first)}{more}."
 
 
 def _place(fault: Mapping[str, Any], known: set[str]) -> str:
