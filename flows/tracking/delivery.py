@@ -34,7 +34,10 @@ def _send_run(store: Store, item: Item, again: bool) -> None:
 
 
 def _send_run_by_client(store: Store, run: NestedRun, tags: Mapping[str, str], info: RunInfo | None) -> None:
-    """To a server, or the rest of what has arrived in part; info : of the run that is there already."""
+    """To a server, or the rest of what has arrived in part; info : of the run that is there already.
+
+    A run of which the store refuses a part is FAILED there until it is whole, not RUNNING for ever.
+    """
     from mlflow.entities import Metric, Param, RunTag
 
     metrics = [Metric(k, v, run.end_ms, 0) for k, v in run.metrics.items()]
@@ -44,8 +47,13 @@ def _send_run_by_client(store: Store, run: NestedRun, tags: Mapping[str, str], i
         info = store.client.create_run(
             run.experiment_id, start_time=run.start_ms, run_name=run.name, tags=dict(tags)
         ).info
-    store.client.log_batch(info.run_id, metrics=metrics, params=params, tags=late)
-    _write_files(store, info.artifact_uri, run.files)
+    try:
+        store.client.log_batch(info.run_id, metrics=metrics, params=params, tags=late)
+        _write_files(store, info.artifact_uri, run.files)
+    except Exception as error:
+        if not store.away(error):
+            store.client.set_terminated(info.run_id, "FAILED", run.end_ms)
+        raise
     store.client.set_terminated(info.run_id, run.status, run.end_ms)
 
 

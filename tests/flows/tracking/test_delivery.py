@@ -5,6 +5,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from mlflow.exceptions import MlflowException
 
 from flows.tracking.delivery import deliver
 from flows.tracking.outbox import Item, OfAnotherVersion
@@ -77,6 +78,18 @@ def test_a_run_whose_item_lacks_a_part_was_made_in_the_store_and_stayed_running(
         deliver(store, of_another_version, again=False)
     assert children(store, item) == {}
     assert not list(tracked.rglob("coefficients.json"))
+
+
+def test_a_run_of_which_the_store_refused_a_part_stayed_running(store, item, monkeypatch):
+    monkeypatch.setattr(store, "local", False)
+    refused = item("candidate:1", params={"lambda1": "0.001", "a;b": "no such name"})
+    with pytest.raises(MlflowException, match="a;b"):
+        deliver(store, refused, again=False)
+    (run,) = children(store, item).values()
+    assert (run.info.status, run.info.end_time) == ("FAILED", 2_000)
+    deliver(store, item("candidate:1"), again=True)  # mended
+    (run,) = children(store, item).values()
+    assert (run.info.status, run.data.metrics["fitness"]) == ("FINISHED", 0.5)
 
 
 def test_a_failed_candidate_has_neither_metrics_nor_files(store, item):
