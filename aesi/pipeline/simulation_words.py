@@ -224,14 +224,31 @@ def band_sentences(
     banded = np.isfinite(prediction.lower_v)
     if prediction.nominal is not None and np.all(np.isfinite(record.voltage_v)):
         low, high = prediction.lower_v[banded], prediction.upper_v[banded]
-        inside = _within(record.voltage_v[banded], low, high)
+        inside = float(np.mean(_within(record.voltage_v[banded], low, high)))
         said.append(
-            f"{record.name}: the {100 * prediction.nominal:g} % band holds {100 * np.mean(inside):.1f} % of the "
+            f"{record.name}: the {100 * prediction.nominal:g} % band holds {100 * inside:.1f} % of the "
             f"measured voltage; it is {MV_PER_V * float(np.mean(high - low)):.1f} mV wide in the mean."
         )
         if measured:
             said += _one_step_band_sentences(record, model, ~_within(prediction.voltage_v[banded], low, high))
+        else:
+            said += _unlike_trained_sentences(record, model, inside)
     return said
+
+
+def _unlike_trained_sentences(record: Measurement, model: HybridModel, inside: float) -> list[str]:
+    """A sentence where a band of a free run holds less of a record than of every piece of the training records, each
+    predicted by a model that was fitted without it.  inside : share of the record's rows within the band."""
+    if model.bands is None:
+        return []
+    left_out = model.bands.horizons[-1].by_piece
+    if inside >= min(left_out):
+        return []
+    return [
+        f"{record.name}: that is less than of any of the {len(left_out)} left-out pieces of the training records "
+        f"({100 * min(left_out):.1f} % or more): this record is further from the model than they are. Check that it is "
+        "of this cell at this age, and that its initial state of charge and its temperature are right."
+    ]
 
 
 def _one_step_band_sentences(record: Measurement, model: HybridModel, apart: BoolArray) -> list[str]:

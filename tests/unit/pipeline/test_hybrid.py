@@ -1123,6 +1123,27 @@ def test_the_band_of_physics_alone_was_called_empty(model, record, tmp_path, ban
     assert told.endswith("lower_v and upper_v are empty.") != banded
 
 
+def test_a_record_that_the_band_holds_less_of_than_of_any_left_out_piece_is_told(model, data):
+    least = min(model.bands.horizons[-1].by_piece)
+
+    def told(record):
+        prediction = model.predict_record(record, SOC0)
+        inside = (record.voltage_v >= prediction.lower_v) & (record.voltage_v <= prediction.upper_v)
+        notes = band_sentences(record, prediction, model, measured=False)
+        return float(np.mean(inside)), [note for note in notes if "left-out pieces" in note]
+
+    inside, notes = told(data)
+    assert inside >= least
+    assert notes == []
+    far = replace(data, voltage_v=data.voltage_v + np.linspace(0.0, 0.1, len(data)))
+    inside, (note,) = told(far)
+    assert 0.0 < inside < least
+    pieces = len(model.bands.horizons[-1].by_piece)
+    assert (
+        f"any of the {pieces} left-out pieces of the training records ({100 * least:.1f} % or more)" in note
+    )
+
+
 def test_a_correction_that_diverges_is_told_with_the_time(model, data):
     unstable = SparseModel(
         "AESI I",
