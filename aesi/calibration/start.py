@@ -187,7 +187,7 @@ def discharge_branch(cell: Cell, data: Measurement) -> tuple[Measurement, tuple[
 
     A model without hysteresis has one open-circuit potential: that of the discharge, where the data show both.
     """
-    step_ah = moved_ah(data)
+    step_ah = charge_by_row_ah(data)
     flows = flowing(data.current_a)
     before = np.maximum.accumulate(np.where(flows, np.arange(len(data)), 0))
     charges = (step_ah < 0.0)[before]  # a rest belongs to what came before it
@@ -209,7 +209,7 @@ def discharge_branch(cell: Cell, data: Measurement) -> tuple[Measurement, tuple[
     return kept, (note,)
 
 
-def moved_ah(data: Measurement) -> Array:
+def charge_by_row_ah(data: Measurement) -> Array:
     """(n,) Ah, charge taken out since the row before, with the current of each row; 0 in the first."""
     return np.diff(data.time_s, prepend=data.time_s[0]) * data.current_a / SECONDS_PER_HOUR
 
