@@ -18,13 +18,13 @@ from aesi.data.current import CurrentProfile, read_current
 from aesi.data.reading import Reading, record_name
 from aesi.errors import DataError, InputError, SimulationError, not_written
 from aesi.numerics.typing import Array
-from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, initial_state, simulate
+from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, initial_state
 from aesi.physics.cell import Soh
 from aesi.physics.depletion import ran_out
 from aesi.physics.effects.self_heating import assumed, of_file
 from aesi.physics.model import case_k
 from aesi.physics.record_checks import check_belongs
-from aesi.physics.simulation import model_with
+from aesi.physics.simulation import OnDepletion, model_with
 from aesi.pipeline.notes import (
     aged_sentences,
     contradiction_sentences,
@@ -114,17 +114,9 @@ def simulate_file(
     profiled = _profiled_model(used, profile, current, asked, say)
     used = profiled.model
     with _with_start_doubt(profiled.start, say):
-        run = simulate(
-            used.cell,
-            profile.time_s,
-            profile.current_a,
-            profiled.start.soc,
-            used.effects,
-            profile.temperature_degc,
-            used.hold_of(profiled.record),
-            on_depletion="clip" if asked.run_on else "raise",
-            model=used.model,
-        )
+        on_depletion: OnDepletion = "clip" if asked.run_on else "raise"
+        hold = used.hold_of(profiled.record)
+        run = used.physics.run(profiled.record, profiled.start.soc, hold, on_depletion)
     degc, of_case = _case_degc(used, run, profile.temperature_degc, declared.cell)
     _write_run(out, run, degc)
     say([f"{profiled.record.name}: {words}" for words in of_case])
