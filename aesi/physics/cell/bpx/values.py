@@ -178,7 +178,7 @@ def _check_surface(cell: CellParameters, electrode: Electrode, side: str, window
 
 def _check_capacity(cell: CellParameters, where: str) -> None:
     """Check that each electrode holds about the nominal capacity."""
-    for label, electrode in (("negative", cell.negative), ("positive", cell.positive)):
+    for label, electrode in cell.electrodes.items():
         window_ah = cell.window_capacity_ah(electrode)
         if not 1.0 / OTHER_UNIT <= cell.nominal_capacity_ah / window_ah <= OTHER_UNIT:
             raise CellError(
