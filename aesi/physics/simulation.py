@@ -37,16 +37,14 @@ from aesi.physics.depletion import depletion_sentence
 from aesi.physics.effect import (
     ActiveEffect,
     Record,
-    Trace,
     as_cell_saw,
-    check_states,
     instruments_first,
     materials_first,
 )
 from aesi.physics.espm.plain import run_plain
 from aesi.physics.model import EspmModel, SolvedRows, of_record
 from aesi.physics.rest.open_circuit import OpenCircuit
-from aesi.physics.rest.voltage import freed_of_instruments, freed_of_series
+from aesi.physics.rest.voltage import as_read, freed_of_instruments, freed_of_series, with_effects_in_series
 from aesi.records import Hold, Run
 from aesi.records.checked import check_row, check_times, numbers, of_columns
 
@@ -153,12 +151,13 @@ def simulate(
         )
     if on_depletion == "clip":
         series["depleted"] = _depleted(fault_at, len(taken.time_s))
-    voltage = _with_effects_in_series(changed, active, taken, rows[0], series, backward)[written]
+    voltage = with_effects_in_series(changed, active, taken, rows[0], series, backward)[written]
     series = {name: values[written] for name, values in series.items()}
     profile_arrays = {  # those of one dimension are positions
         name: values[written] if values.ndim == 2 else values for name, values in profile_arrays.items()
     }
-    voltage = _as_read(changed, active, record.beside_voltage(backward), voltage, series, backward)
+    read = record.beside_voltage(backward)
+    voltage = _writable(as_read(changed, active, read, voltage, series, backward))
     _check_finite(time, voltage, written_at)
     return Run(time, current, voltage, series, profile_arrays, hold)
 
@@ -300,44 +299,6 @@ def _check_finite(time: Array, voltage: Array, fault_at: int) -> None:
         f"there is no solution at {stamp(time[lost])} s: the cell ran out at {stamp(time[fault_at])} s, and the "
         "current went on; end the record there, or check soc0, capacity and the sign of the current."
     )
-
-
-def _with_effects_in_series(
-    model: EspmModel,
-    effects: Sequence[ActiveEffect],
-    record: Record,
-    voltage: Array,
-    series: dict[str, Array],
-    backward: bool,
-) -> Array:
-    """(n,) V at the terminals: the model's voltage with all voltage effects added.
-
-    series : dict to which the states of these effects are added.
-    """
-    for active in effects:
-        if active.effect.on_voltage is not None:
-            trace = Trace(model, record.time_s, record.current_a, voltage, series, backward)
-            added = active.act(active.effect.on_voltage, trace)
-            check_states(active.effect, added, trace)
-            voltage = voltage + added.voltage_v
-            series.update(added.series)
-    return voltage
-
-
-def _as_read(
-    model: EspmModel,
-    effects: Sequence[ActiveEffect],
-    record: Record,
-    voltage: Array,
-    series: dict[str, Array],
-    backward: bool,
-) -> Array:
-    """(n,) V, the terminal voltage as the instrument records it.  record : one row per reading."""
-    for active in effects:
-        if active.effect.on_reading is not None:
-            trace = Trace(model, record.time_s, record.current_a, voltage, series, backward)
-            voltage = active.act(active.effect.on_reading, trace)
-    return _writable(voltage)
 
 
 def _checked_record(time_s: object, current_a: object) -> tuple[Array, Array]:
