@@ -283,8 +283,8 @@ def _check_window(cell: Cell, record: Measurement) -> None:
 
 
 def _check_capacity(cell: Cell, record: Measurement, slack: CapacitySlack | None = None) -> None:
-    """Raises DataError where the charge between two voltages requires another capacity than the cell has: on the
-    voltages, where they are of no such cell either, else on the capacity with what may explain it."""
+    """Raises DataError where the charge between two voltages fits no cell of this capacity. Where the voltages do not
+    fit either, the error is on them (`check_voltage`); else it names the capacity and what may explain it."""
     fault = _capacity_fault(cell, record, slack)
     if fault is None:
         return

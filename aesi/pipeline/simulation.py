@@ -141,8 +141,9 @@ def _write_run(out: Path, run: Run, case_degc: Array | None) -> None:
 def _case_degc(
     used: HybridModel, run: Run, measured_degc: Array | None, declared: Cell
 ) -> tuple[Array | None, tuple[str, ...]]:
-    """(n,) degC of the case in a run: as measured, else the model's, and a sentence where that does not tell it; None
-    also where it is the declared cell's all along."""
+    """((n,) degC, temperature of the case in a run, as measured or else the model's; sentences). The temperature is
+    None where it is that of the declared cell throughout, and where the model does not determine it, which a sentence
+    says."""
     winding_k = run.series["temperature_k"]
     if measured_degc is not None or np.all(winding_k == declared.initial_temperature_k):
         return measured_degc, ()

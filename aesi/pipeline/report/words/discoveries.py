@@ -269,7 +269,7 @@ def next_finding(discovery: Mapping[str, Any], titles: Mapping[str, str] | None 
 
 
 def hypothesis_title(row: Row, titles: Mapping[str, str]) -> str:
-    """An effect as it did best: by itself, or beside the others of its hypothesis, whose score it shares."""
+    """The title of an effect and, in its best hypothesis, of the effects beside it, with which it shares the score."""
     name, *others = (
         _title(titles, effect) for effect in dict.fromkeys((row["effect"], *row.get("hypothesis", ())))
     )

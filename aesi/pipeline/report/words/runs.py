@@ -27,8 +27,8 @@ def run_finding(view: RunView) -> str:
 
 
 def _refit_better(view: RunView) -> str:
-    """Clause, from '; ' on, that the physics with its own parameters refitted errs less, where the correction is not
-    on that; '' where it does not."""
+    """Clause, from '; ' on, that the physics with its own parameters refitted has a lower error than the chosen model;
+    '' where it has not, or where the correction was learnt on that physics."""
     ours, refitted = _free_run_mv(view, view.chosen), _refitted_mv(view)
     if ours is None or refitted is None or not _is_less(refitted, ours):
         return ""
@@ -47,8 +47,9 @@ def _refitted_mv(view: RunView) -> float | None:
 
 
 def _physics_mv(view: RunView, name: str, role: Role = "test") -> float | None:
-    """RMSE of the physics as declared, or of that which is corrected, in free run, mV. Of one that is not among the
-    models of the experiment it is told by what the chosen model takes off it; None where that is not known."""
+    """RMSE in free run, mV, of the physics as declared or of that on which the correction was learnt. Where that is no
+    model of the experiment, it follows from the reduction of the error by the chosen model; None where this is not
+    known either."""
     told = _free_run_mv(view, name, role)
     if told is not None:
         return told
@@ -65,8 +66,8 @@ def _before_mv(view: RunView, role: Role, key: str) -> float | None:
 
 
 def _not_applied(view: RunView) -> str:
-    """Clause, from '; ' on, on the test records that say nothing of the correction, since it has faded there, or on one
-    that is applied nowhere; '' where there is none."""
+    """Clause, from '; ' on, on test records so far outside the trained range that next to nothing of the correction is
+    applied, or on a correction that is applied nowhere; '' without either."""
     records = (view.model(view.chosen) or {}).get("test_records") or {}
     if any(map(is_applied_nowhere, records.values())):
         return f"; {NOWHERE}"
@@ -82,8 +83,8 @@ def _not_applied(view: RunView) -> str:
 
 
 def _ran_out(view: RunView) -> str:
-    """Clause, from '; ' on, on when a model ran out, from where on the errors of test records say no more than that,
-    and on the error before; '' where none did."""
+    """Clause, from '; ' on, on when a simulation of test records ran empty or full, after which its errors do not show
+    how accurate the model is, and on the errors before that; '' where none did."""
     model = view.model(view.chosen) or {}
     records = {
         name: figures["ran_out_s"]
