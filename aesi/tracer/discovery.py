@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path as FilePath
 from types import MappingProxyType
@@ -134,19 +134,19 @@ class Discovery:
     effects: Mapping[str, Effect]
     experiments: tuple[tuple[tuple[str, ...], str], ...]
     choice: ModelChoice
-    not_adopted: str | None = None
-    notes: tuple[str, ...] = ()
-    contradicted: bool = False
-    warnings: tuple[str, ...] = ()
-    other_temperature: tuple[str, ...] = ()
-    good: tuple[str, ...] = ()
-    held: tuple[ActiveEffect, ...] = ()
-    chosen: tuple[str, ...] = ()
-    written: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    own: Mapping[State, tuple[OwnParameter, ...]] = field(default_factory=dict)
-    tried: tuple[str, ...] = ()
-    seconds: float = 0.0
-    simulations: int = 0
+    not_adopted: str | None
+    notes: tuple[str, ...]
+    contradicted: bool
+    warnings: tuple[str, ...]
+    other_temperature: tuple[str, ...]
+    good: tuple[str, ...]
+    held: tuple[ActiveEffect, ...]
+    chosen: tuple[str, ...]
+    written: Mapping[str, Mapping[str, float]]
+    own: Mapping[State, tuple[OwnParameter, ...]]
+    tried: tuple[str, ...]
+    seconds: float
+    simulations: int
 
 
 def discover(
