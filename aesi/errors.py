@@ -89,8 +89,8 @@ def not_written(path: object, error: OSError) -> str:
 
 
 def nearest_name(name: str, known: Iterable[str]) -> str | None:
-    """The known name that a name begins, as `temp` does, also where it begins others in its turn; or else the one with
-    a similar spelling; the most similar of several, None of none."""
+    """The known name that is meant by an abbreviated or misspelt one: the one that begins with it, or the
+    shortest where they begin with one another; else the most similar spelling; None where nothing is near."""
     from difflib import get_close_matches
 
     every = list(known)

@@ -1,4 +1,7 @@
-"""Columns over time in a few words, and drawn, one panel a quantity, by plotly, which is imported where it is used."""
+"""Times, ranges and durations in a few words, and columns over time drawn by plotly, one panel a quantity.
+
+Plotly is imported where it is used.
+"""
 
 from __future__ import annotations
 

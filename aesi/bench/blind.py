@@ -9,7 +9,6 @@ exceeds its processor time, or that the tracer refuses, counts as a wrong answer
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -20,8 +19,8 @@ from aesi.bench.detectable import SEEN_NATS, Detectability, detectability
 from aesi.bench.limit import LOST, NO_ANSWER, NO_TIME, NoAnswer, Stopwatch, answer_of, timed
 from aesi.bench.scoring import (
     TO_THE_NOISE,
-    answer_words,
     calibration,
+    confusion,
     judge,
     median_of,
     neutral_value,
@@ -231,7 +230,7 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "calibration": calibration(answered),
         "processor_s_median": median_of(timed(rows), "processor_s"),
         "processor_s_most": max((r["processor_s"] for r in timed(rows)), default=None),
-        "confusion": _confusion(rows),
+        "confusion": confusion((row["label"], row) for row in rows),
     }
 
 
@@ -239,14 +238,6 @@ def _answered(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     """The rows with an answer. Rates of false names are over these: of the other rows it is unknown which effects the
     tracer would have named."""
     return [r for r in rows if r["verdict"] not in NO_ANSWER]
-
-
-def _confusion(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, int]]:
-    """Confusion matrix: label -> answer -> number of cases."""
-    counts: dict[str, Counter[str]] = {}
-    for row in rows:
-        counts.setdefault(row["label"], Counter())[answer_words(row)] += 1
-    return {label: dict(answers) for label, answers in counts.items()}
 
 
 def table(rows: Sequence[dict[str, Any]]) -> list[str]:

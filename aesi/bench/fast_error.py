@@ -54,16 +54,17 @@ def fast_controls() -> Iterator[RealCase]:
             yield case
 
 
-def fast_error(case: RealCase, cells: str = "experiments/cells") -> dict[str, Any]:
+def fast_error(case: RealCase) -> dict[str, Any]:
     """The row of one record.
 
-    cells : folder of the cell files.
     `rms_mv` is the RMS of the fast residual, `lasts_s` its correlation time, `resistance_off` the relative error of the
     ohmic resistance that explains it best (positive if the model's resistance is too low), and `sds` the fitted size of
     each effect over its standard deviation.  `failed` stands in their place if the model cannot be fitted.
     Raises DataError if the record or the cell file is not available.
     """
-    problem = inverse_problem(declared_cell(case.cell, cells), [taken(case.take)], case.soc0, HOLDOUT)
+    problem = inverse_problem(
+        declared_cell(case.cell, "experiments/cells"), [taken(case.take)], case.soc0, HOLDOUT
+    )
     problem = replace(problem, trust="measured")
     blocks, archive = blocks_of(problem), Archive(None, "")
     base, windows = base_of(problem, blocks, archive), blocks.windows

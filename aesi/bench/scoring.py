@@ -6,7 +6,8 @@ also by a look-alike in a small group. The lenient score also accepts the other 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections import Counter
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -175,6 +176,14 @@ def answer_words(row: Mapping[str, Any]) -> str:
     are none."""
     names = "+".join(row.get("effects", ()))
     return f"unknown: {names}" if names and row["verdict"] == "unknown" else names or str(row["verdict"])
+
+
+def confusion(rows: Iterable[tuple[str, Mapping[str, Any]]]) -> dict[str, dict[str, int]]:
+    """Confusion matrix: right answer -> given answer -> number of cases.  rows : each with its right answer."""
+    counts: dict[str, Counter[str]] = {}
+    for right, row in rows:
+        counts.setdefault(right, Counter())[answer_words(row)] += 1
+    return {right: dict(given) for right, given in counts.items()}
 
 
 def calibration(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:

@@ -177,7 +177,7 @@ def _courses() -> Iterator[FitParameter]:
 
 def _interfaces(cell: Cell) -> Iterator[FitParameter]:
     """Double layer and film of each electrode."""
-    for side, electrode in (("negative", cell.negative), ("positive", cell.positive)):
+    for side, electrode in cell.electrodes.items():
         typical = electrode.double_layer_f_m2 or DOUBLE_LAYER_F_M2
         yield FitParameter(f"{side}.double_layer", typical, LAYER_SD, "F/m2", LAYERS, True)
         yield FitParameter(f"{side}.film", 1.0, FILM_SD, "factor", FILMS, True)
@@ -240,7 +240,7 @@ def with_parameters(cell: Cell, values: Mapping[str, float], ages: bool = False)
     p1 = values.get("positive.full_stoichiometry", cell.positive.theta_min)
     n_ah, p_ah = (
         cell.electrode_capacity_ah(x) * values.get(f"{side}.capacity", 1.0)
-        for side, x in (("negative", cell.negative), ("positive", cell.positive))
+        for side, x in cell.electrodes.items()
     )
     size = (
         np.sqrt(values.get("negative.capacity", 1.0) * values.get("positive.capacity", 1.0)) if ages else 1.0

@@ -187,15 +187,15 @@ def discharge_branch(cell: Cell, data: Measurement) -> tuple[Measurement, tuple[
 
     A model without hysteresis has one open-circuit potential: that of the discharge, where the data show both.
     """
-    step_ah = np.diff(data.time_s, prepend=data.time_s[0]) * data.current_a / SECONDS_PER_HOUR
+    step_ah = charge_by_row_ah(data)
     flows = flowing(data.current_a)
     before = np.maximum.accumulate(np.where(flows, np.arange(len(data)), 0))
     charges = (step_ah < 0.0)[before]  # a rest belongs to what came before it
     runs = _run_numbers(charges)
-    moved_ah = np.bincount(runs, weights=step_ah)
-    long = moved_ah < -LONG_CHARGE * cell.capacity_ah
+    of_run_ah = np.bincount(runs, weights=step_ah)
+    long = of_run_ah < -LONG_CHARGE * cell.capacity_ah
     pieces = _run_numbers(long)
-    discharged_ah = np.bincount(pieces, weights=np.where(long, 0.0, moved_ah))
+    discharged_ah = np.bincount(pieces, weights=np.where(long, 0.0, of_run_ah))
     best = int(np.argmax(discharged_ah))
     if not long.any() or discharged_ah[best] < LONG_CHARGE * cell.capacity_ah:
         return data, ()
@@ -207,6 +207,11 @@ def discharge_branch(cell: Cell, data: Measurement) -> tuple[Measurement, tuple[
         "rest follows the other branch of the open-circuit voltage, and this model has no hysteresis."
     )
     return kept, (note,)
+
+
+def charge_by_row_ah(data: Measurement) -> Array:
+    """(n,) Ah, charge taken out since the row before, with the current of each row; 0 in the first."""
+    return np.diff(data.time_s, prepend=data.time_s[0]) * data.current_a / SECONDS_PER_HOUR
 
 
 def flowing(current_a: Array) -> BoolArray:

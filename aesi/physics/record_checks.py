@@ -283,8 +283,8 @@ def _check_window(cell: Cell, record: Measurement) -> None:
 
 
 def _check_capacity(cell: Cell, record: Measurement, slack: CapacitySlack | None = None) -> None:
-    """Raises DataError where the charge between two voltages requires another capacity than the cell has: on the
-    voltages, where they are of no such cell either, else on the capacity with what may explain it."""
+    """Raises DataError where the charge between two voltages fits no cell of this capacity. Where the voltages do not
+    fit either, the error is on them (`check_voltage`); else it names the capacity and what may explain it."""
     fault = _capacity_fault(cell, record, slack)
     if fault is None:
         return
@@ -329,16 +329,15 @@ def _capacity_fault(cell: Cell, record: Measurement, slack: CapacitySlack | None
     bounds, allowed = capacity_bounds(cell, record), slack or CapacitySlack()
     declared = _capacity_ah(cell)
     if bounds.low_rows is not None and bounds.low_ah > TOO_SMALL * allowed.more * declared:
-        return (
-            f"{_charge_clause(record, bounds.low_rows)}, as in a cell of {bounds.low_ah:.3g} Ah or more, but "
-            f"{cell.name} has {declared:.3g} Ah: {_cause_clause(bounds.low_ah / declared, record)}"
-        )
-    if bounds.high_rows is not None and allowed.less * declared > TOO_LARGE * bounds.high_ah:
-        return (
-            f"{_charge_clause(record, bounds.high_rows)}, as in a cell of {bounds.high_ah:.3g} Ah or less, but "
-            f"{cell.name} has {declared:.3g} Ah: {_cause_clause(bounds.high_ah / declared, record)}"
-        )
-    return None
+        rows, needed_ah, way = bounds.low_rows, bounds.low_ah, "more"
+    elif bounds.high_rows is not None and allowed.less * declared > TOO_LARGE * bounds.high_ah:
+        rows, needed_ah, way = bounds.high_rows, bounds.high_ah, "less"
+    else:
+        return None
+    return (
+        f"{_charge_clause(record, rows)}, as in a cell of {needed_ah:.3g} Ah or {way}, but {cell.name} has "
+        f"{declared:.3g} Ah: {_cause_clause(needed_ah / declared, record)}"
+    )
 
 
 def _charge_clause(record: Measurement, rows: tuple[int, int]) -> str:

@@ -20,7 +20,7 @@ import numpy as np
 
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError, NoNumberError, SimulationError
-from aesi.numerics.typing import Array, Numbers
+from aesi.numerics.typing import Array, IntArray, Numbers
 from aesi.over_time import stamp
 from aesi.physics.arguments import (
     FARTHEST_SOC,
@@ -37,16 +37,14 @@ from aesi.physics.depletion import depletion_sentence
 from aesi.physics.effect import (
     ActiveEffect,
     Record,
-    Trace,
     as_cell_saw,
-    check_states,
     instruments_first,
     materials_first,
 )
 from aesi.physics.espm.plain import run_plain
 from aesi.physics.model import EspmModel, SolvedRows, of_record
 from aesi.physics.rest.open_circuit import OpenCircuit
-from aesi.physics.rest.voltage import freed_of_instruments, freed_of_series
+from aesi.physics.rest.voltage import as_read, freed_of_instruments, freed_of_series, with_effects_in_series
 from aesi.records import Hold, Run
 from aesi.records.checked import check_row, check_times, numbers, of_columns
 
@@ -122,8 +120,8 @@ def simulate(
     soc0 = checked_soc(soc0, farthest=FARTHEST_SOC if on_depletion == "raise" else float_info.max)
     time, current = _checked_record(time_s, current_a)
     active = instruments_first(checked_effects(effects))
-    profile_arrays: dict[str, Array] | None = {} if profiles else None
-    solve = solver(model, profile_arrays)
+    profile_arrays: dict[str, Array] = {}
+    solve = solver(model, profile_arrays if profiles else None)
     changed = model_with(cell, active)
     record = as_cell_saw(Record(time, current, _kelvin(temperature_degc, time)), active)
     if unresolved_heat_w is not None:
@@ -136,36 +134,32 @@ def simulate(
         soc0 = same_rest(cell, changed.cell, soc0)
     backward = hold == "backward"
     # A clock or lag effect reads the voltage between the rows of the current, at rows of their own.
-    taken, reading_rows = (record, None) if record.read_s is None else record.with_readings(backward)
+    taken: Record
+    written: slice | IntArray  # rows of the solution at which the voltage was read
+    taken, written = (record, slice(None)) if record.read_s is None else record.with_readings(backward)
     if profiles or len(taken.time_s) > MOST_ROWS:
         rows, further, fault_at, fault = solved(solve, changed, taken, soc0, hold)
     else:
         cached = _cached_solution(model, changed, _KeyedRecord.of(taken), soc0, hold)
         rows, further, fault_at, fault = _copied(cached)
     series = _series(changed.cell, rows) | further
-    written_at = (
-        fault_at if reading_rows is None or fault_at < 0 else int(np.searchsorted(reading_rows, fault_at))
-    )
+    written_at = -1 if fault_at < 0 else int(np.searchsorted(np.arange(len(taken.time_s))[written], fault_at))
     if fault_at >= 0 and on_depletion == "raise":
-        kelvin = float(further["temperature_k"][fault_at])
-        own = slice(None) if reading_rows is None else reading_rows
+        kelvin, read_a = float(further["temperature_k"][fault_at]), taken.current_a[written]
         raise SimulationError(
-            depletion_sentence(changed, time, taken.current_a[own], kelvin, rows[:, own], written_at, fault)
+            depletion_sentence(changed, time, read_a, kelvin, rows[:, written], written_at, fault)
         )
     if on_depletion == "clip":
         series["depleted"] = _depleted(fault_at, len(taken.time_s))
-    voltage = _with_effects_in_series(changed, active, taken, rows[0], series, backward)
-    if reading_rows is not None:
-        voltage = voltage[reading_rows]
-        series = {name: values[reading_rows] for name, values in series.items()}
-        if profile_arrays:  # those of one dimension are positions
-            profile_arrays = {
-                name: values[reading_rows] if values.ndim == 2 else values
-                for name, values in profile_arrays.items()
-            }
-    voltage = _as_read(changed, active, record.beside_voltage(backward), voltage, series, backward)
+    voltage = with_effects_in_series(changed, active, taken, rows[0], series, backward)[written]
+    series = {name: values[written] for name, values in series.items()}
+    profile_arrays = {  # those of one dimension are positions
+        name: values[written] if values.ndim == 2 else values for name, values in profile_arrays.items()
+    }
+    read = record.beside_voltage(backward)
+    voltage = _writable(as_read(changed, active, read, voltage, series, backward))
     _check_finite(time, voltage, written_at)
-    return Run(time, current, voltage, series, profile_arrays or {}, hold)
+    return Run(time, current, voltage, series, profile_arrays, hold)
 
 
 def model_with(cell: Cell, effects: Iterable[ActiveEffect]) -> EspmModel:
@@ -305,44 +299,6 @@ def _check_finite(time: Array, voltage: Array, fault_at: int) -> None:
         f"there is no solution at {stamp(time[lost])} s: the cell ran out at {stamp(time[fault_at])} s, and the "
         "current went on; end the record there, or check soc0, capacity and the sign of the current."
     )
-
-
-def _with_effects_in_series(
-    model: EspmModel,
-    effects: Sequence[ActiveEffect],
-    record: Record,
-    voltage: Array,
-    series: dict[str, Array],
-    backward: bool,
-) -> Array:
-    """(n,) V at the terminals: the model's voltage with all voltage effects added.
-
-    series : dict to which the states of these effects are added.
-    """
-    for active in effects:
-        if active.effect.on_voltage is not None:
-            trace = Trace(model, record.time_s, record.current_a, voltage, series, backward)
-            added = active.act(active.effect.on_voltage, trace)
-            check_states(active.effect, added, trace)
-            voltage = voltage + added.voltage_v
-            series.update(added.series)
-    return voltage
-
-
-def _as_read(
-    model: EspmModel,
-    effects: Sequence[ActiveEffect],
-    record: Record,
-    voltage: Array,
-    series: dict[str, Array],
-    backward: bool,
-) -> Array:
-    """(n,) V, the terminal voltage as the instrument records it.  record : one row per reading."""
-    for active in effects:
-        if active.effect.on_reading is not None:
-            trace = Trace(model, record.time_s, record.current_a, voltage, series, backward)
-            voltage = active.act(active.effect.on_reading, trace)
-    return _writable(voltage)
 
 
 def _checked_record(time_s: object, current_a: object) -> tuple[Array, Array]:

@@ -37,8 +37,8 @@ sixth. A convention."""
 
 
 def together(notes: Iterable[str], names: Collection[str] = ()) -> tuple[str, ...]:
-    """`a: text`, `b: text` as `a, b: text`, in the order of the first of them; what is no mere name before the colon
-    says something by itself, and stays a line of its own.
+    """Notes `record: text` with the same text joined to `record, other: text`, in the order of the first of each. A
+    note with something else than names before the colon stays as it is; notes without a colon come last.
 
     names : of the records, by which one with a space (`25degC drive`) is known for a name.
     """
@@ -157,8 +157,8 @@ def contradiction_sentences(
 
 
 def soh_sentences(given: HybridModel, soh: Soh | None) -> tuple[str, ...]:
-    """A sentence on the state of health that a saved model was made at, since a share that is asked for is of that, and
-    one on the share that a day stands for.
+    """A sentence on the state of health at which a saved model was made, to which a requested share refers, and one on
+    the share at a requested day.
 
     given : what is declared, before it is taken at the state of health that is asked for.
     """
@@ -216,8 +216,8 @@ def aged_sentences(cell: Cell, record: Measurement, start: InitialState, soh: So
 
 
 def seen_names(declared: HybridModel, judging: Iterable[Measurement]) -> tuple[str, ...]:
-    """Names of the records, of those that judge, that the declared model was fitted to: by their content where it is
-    a saved model, by their names where it is the file of a cell."""
+    """Names of those of the judging records that the declared model was fitted to, recognised by content for a saved
+    model and by name for the file of a cell."""
     digests = {digest for _, digest in declared.fitted_to}
     of_file = dict(declared.cell.capacity_shares)
     return tuple(one.name for one in judging if one.file_digest in digests or one.name in of_file)

@@ -18,13 +18,13 @@ from aesi.data.current import CurrentProfile, read_current
 from aesi.data.reading import Reading, record_name
 from aesi.errors import DataError, InputError, SimulationError, not_written
 from aesi.numerics.typing import Array
-from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, initial_state, simulate
+from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, initial_state
 from aesi.physics.cell import Soh
 from aesi.physics.depletion import ran_out
 from aesi.physics.effects.self_heating import assumed, of_file
 from aesi.physics.model import case_k
 from aesi.physics.record_checks import check_belongs
-from aesi.physics.simulation import model_with
+from aesi.physics.simulation import OnDepletion, model_with
 from aesi.pipeline.notes import (
     aged_sentences,
     contradiction_sentences,
@@ -114,17 +114,9 @@ def simulate_file(
     profiled = _profiled_model(used, profile, current, asked, say)
     used = profiled.model
     with _with_start_doubt(profiled.start, say):
-        run = simulate(
-            used.cell,
-            profile.time_s,
-            profile.current_a,
-            profiled.start.soc,
-            used.effects,
-            profile.temperature_degc,
-            used.hold_of(profiled.record),
-            on_depletion="clip" if asked.run_on else "raise",
-            model=used.model,
-        )
+        on_depletion: OnDepletion = "clip" if asked.run_on else "raise"
+        hold = used.hold_of(profiled.record)
+        run = used.physics.run(profiled.record, profiled.start.soc, hold, on_depletion)
     degc, of_case = _case_degc(used, run, profile.temperature_degc, declared.cell)
     _write_run(out, run, degc)
     say([f"{profiled.record.name}: {words}" for words in of_case])
@@ -149,8 +141,9 @@ def _write_run(out: Path, run: Run, case_degc: Array | None) -> None:
 def _case_degc(
     used: HybridModel, run: Run, measured_degc: Array | None, declared: Cell
 ) -> tuple[Array | None, tuple[str, ...]]:
-    """(n,) degC of the case in a run: as measured, else the model's, and a sentence where that does not tell it; None
-    also where it is the declared cell's all along."""
+    """((n,) degC, temperature of the case in a run, as measured or else the model's; sentences). The temperature is
+    None where it is that of the declared cell throughout, and where the model does not determine it, which a sentence
+    says."""
     winding_k = run.series["temperature_k"]
     if measured_degc is not None or np.all(winding_k == declared.initial_temperature_k):
         return measured_degc, ()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path as FilePath
 from types import MappingProxyType
@@ -134,19 +134,19 @@ class Discovery:
     effects: Mapping[str, Effect]
     experiments: tuple[tuple[tuple[str, ...], str], ...]
     choice: ModelChoice
-    not_adopted: str | None = None
-    notes: tuple[str, ...] = ()
-    contradicted: bool = False
-    warnings: tuple[str, ...] = ()
-    other_temperature: tuple[str, ...] = ()
-    good: tuple[str, ...] = ()
-    held: tuple[ActiveEffect, ...] = ()
-    chosen: tuple[str, ...] = ()
-    written: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    own: Mapping[State, tuple[OwnParameter, ...]] = field(default_factory=dict)
-    tried: tuple[str, ...] = ()
-    seconds: float = 0.0
-    simulations: int = 0
+    not_adopted: str | None
+    notes: tuple[str, ...]
+    contradicted: bool
+    warnings: tuple[str, ...]
+    other_temperature: tuple[str, ...]
+    good: tuple[str, ...]
+    held: tuple[ActiveEffect, ...]
+    chosen: tuple[str, ...]
+    written: Mapping[str, Mapping[str, float]]
+    own: Mapping[State, tuple[OwnParameter, ...]]
+    tried: tuple[str, ...]
+    seconds: float
+    simulations: int
 
 
 def discover(
@@ -225,8 +225,8 @@ def _check_case(problem: InverseProblem, tested: Sequence[PreparedRecord]) -> No
 def _hold_of_test(
     test: Measurement, fitted: Iterable[Measurement], inferred: Iterable[InferredHold]
 ) -> InferredHold | None:
-    """The hold of a test record that declares none, as a logger wrote the fitted ones: the one that was inferred of all
-    fitted records of which it is known; None where that is not one."""
+    """The hold of a test record that declares none: that of the fitted records, since one logger wrote them all. It has
+    to be inferred of at least one of them and declared otherwise by none; else None."""
     holds = {one.hold for one in inferred}
     if test.hold is not None or len(holds) != 1 or holds | {one.hold for one in fitted} - {None} != holds:
         return None
@@ -347,8 +347,8 @@ class _Search:
 
 
 def _with_heat(search: _Search, given: Sequence[ActiveEffect]) -> _Searched:
-    """The search of the declared model; of one that warms itself by its file, where that is asked for by
-    `heat_of_file` and the data do not speak against it."""
+    """The search of the declared model or, where `heat_of_file` gives a heat and the data do not speak against it, of
+    the declared model with that heat."""
     cold = search.of(given)
     heat = heat_of_file(cold.evidence)
     if heat is None:

@@ -159,6 +159,13 @@ def _commands(group: Any, prefix: str) -> list[tuple[str, Any]]:
     return found
 
 
+def opening() -> str:
+    """The questions, terms and first picture of README.md, which begin the first page of the site as well."""
+    return (
+        _from_root("README.md").split("<!-- opening -->")[1].split("<!-- end of the opening -->")[0].strip()
+    )
+
+
 def contributing() -> str:
     """CONTRIBUTING.md of the repository, with its links as the site has them."""
     return _from_root("CONTRIBUTING.md")
@@ -185,6 +192,7 @@ GENERATORS: dict[str, Callable[[], str]] = {
     "bands in short": bands,
     "experiment": experiment,
     "command line": command_line,
+    "opening": opening,
     "contributing": contributing,
     "changelog": changelog,
 }

@@ -89,7 +89,7 @@ def judged_once(
     case: Any,
     judge: Callable[[Any], CaseRow],
     keep: str | None,
-    files: Callable[[Any], Iterable[Path]] = lambda case: (),
+    files: Callable[[Any], Iterable[Path]],
 ) -> CaseRow:
     """The row of a case: the one in the folder `keep`, if it is of the same program, case, arguments and files, else a
     new one, which is then kept there.

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
+from aesi.advice import KEYS
 from aesi.constants import LARGEST_SEED, MILLI
 from aesi.errors import InputError
 from aesi.pipeline.written import calibration_files, discovery_files, discovery_marks
@@ -19,22 +20,17 @@ KEYS_OF_DISCOVERY = {
     "data": "discover.fit",
     "test": "discover.test",
     "good": "discover.good",
-    "soc0": "cell.soc0",
-    "soh": "cell.soh",
     "holdout": "discover.holdout",
     "max_effects": "discover.max_effects",
     "seed": "seed",
     "effect_file": "cell.effect_files",
     "hold": "discover.hold",
     "model": "cell.model",
-    "column": "data.columns",
-    "unit": "data.units",
-    "sign": "data.sign",
     "state": "data.columns",
-    "state_word": "data.state_words",
-    "from_s": "data.from_s",
-    "to_s": "data.to_s",
-    "duplicates": "data.duplicates",
+    **{
+        name: KEYS[f"--{name.replace('_', '-')}"]
+        for name in ("soc0", "soh", "column", "unit", "sign", "state_word", "from_s", "to_s", "duplicates")
+    },
 }
 """Argument of `aesi discover` -> the key of an experiment file with the same meaning. Others have no such key."""
 

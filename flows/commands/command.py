@@ -68,9 +68,9 @@ class Command(TyperCommand):
             raise InputError(_sentence(option, faults[0])) from None
 
     def _unknown(self, option: str, command: str) -> str:
-        """A sentence on an option that there is not: the nearest one, where the name by which another command takes a
-        record stands for this one's, and that of a quantity, which many write as an option, for the column that
-        `--column` names.  Names are compared without their dashes, which would make all of them alike."""
+        """A sentence on an unknown option, with the nearest known one. A name by which other commands take records
+        leads to this command's own, and the name of a quantity, such as time_s, to `--column`.  Names are compared
+        without their dashes, which would make all of them alike."""
         named = {known.lstrip("-"): known for parameter in self.params for known in parameter.opts}
         instead = {name: known if known != name else f"{name} without --" for name, known in named.items()}
         instead |= {other: named[one] for one in OF_RECORDS if one in named for other in OF_RECORDS}

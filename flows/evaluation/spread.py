@@ -15,13 +15,12 @@ R = TypeVar("R")
 
 
 def in_processes(
-    function: Callable[[T], R], items: Sequence[T], workers: int, lost: Callable[[T], R] | None = None
+    function: Callable[[T], R], items: Sequence[T], workers: int, lost: Callable[[T], R]
 ) -> Iterator[R]:
     """Results by processes that start anew; `function` is one that they can import, or a partial of one.
 
     What has not begun is given up where the caller stops asking.
-    lost : what an item comes to whose process the system ended, as it does where memory runs out; the others go on.
-    Without it that raises BrokenProcessPool.
+    lost : result of an item whose process the system ended, as it does where memory runs out; the others go on.
     """
     from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
     from concurrent.futures.process import BrokenProcessPool
@@ -53,8 +52,6 @@ def in_processes(
                 try:
                     results.append(future.result())
                 except BrokenProcessPool:
-                    if lost is None:
-                        raise
                     results.append(lost(item))
                     pool = new_pool()
                 submit_next(pool)
@@ -69,12 +66,12 @@ def on_dask(
     items: Sequence[T],
     workers: int,
     address: str | None,
-    lost: Callable[[T], R] | None = None,
+    lost: Callable[[T], R],
 ) -> Iterator[R]:
     """Results by the scheduler at an address, or by a cluster of `workers` processes here.
 
-    lost : as above, for an item that Dask gives up because worker after worker ended over it; without it that raises
-    KilledWorker. Raises as `connect` does, and SchedulerLost.
+    lost : as above, for an item that Dask gives up because worker after worker ended over it.
+    Raises as `connect` does, and SchedulerLost.
     """
     client, cluster = connect(address, workers)
     from distributed import KilledWorker, as_completed
@@ -87,8 +84,6 @@ def on_dask(
                 try:
                     result = future.result()
                 except KilledWorker:
-                    if lost is None:
-                        raise
                     result = lost(given[future.key])
                 yield result
     finally:

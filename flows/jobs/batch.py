@@ -120,7 +120,7 @@ def _tracked(
 
 
 def _identity(job: Job, settings: Settings) -> str:
-    """What tells a job from others; of one that cannot be done, why, which its row says, too."""
+    """Key that tells a job from others; for a job that cannot be done, the reason, which its row also gives."""
     try:
         return job.unusable or job.key(settings.key)
     except OSError as error:

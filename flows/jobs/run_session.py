@@ -54,8 +54,9 @@ def working_on(request: RunRequest, store: Store, console: Console) -> Iterator[
 
 @contextmanager
 def tracked_job(subject: Subject, title: str, console: Console) -> Iterator[Tracker | None]:
-    """A tracked run of a job that is no experiment, closed as what it becomes; None, which is said, where the store is
-    away or nothing can be written in the workspace: the job's results lie elsewhere.
+    """A tracked run of a job that is no experiment, closed with the status that the job ends with. None, with a
+    message, where the store does not answer or nothing can be written in the workspace: the job goes on, since its
+    results lie elsewhere.
 
     title : what the run is called.  Runs that were killed before are closed first, and what they could not deliver is
     delivered.

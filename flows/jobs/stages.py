@@ -33,8 +33,9 @@ class Stages(Protocol):
     """Runs the stages of a job, and shows what comes of them where there is somebody to show it."""
 
     def __call__(self, name: str, work: Callable[[], T], retries: int = 0) -> T:
-        """One stage: its name, a function of nothing, and how often it may be tried again where a disk or a network
-        failed (OSError); bad input is not, nor data that cannot be fetched, which a fallback may stand in for."""
+        """Run one stage, a function without arguments.  retries : how often it is tried again after a failure of a disk
+        or a network (OSError); bad input and data that cannot be fetched, for which a fallback may stand in, are not.
+        """
         ...
 
     def progress(self, name: str, done: int, total: int) -> None:

@@ -99,9 +99,10 @@ def _metrics(run: Any) -> dict[str, float]:
 
 
 def _judged_on(params: Mapping[str, str]) -> str:
-    """What tells the test rows of a run from another's: the step to which they were averaged; the digests of the
-    records, which are tracked behind those of the other roles; of a record that is cut, of the virtual cell's, and
-    where so many are named that the list is not tracked whole, all digests and which part tests."""
+    """Key of the rows that a run was tested on, equal for runs that were tested on the same rows. It holds the time
+    step of the averages and the digests of the test records, which are tracked after those of the other roles. Where
+    one record is cut into parts, where the cell is virtual, and where the list of records was too long to be tracked
+    whole, it holds all digests and the choice of the test part."""
     dt_s, asked, read = (
         params.get("data.dt_s"),
         params.get("data.test") or "[]",

@@ -55,7 +55,7 @@ class TermSampler(NSGAIISampler):
     """NSGA-II that knows how to cross masks. `warm_start` genomes are the first candidates."""
 
     def __init__(
-        self, space: GenomeSpace, seed: int, population_size: int = 20, warm_start: Sequence[Genome] = ()
+        self, space: GenomeSpace, seed: int, population_size: int, warm_start: Sequence[Genome]
     ) -> None:
         super().__init__(population_size=population_size, seed=seed)
         self.size = population_size

@@ -53,8 +53,8 @@ PAGE = 1000
 
 
 def beginning(runs: Sequence[Any], begin: str) -> list[Any]:
-    """Those of the runs whose id begins so, or that wrote the folder of that name; none where that is too short to
-    stand for an id."""
+    """Those of the runs whose id begins with `begin`, which may also be the folder that a run wrote; none where it is
+    shorter than `SHORTEST_ID`."""
     begin = Path(begin).name
     return [run for run in runs if run.info.run_id.startswith(begin)] if len(begin) >= SHORTEST_ID else []
 

@@ -103,10 +103,6 @@ class Page:
                 "Input.dispatchMouseEvent", type=f"mouse{kind}", button="left", clickCount=1, **position
             )
 
-    def screenshot(self, path):
-        picture = self.call("Page.captureScreenshot", captureBeyondViewport=True)
-        Path(path).write_bytes(base64.b64decode(picture["data"]))
-
     def pdf(self):
         return base64.b64decode(self.call("Page.printToPDF", printBackground=False)["data"])
 

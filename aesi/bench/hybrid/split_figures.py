@@ -153,7 +153,7 @@ def table(rows: Sequence[CaseRow]) -> list[str]:
     ran = [row for row in rows if row.get("verdict") != NOT_RUN]
     lines, each = list(HEAD), list(EACH)
     for cell, title in TITLES.items():
-        by_split = list(_grouped_by("split", [row for row in ran if row["cell"] == cell]))
+        by_split = list(_by_split([row for row in ran if row["cell"] == cell]))
         splits = [_over_seeds(runs) for runs in by_split if not all("error" in run for run in runs)]
         lost = [runs for runs in by_split if all("error" in run for run in runs)]
         lines += _cell_rows(title, splits, lost)
@@ -165,9 +165,9 @@ def table(rows: Sequence[CaseRow]) -> list[str]:
     return [*lines, "", *failed, '??? note "Each split"', "", *(f"    {line}" for line in each)]
 
 
-def _grouped_by(key: str, rows: Sequence[CaseRow]) -> Iterator[list[CaseRow]]:
-    for name in dict.fromkeys(row[key] for row in rows):
-        yield [row for row in rows if row[key] == name]
+def _by_split(rows: Sequence[CaseRow]) -> Iterator[list[CaseRow]]:
+    for name in dict.fromkeys(row["split"] for row in rows):
+        yield [row for row in rows if row["split"] == name]
 
 
 def _over_seeds(rows: Sequence[CaseRow]) -> dict[str, Any]:

@@ -179,8 +179,9 @@ def _scored_row(
 def _shift_k(
     found: Discovery, declared: Cell, data: Measurement, soc0: float | None, measured_degc: Array
 ) -> float:
-    """K, true temperature of the surroundings minus the declared one: the mean of what was measured, without what the
-    cell's own heat adds to its case where the answer has such heat: that of the declared cell at the temperature found.
+    """K, true temperature of the surroundings minus the declared one: that of the case in the mean, less what the
+    cell's own heat adds to it where the answer has self-heating (simulated for the declared cell at the temperature
+    found).
 
     data, soc0 : record and initial state of charge as the tracer had them.  measured_degc : (n,) degC, of the case.
     """

@@ -6,14 +6,13 @@ same of cases in which no effect may be named.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
 from aesi.bench import CaseRow
 from aesi.bench.detectable import SEEN_NATS
 from aesi.bench.limit import NO_ANSWER, NOT_RUN, timed
-from aesi.bench.scoring import answer_words, median_of, rate
+from aesi.bench.scoring import confusion, median_of, rate
 from aesi.tracer.decide.model_to_write import AS_GOOD
 from aesi.tracer.report.outcome import STATES
 
@@ -41,7 +40,7 @@ def summary(rows: Sequence[CaseRow]) -> CaseRow:
         "not_run": [r["case"] for r in rows if r["verdict"] == NOT_RUN],
         **_rates(ran),
         "reported": _rates([r for r in ran if not r["development"]]),
-        "confusion": _confusion(ran),
+        "confusion": confusion((" or ".join(r["answer"]) or "no name", r) for r in ran),
     }
 
 
@@ -50,7 +49,6 @@ def _rates(rows: Sequence[CaseRow]) -> CaseRow:
         return [r for r in rows if r["group"] == group]
 
     faults = [r for r in of("fault") if r["answer"]]
-    sized = [r for r in [*faults, *of("physics")] if r.get("size_error") is not None]
     return {
         "ran": len(rows),
         "no_answer": sum(r["verdict"] in NO_ANSWER for r in rows),
@@ -62,8 +60,7 @@ def _rates(rows: Sequence[CaseRow]) -> CaseRow:
         **rate(detectable(faults), "named").named("fault_seen_named"),
         "fault_named_by_kind": _by_kind(faults),
         **rate(of("physics"), "named").named("physics_named"),
-        "size_error_median": median_of(sized, "size_error"),
-        **rate([r for r in sized if r.get("size_covered") is not None], "size_covered").named("size_covered"),
+        **_sizes([*faults, *of("physics")], ""),
         **_with_good_records(of("fault_beside"), of("control_beside")),
         **_initial_state([r for r in of("fault") if r["put_in"].startswith(SOC0)]),
         **_controls(of("control"), rows),
@@ -103,18 +100,24 @@ def _with_good_records(rows: Sequence[CaseRow], controls: Sequence[CaseRow]) -> 
     """Figures of the cases with known-good records: of those with a fault or contact resistance (`rows`), and of the
     controls without."""
     faults = [r for r in rows if r["answer"]]
-    sized = [r for r in faults if r.get("size_error") is not None]
     silent = [r for r in rows if not r["answer"]]
     return {
         **rate(faults, "named").named("beside_named"),
         **rate(detectable(faults), "named").named("beside_seen_named"),
         "beside_named_by_kind": _by_kind(faults),
-        "beside_size_error_median": median_of(sized, "size_error"),
-        **rate([r for r in sized if r.get("size_covered") is not None], "size_covered").named(
-            "beside_size_covered"
-        ),
+        **_sizes(faults, "beside_"),
         **rate(silent, "named").named("beside_wrong_soc0_silent"),
         **rate(controls, "named").named("beside_control_silent"),
+    }
+
+
+def _sizes(rows: Sequence[CaseRow], prefix: str) -> CaseRow:
+    """Figures of the estimated sizes, over the cases that have one.  prefix : of their keys."""
+    sized = [r for r in rows if r.get("size_error") is not None]
+    covered = [r for r in sized if r.get("size_covered") is not None]
+    return {
+        f"{prefix}size_error_median": median_of(sized, "size_error"),
+        **rate(covered, "size_covered").named(f"{prefix}size_covered"),
     }
 
 
@@ -181,12 +184,3 @@ def _is_worse(row: CaseRow) -> bool:
     and the recalibrated one."""
     better = min(row["before_test_mv"], row["recalibrated_test_mv"])
     return not row["after_test_mv"] <= AS_GOOD * better
-
-
-def _confusion(rows: Sequence[CaseRow]) -> dict[str, dict[str, int]]:
-    """Confusion matrix: right answer -> given answer -> number of cases."""
-    out: dict[str, Counter[str]] = {}
-    for row in rows:
-        asked = " or ".join(row["answer"]) or "no name"
-        out.setdefault(asked, Counter())[answer_words(row)] += 1
-    return {asked: dict(counts) for asked, counts in out.items()}

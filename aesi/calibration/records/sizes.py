@@ -43,8 +43,8 @@ AGED_SDS = 2.0
 
 
 def capacity_test_ah(cell: Cell, record: Measurement) -> float | None:
-    """Charge of a full discharge between the cut-offs of a cell that tells the capacity of the record's cell, Ah; None
-    where the record holds none, was loaded faster than `FASTEST_C`, or was or may have been too cold for that."""
+    """Charge of a full discharge between the cut-offs of a cell, Ah, as the capacity of the record's cell; None where
+    the record has no full discharge, or one that was faster than `FASTEST_C` or may have been too cold to show it."""
     charge_ah = full_discharge_ah(cell, record)
     return charge_ah if charge_ah is not None and _tells_capacity(record, charge_ah) else None
 
@@ -62,8 +62,8 @@ class ChargedShare:
 
 
 def charged_share(cell: Cell, record: Measurement, start: InitialState) -> ChargedShare | None:
-    """The capacity that a record shows which ends with a charge to full; None for other records, and for one that
-    starts under a load, or too soon after it: its state is read from the minutes of the charge then, which are on
+    """Capacity of the cell by a record that ends with a charge to full; None for other records, and for one that starts
+    under a load or too soon after one. Its state is then read from the first minutes of the charge, which are on
     another branch of the open-circuit voltage than the file. Of 35 charges of a Panasonic NCR18650PF the 29 that begin
     at rest show the share of their day within 0.015 RMS, the six others within 0.035.
 

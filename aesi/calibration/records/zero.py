@@ -26,10 +26,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aesi.calibration.start import LONG_CHARGE
+from aesi.calibration.start import LONG_CHARGE, charge_by_row_ah
 from aesi.constants import MILLI, SECONDS_PER_HOUR
 from aesi.errors import DataError
-from aesi.numerics.typing import Array, BoolArray
+from aesi.numerics.typing import BoolArray
 from aesi.physics.cell import Cell
 from aesi.physics.initial_state import initial_state
 from aesi.physics.rest.open_circuit import GOOD_READING_V
@@ -119,14 +119,9 @@ def zero_of(cell: Cell, records: Sequence[Measurement]) -> Zero:
 
 def _is_cycle(cell: Cell, data: Measurement) -> bool:
     """Whether a record takes much of a cell's charge and gives much back."""
-    moved_ah = _moved_ah(data)
-    each_way = min(moved_ah[moved_ah > 0.0].sum(), -moved_ah[moved_ah < 0.0].sum())
+    moved = charge_by_row_ah(data)
+    each_way = min(moved[moved > 0.0].sum(), -moved[moved < 0.0].sum())
     return bool(each_way >= LONG_CHARGE * cell.capacity_ah)
-
-
-def _moved_ah(data: Measurement) -> Array:
-    """(n,) Ah since the row before, I > 0 on discharge."""
-    return np.diff(data.time_s, prepend=data.time_s[0]) * data.current_a / SECONDS_PER_HOUR
 
 
 def _cycle_offset(cell: Cell, data: Measurement) -> tuple[float, float] | str:
@@ -155,4 +150,4 @@ def _cycle_offset(cell: Cell, data: Measurement) -> tuple[float, float] | str:
     flowed_h = float(np.diff(data.time_s, prepend=data.time_s[0])[flows].sum()) / SECONDS_PER_HOUR
     sd_ah = cell.capacity_ah * float(np.hypot(began.sd, ended.sd))
     gained_ah = cell.capacity_ah * (ended.by_voltage - began.by_voltage)
-    return (float(_moved_ah(data).sum()) + gained_ah) / flowed_h, sd_ah / flowed_h
+    return (float(charge_by_row_ah(data).sum()) + gained_ah) / flowed_h, sd_ah / flowed_h

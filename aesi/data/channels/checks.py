@@ -229,20 +229,24 @@ def check_ranges(columns: Columns, context: Context) -> None:
             f"{context.at('current_a', row)}: {current[row]:.6g} A is beyond any cell; "
             "check the row, give it in A, or declare the unit: --unit current_a=mA."
         )
-    temperature = columns.get("temperature_degc")
-    if temperature is not None:
-        absurd = (temperature < COLDEST_DEGC) | (temperature > WARMEST_DEGC)
-        if np.any(absurd):
-            row = int(np.argmax(absurd))
-            warm = temperature[row] > WARMEST_DEGC and context.unit.get("temperature_degc") != "K"
-            kelvin = " (in kelvin? --unit temperature_degc=K)" if warm else ""
-            stated = "temperature_degc" not in context.header
-            place = f"{context.file}: stated for every row" if stated else context.at("temperature_degc", row)
-            mend = "state another" if stated else "correct the column"
-            raise DataError(
-                f"{place}: {temperature[row]:.6g} degC is outside {COLDEST_DEGC:g} to {WARMEST_DEGC:g} degC{kelvin}; "
-                f"{mend} or leave it out: --column temperature_degc=."
-            )
+    if "temperature_degc" in columns:
+        _check_temperature(columns["temperature_degc"], context)
+
+
+def _check_temperature(temperature_degc: Array, context: Context) -> None:
+    absurd = (temperature_degc < COLDEST_DEGC) | (temperature_degc > WARMEST_DEGC)
+    if not np.any(absurd):
+        return
+    row = int(np.argmax(absurd))
+    warm = temperature_degc[row] > WARMEST_DEGC and context.unit.get("temperature_degc") != "K"
+    kelvin = " (in kelvin? --unit temperature_degc=K)" if warm else ""
+    stated = "temperature_degc" not in context.header
+    place = f"{context.file}: stated for every row" if stated else context.at("temperature_degc", row)
+    mend = "state another" if stated else "correct the column"
+    raise DataError(
+        f"{place}: {temperature_degc[row]:.6g} degC is outside {COLDEST_DEGC:g} to {WARMEST_DEGC:g} degC{kelvin}; "
+        f"{mend} or leave it out: --column temperature_degc=."
+    )
 
 
 def _leave_out_clause(time_s: Array, bad: BoolArray) -> str:

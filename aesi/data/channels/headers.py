@@ -57,10 +57,9 @@ def nearest(quantity: str, header: Sequence[str], doubtful: bool = False) -> str
 
 
 def likeliest(quantity: str, header: Sequence[str], doubtful: bool = False) -> str | None:
-    """The column to propose for the quantity: the nearest, or for the time one of dates where none else tells it, for
-    a temperature a lone T, and else the only one of an unknown name with its unit.  doubtful : as in `nearest`, of
-    which a unit alone is no sign.
-    """
+    """The column to propose for the quantity, or None: the nearest name; else a column of dates for the time; else a
+    column T for the time or the temperature; else the only column with a unit of the quantity and a name that says
+    nothing.  doubtful : as in `nearest`; a unit alone then does not count."""
     found = nearest(quantity, [name for name in header if name != TEMPERATURE], doubtful)
     if found is None and quantity == "time_s":
         found = next((name for name in header if re.search(STAMP, plain(name))), None)

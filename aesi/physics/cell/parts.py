@@ -185,6 +185,11 @@ class CellParameters:
     unread: tuple[str, ...] = field(default=(), compare=False)
 
     @property
+    def electrodes(self) -> dict[str, Electrode]:
+        """ "negative" and "positive" -> the electrode."""
+        return {"negative": self.negative, "positive": self.positive}
+
+    @property
     def total_area_m2(self) -> float:
         """Area of all electrode pairs, m2."""
         return self.electrode_area_m2 * self.electrode_pairs

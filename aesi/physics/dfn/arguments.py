@@ -14,11 +14,11 @@ from aesi.physics.dfn.layout import Electrodes, Particles, Stack
 from aesi.physics.espm.tables import (
     conductivity_table,
     electrolyte_diffusion,
-    entropic_table,
+    entropic_tables,
     film_tables,
-    ocp_table,
+    ocp_tables,
     rate_tables,
-    solid_diffusion,
+    solid_diffusions,
 )
 from aesi.physics.model import NO_PLATING, EspmModel, activation_energies, heat_numbers
 
@@ -32,7 +32,7 @@ def porous_arguments(model: EspmModel) -> tuple[Particles, Stack, Electrodes]:
 def _particles(model: EspmModel) -> Particles:
     """Constants of the units, ordered by place, then by particle size."""
     sphere, layer = sphere_modes(model.solid_order), gauss_layer(model.electrode_points)
-    solids = [solid_diffusion(x.diffusivity) for x in (model.cell.negative, model.cell.positive)]
+    solids = solid_diffusions(model.cell)
     place, kind, scale, share, volume, exchange, reactive = [], [], [], [], [], [], []
     sides: list[int] = []
     rates: list[Array] = []
@@ -58,7 +58,6 @@ def _particles(model: EspmModel) -> Particles:
                 volume.append(part * ratio / of_volume)
                 exchange.append(area * FARADAY_C_MOL * electrode.rate_constant)
                 reactive.append(area)
-    longest = max(len(x.psi) for x in solids)
     return Particles(
         place=np.array(place, dtype=np.int64),
         kind=np.array(kind, dtype=np.int64),
@@ -70,8 +69,8 @@ def _particles(model: EspmModel) -> Particles:
         reactive=np.array(reactive),
         rates=np.array(rates),
         gains=np.array(sphere.gain[1:]),
-        psi=np.array([x.psi if len(x.psi) == longest else np.zeros(longest) for x in solids]),
-        strength=np.array([0.0 if x.linear else 1.0 / x.d0 for x in solids]),
+        psi=np.array([x.psi for x in solids]),
+        strength=np.array([x.strength for x in solids]),
         at=np.array(sphere.at),
         project=np.array(sphere.project),
     )
@@ -100,7 +99,7 @@ def _stack(model: EspmModel) -> Stack:
         to_nodes=np.array(stack.to_nodes),
         project=np.ascontiguousarray(stack.project.T),
         psi=diffusion.psi,
-        strength=0.0 if diffusion.linear else 1.0 / diffusion.d0,
+        strength=diffusion.strength,
         top=diffusion.top,
         c0=e.c0_mol_m3,
         supply=(1.0 - e.transference) / FARADAY_C_MOL,
@@ -139,8 +138,8 @@ def _electrodes(model: EspmModel) -> Electrodes:
         before=np.array(layer.before),
         after=np.array(layer.after),
         solid=np.array([layer.solid * x.thickness_m / x.conductivity_s_m for x in (n, p)]),
-        ocp=np.array([ocp_table(n.ocp, "negative"), ocp_table(p.ocp, "positive")]),
-        entropic=np.array([entropic_table(n, "negative"), entropic_table(p, "positive")]),
+        ocp=ocp_tables(cell),
+        entropic=entropic_tables(cell),
         rate=rate_tables(cell),
         film=film_tables(cell),
         alpha=np.array([x.transfer_coefficient for _, x in sides]),

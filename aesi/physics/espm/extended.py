@@ -29,11 +29,11 @@ from aesi.physics.espm.plain import stack_of
 from aesi.physics.espm.tables import (
     conductivity_table,
     electrolyte_diffusion,
-    entropic_table,
+    entropic_tables,
     film_tables,
-    ocp_table,
+    ocp_tables,
     rate_tables,
-    solid_diffusion,
+    solid_diffusions,
 )
 from aesi.physics.model import NO_PLATING, EspmModel, activation_energies, heat_numbers
 from aesi.records import Hold
@@ -118,7 +118,7 @@ def _salt(model: EspmModel) -> Salt:
         gauss=stack.gauss,
         mean=stack.mean,
         psi=diffusion.psi,
-        strength=0.0 if diffusion.linear else 1.0 / diffusion.d0,
+        strength=diffusion.strength,
         top=diffusion.top,
         c0=e.c0_mol_m3,
         kappa=conductivity_table(e.conductivity, e.c0_mol_m3),
@@ -128,7 +128,7 @@ def _salt(model: EspmModel) -> Salt:
 
 def particle_units(model: EspmModel) -> Units:
     """Constants of the particles, ordered by region from each collector, then by size."""
-    solids = [solid_diffusion(x.diffusivity) for x in (model.cell.negative, model.cell.positive)]
+    solids = solid_diffusions(model.cell)
     sphere = sphere_modes(model.solid_order)
     units, rates, gains, lump, share, volume, exchange = [], [], [], [], [], [], []
     reactive = []
@@ -159,27 +159,21 @@ def particle_units(model: EspmModel) -> Units:
         volume=np.array(fractions),
         exchange=np.array(exchange),
         reactive=np.array(reactive),
-        psi=_padded([x.psi for x in solids]),
-        strength=np.array([0.0 if x.linear else 1.0 / x.d0 for x in solids]),
+        psi=np.array([x.psi for x in solids]),
+        strength=np.array([x.strength for x in solids]),
         at=sphere.at,
         project=sphere.project,
     )
 
 
-def _padded(tables: list[Array]) -> Array:
-    """Tables padded to the same length; the table of a linear diffusion is all zeros anyway."""
-    longest = max(len(t) for t in tables)
-    return np.array([t if len(t) == longest else np.zeros(longest) for t in tables])
-
-
 def _surfaces(model: EspmModel) -> Surfaces:
-    n, p = model.cell.negative, model.cell.positive
+    n = model.cell.negative
     plating = model.negative.plating or NO_PLATING
     area_n = n.area_per_volume_1_m * n.thickness_m / model.regions
     solid, salt = ohmic_drops(model)
     return Surfaces(
-        ocp=np.array([ocp_table(n.ocp, "negative"), ocp_table(p.ocp, "positive")]),
-        entropic=np.array([entropic_table(n, "negative"), entropic_table(p, "positive")]),
+        ocp=ocp_tables(model.cell),
+        entropic=entropic_tables(model.cell),
         rate=rate_tables(model.cell),
         film=film_tables(model.cell),
         alpha=np.array([model.negative.transfer_coefficient, model.positive.transfer_coefficient]),

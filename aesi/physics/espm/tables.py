@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
 from aesi.errors import CellError
 from aesi.numerics.typing import Array
-from aesi.physics.cell import Cell, Electrode
+from aesi.physics.cell import Cell
 from aesi.physics.cell.relations import (
     LEAST_TRANSPORT,
     OCP_POINTS,
@@ -50,9 +50,15 @@ def ocp_table(ocp: Relation, side: str, what: str = "open-circuit potential") ->
     return values
 
 
-def entropic_table(electrode: Electrode, side: str) -> Array:
-    """(OCP_POINTS,) V/K on [0, 1], as `ocp_table`."""
-    return ocp_table(electrode.entropic, side, "entropic change coefficient")
+def ocp_tables(cell: Cell) -> Array:
+    """(2, OCP_POINTS) V of the negative and the positive electrode, as `ocp_table`."""
+    return np.array([ocp_table(x.ocp, side) for side, x in cell.electrodes.items()])
+
+
+def entropic_tables(cell: Cell) -> Array:
+    """(2, OCP_POINTS) V/K of the negative and the positive electrode, as `ocp_table`."""
+    what = "entropic change coefficient"
+    return np.array([ocp_table(x.entropic, side, what) for side, x in cell.electrodes.items()])
 
 
 def rate_tables(cell: Cell) -> Array:
@@ -95,6 +101,11 @@ class DiffusionTable:
     top: float
     linear: bool
 
+    @property
+    def strength(self) -> float:
+        """Factor on psi beside rates that are of d0, s/m2; 0 where the diffusivity is constant."""
+        return 0.0 if self.linear else 1.0 / self.d0
+
 
 @lru_cache(maxsize=128)
 def electrolyte_diffusion(diffusivity: Relation, c0: float) -> DiffusionTable:
@@ -113,6 +124,13 @@ def solid_diffusion(diffusivity: Relation) -> DiffusionTable:
         return DiffusionTable(diffusivity.value, np.zeros(2), 1.0, True)
     half_full = "the diffusivity of an electrode is {:g} m2/s at a stoichiometry of 0.5"
     return _split(diffusivity, 0.5, 1.0, (0.0, 1.0), CORRECTED_MARGIN, half_full)
+
+
+def solid_diffusions(cell: Cell) -> list[DiffusionTable]:
+    """The splits of both electrodes with psi of one length, the negative one first."""
+    solids = [solid_diffusion(x.diffusivity) for x in cell.electrodes.values()]
+    longest = max(len(x.psi) for x in solids)
+    return [replace(x, psi=np.zeros(longest)) if x.linear else x for x in solids]
 
 
 def _split(

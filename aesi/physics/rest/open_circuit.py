@@ -107,8 +107,7 @@ class OpenCircuit:
         """That of the same windows with the potentials of another cell; itself where they are the same."""
         own = self.cell
         n, p = (
-            {"ocp": electrode.ocp, "entropic": electrode.entropic}
-            for electrode in (cell.negative, cell.positive)
+            {"ocp": electrode.ocp, "entropic": electrode.entropic} for electrode in cell.electrodes.values()
         )
         if all(
             getattr(own.negative, name) == n[name] and getattr(own.positive, name) == p[name] for name in n

@@ -1,13 +1,13 @@
-"""The voltage of a cell at rest: as read, without instrument faults, and without voltage effects in series."""
+"""Voltage with what effects in series add and instruments make of it; a first voltage freed of both."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from aesi.numerics.typing import Array
-from aesi.physics.effect import ActiveEffect, Trace
+from aesi.physics.effect import ActiveEffect, Record, Trace, check_states
 from aesi.physics.model import EspmModel
 from aesi.physics.rest.open_circuit import OpenCircuit
 
@@ -48,11 +48,7 @@ def freed_of_instruments(
     for _ in range(ROUNDS if faulty else 0):
         cell_v = freed_of_series(open_circuit, model, effects, terminal_v, current_a)
         _, states = _with_series(open_circuit, model, effects, cell_v, current_a)
-        read = np.array([terminal_v])
-        for active in effects:
-            if active.effect.on_reading is not None:
-                trace = Trace(model, np.zeros(1), np.array([current_a]), read, states)
-                read = active.act(active.effect.on_reading, trace)
+        read = as_read(model, effects, _first_row(current_a), np.array([terminal_v]), states)
         off_v = float(read[0]) - reading_v
         if abs(off_v) < ROUND_OFF_V:
             break
@@ -98,12 +94,48 @@ def _with_series(
         "soc": soc,
         "temperature_k": open_circuit.kelvin,
     }
-    row, voltage = np.zeros(1), np.array([cell_v])
     series = {name: np.array([value]) for name, value in states.items()}
+    voltage = with_effects_in_series(model, effects, _first_row(current_a), np.array([cell_v]), series)
+    return float(voltage[0]), series
+
+
+def _first_row(current_a: float) -> Record:
+    return Record(np.zeros(1), np.array([current_a]))
+
+
+def with_effects_in_series(
+    model: EspmModel,
+    effects: Sequence[ActiveEffect],
+    record: Record,
+    voltage: Array,
+    series: dict[str, Array],
+    backward: bool = False,
+) -> Array:
+    """(n,) V at the terminals: the model's voltage with all voltage effects added.
+
+    series : dict to which the states of these effects are added.  backward : as of a `Trace`.
+    """
     for active in effects:
         if active.effect.on_voltage is not None:
-            trace = Trace(model, row, np.array([current_a]), voltage, series)
+            trace = Trace(model, record.time_s, record.current_a, voltage, series, backward)
             added = active.act(active.effect.on_voltage, trace)
+            check_states(active.effect, added, trace)
             voltage = voltage + added.voltage_v
             series.update(added.series)
-    return float(voltage[0]), series
+    return voltage
+
+
+def as_read(
+    model: EspmModel,
+    effects: Sequence[ActiveEffect],
+    record: Record,
+    voltage: Array,
+    series: Mapping[str, Array],
+    backward: bool = False,
+) -> Array:
+    """(n,) V, the terminal voltage as the instrument records it.  record : one row per reading."""
+    for active in effects:
+        if active.effect.on_reading is not None:
+            trace = Trace(model, record.time_s, record.current_a, voltage, series, backward)
+            voltage = active.act(active.effect.on_reading, trace)
+    return voltage

@@ -255,23 +255,25 @@ class _Row:
             raise InputError(f"{self.place}: {column} = {text!r} is no number.")
         return value
 
-    def share(self, column: str) -> float | None:
-        """Raises InputError for what is no share."""
-        value = self.number(column)
+    @property
+    def soc0(self) -> float | None:
+        """Raises InputError for what is no state of charge."""
+        value = self.number("soc0")
         if value is not None and not 0.0 <= value <= 1.0:
             raise InputError(
-                f"{self.place}: {column} = {value:g}: a state of charge is a share of the capacity, from 0 (empty) to "
+                f"{self.place}: soc0 = {value:g}: a state of charge is a share of the capacity, from 0 (empty) to "
                 "1 (full); 90 % is 0.9."
             )
         return value
 
-    def health(self, column: str) -> Soh | None:
+    @property
+    def soh(self) -> Soh | None:
         """Raises InputError for what is no state of health."""
-        text = self.text(column)
+        text = self.text("soh")
         try:
             return read_soh(text) if text else None
         except CellError as error:
-            raise InputError(f"{self.place}: {column}: {error}") from None
+            raise InputError(f"{self.place}: soh: {error}") from None
 
 
 def _job(row: _Row, cell: Path | None, name: str) -> Job:
@@ -299,8 +301,8 @@ def _job(row: _Row, cell: Path | None, name: str) -> Job:
         own[0] if own else cell or Path(),
         data,
         row.files("test"),
-        row.share("soc0"),
+        row.soc0,
         specimen,
         at,
-        row.health("soh"),
+        row.soh,
     )

@@ -128,31 +128,22 @@ class ExperimentConfig(Section):
         return self
 
     @model_validator(mode="after")
-    def _cuts_named_records(self) -> ExperimentConfig:
+    def _tells_of_named_records(self) -> ExperimentConfig:
         wanted = self.discover.listed if self.discover is not None else ()
-        for where, data in (("", self.data), *([("fallback.", self.fallback.data)] if self.fallback else [])):
-            named = (*data.listed, *wanted)
-            for key, cuts in (("from_s", data.from_s), ("to_s", data.to_s)):
-                if unknown := [name for name in cuts if name not in named]:
-                    raise ValueError(
-                        f"{where}data.{key} cuts {unknown[0]}, which is no record here; there are: "
-                        f"{', '.join(dict.fromkeys(named)) or 'none'}"
-                    )
-        return self
-
-    @model_validator(mode="after")
-    def _begins_named_records(self) -> ExperimentConfig:
-        wanted = self.discover.listed if self.discover is not None else ()
-        places = [("", self.data, self.cell)]
+        parts: list[tuple[str, ExperimentConfig | FallbackConfig]] = [("", self)]
         if self.fallback is not None:
-            places.append(("fallback.", self.fallback.data, self.fallback.cell))
-        for where, data, cell in places:
-            named = (*data.listed, *wanted)
-            if unknown := [name for name in cell.soc0_of if name not in named]:
-                raise ValueError(
-                    f"{where}cell.soc0_of is about {unknown[0]}, which is no record here; there are: "
-                    f"{', '.join(dict.fromkeys(named)) or 'none'}"
-                )
+            parts.append(("fallback.", self.fallback))
+        for where, part in parts:
+            named = dict.fromkeys((*part.data.listed, *wanted))
+            for told, by_record in (
+                ("data.from_s cuts", part.data.from_s),
+                ("data.to_s cuts", part.data.to_s),
+                ("cell.soc0_of is about", part.cell.soc0_of),
+            ):
+                if unknown := [name for name in by_record if name not in named]:
+                    raise ValueError(
+                        f"{where}{told} {unknown[0]}, which is no record here; there are: {', '.join(named) or 'none'}"
+                    )
         return self
 
     @model_validator(mode="after")

@@ -18,7 +18,7 @@ from aesi.calibration.records.sizes import sizes_sentence
 from aesi.data.resample import DENSE, is_sparse, off_rows, to_even
 from aesi.data.virtual import DEFAULT_MIX
 from aesi.errors import ConfigError, DataAway, DataError, InputError, SimulationError
-from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, simulate
+from aesi.physics import ActiveEffect, Cell, InitialState, ModelName
 from aesi.physics.depletion import RUN_ON
 from aesi.physics.effects import activated
 from aesi.physics.record_checks import check_measured
@@ -52,7 +52,6 @@ from aesi.pipeline.notes import (
 )
 from aesi.pipeline.product.contents import contents
 from aesi.pipeline.product.declared import declared_model
-from aesi.pipeline.product.deviations import PhysicsVariant
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.product.one_step import LEAST_ROWS
 from aesi.records import ErrorSeries, Hold, LeftOutDrives, Measurement, Role, Split, hold_sentence
@@ -228,8 +227,9 @@ def _training(
 ) -> TrainingDrives:
     """The training drives. In the records, their rows are marked as those that fits may see."""
     drives = training_drives(config.data, records, roles)
-    declared = PhysicsVariant(given.cell, given.cell, given.effects, model=given.model)
-    opened = {name: records[name].with_resampling_change(declared, config.data.hold) for name, _ in drives}
+    opened = {
+        name: records[name].with_resampling_change(given.physics, config.data.hold) for name, _ in drives
+    }
     for name, rows in drives:
         opened[name].rows[rows] = True
     return TrainingDrives(config, {**records, **opened}, drives, roles)
@@ -446,16 +446,7 @@ def _raise_depletion(physics: PhysicsModels, name: str, record: FitRecord, hold:
     chosen = physics.chosen
     try:
         for data in (record.logged, record.measurement):
-            simulate(
-                chosen.cell,
-                data.time_s,
-                data.current_a,
-                physics.initial_soc(physics.corrected, record, hold)[0],
-                chosen.effects,
-                data.temperature_degc,
-                hold,
-                model=chosen.model,
-            )
+            chosen.run(data, physics.initial_soc(physics.corrected, record, hold)[0], hold, "raise")
     except SimulationError as error:
         raise SimulationError(
             f"{Path(name).name}: {str(error).removesuffix(RUN_ON)}, or end the file before that, or give it as a test, "

@@ -19,7 +19,7 @@ from aesi.physics.balance import same_rest
 from aesi.physics.cell.energies import FILM_ENERGY_SD, RATE_ENERGY_SD, SALT_EA, SOLID_EA
 from aesi.physics.cell.relations import scaled
 from aesi.physics.effects import CATALOGUE
-from aesi.physics.simulation import model_with
+from aesi.physics.simulation import OnDepletion, model_with
 from aesi.records import Hold, Measurement, Run
 
 STEP = 0.05
@@ -109,11 +109,8 @@ class PhysicsVariant:
         """`run` of a record that starts at soc0 in the windows of the declared cell, as `soc0` translates it."""
         return self.run(record, self.soc0(soc0), hold)
 
-    def run(self, record: Measurement, soc0: float, hold: Hold) -> Run:
-        """The record under this physics; where it runs empty, it is clipped (`simulate`) and `depleted` says so.
-
-        soc0 : in the windows of this cell.
-        """
+    def run(self, record: Measurement, soc0: float, hold: Hold, on_depletion: OnDepletion = "clip") -> Run:
+        """The record under this physics.  soc0 : in the windows of this cell.  on_depletion : see `simulate`."""
         return simulate(
             self.cell,
             record.time_s,
@@ -122,7 +119,7 @@ class PhysicsVariant:
             self.effects,
             record.temperature_degc,
             hold,
-            on_depletion="clip",
+            on_depletion=on_depletion,
             model=self.model,
         )
 

@@ -32,8 +32,8 @@ def error_series(measurement: Measurement, run: Run, dt_s: float) -> ErrorSeries
 
 
 def as_resampled(even: ErrorSeries, own: ErrorSeries) -> ErrorSeries:
-    """The error at even stamps as that of a record's own rows (`ErrorSeries.own`), brought there as the measured
-    voltage was: an average is compared with the average of what the model says, not with what it says at the stamp.
+    """The error at even stamps, with the model's voltage averaged from the record's own rows (`ErrorSeries.own`) just
+    as the measured one was, instead of simulated at the stamps.
 
     even : of the measurement on its stamps, by a simulation of these.  own : of the rows that it was made of, by a
     simulation of the same physics from the same start; its `physics` become those of the stamps.

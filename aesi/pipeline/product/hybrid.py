@@ -22,7 +22,7 @@ from aesi.errors import CellError, DataError, InputError, SimulationError, in_wo
 from aesi.numerics.typing import Array, BoolArray, Numbers
 from aesi.numerics.visited import Visited
 from aesi.over_time import stamp
-from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
+from aesi.physics import ActiveEffect, Cell, ModelName, initial_state
 from aesi.physics.arguments import check_cell, check_choice, check_measurement, checked_effects, checked_soc
 from aesi.physics.cell import Soh
 from aesi.physics.depletion import RUN_ON
@@ -326,16 +326,7 @@ class HybridModel:
 
     def _series(self, record: Measurement, soc0: float) -> ErrorSeries:
         try:
-            run = simulate(
-                self.cell,
-                record.time_s,
-                record.current_a,
-                soc0,
-                self.effects,
-                record.temperature_degc,
-                self.hold_of(record),
-                model=self.model,
-            )
+            run = self.physics.run(record, soc0, self.hold_of(record), "raise")
         except SimulationError as error:
             if not str(error).endswith(RUN_ON):
                 raise
@@ -359,8 +350,12 @@ class HybridModel:
     def start_worth_v(self, record: Measurement, soc0: float, soc0_sd: float, physics_v: Array) -> Array:
         """(n,) V, >= 0, change of the record's physics_v (n,) where it starts `soc0_sd` away from soc0; see
         `start_v`."""
-        physics = PhysicsVariant(self.cell, self.cell, self.effects, model=self.model)
-        return start_v(physics, record, soc0, soc0_sd, self.hold_of(record), physics_v)
+        return start_v(self.physics, record, soc0, soc0_sd, self.hold_of(record), physics_v)
+
+    @property
+    def physics(self) -> PhysicsVariant:
+        """The model without its correction."""
+        return PhysicsVariant(self.cell, self.cell, self.effects, model=self.model)
 
     def _free_run(self, series: ErrorSeries, error0_v: float | None) -> Prediction:
         n = len(series)

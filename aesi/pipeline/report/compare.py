@@ -391,10 +391,7 @@ def _terms(runs: Sequence[ComparedRun]) -> PageTable | None:
     having = [run for run in runs if run.comparison.get("terms")]
     if len(having) < 2:
         return None
-    count: dict[str, int] = {}
-    for run in having:
-        for term in run.comparison["terms"]:
-            count[term] = count.get(term, 0) + 1
+    count = Counter(term for run in having for term in run.comparison["terms"])
     differing = sorted(
         (term for term in count if count[term] < len(having)), key=lambda term: (-count[term], term)
     )

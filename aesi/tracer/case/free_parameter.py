@@ -168,45 +168,33 @@ def own_parameter(effect: str, name: str, p: Parameter, sd: float) -> FreeParame
     """A parameter of the declared model that may be off by `sd`, in its unit, or in its natural logarithm where it has
     a logarithmic scale.  effect : its owner."""
     centre = p.default if p.neutral is None else p.neutral
-    log = p.log and centre > 0
-    reach = FURTHEST_SDS * sd
-    low, high = (centre * np.exp(-reach), centre * np.exp(reach)) if log else (centre - reach, centre + reach)
-    low, high = max(float(low), p.bounds[0]), min(float(high), p.bounds[1])
-    return FreeParameter(
-        owner=effect, name=name, unit=p.unit, low=low, high=high, log=log, centre=centre, sd=sd, own=True
-    )
+    return _within_sds(effect, name, p.unit, centre, sd, p.log and centre > 0, p.bounds)
 
 
 def state_of_charge(record: int, soc0: float, sd: float) -> FreeParameter:
     """Initial state of charge of a record, known to `sd`."""
-    low, high = soc0 - FURTHEST_SDS * sd, soc0 + FURTHEST_SDS * sd
-    return FreeParameter(
-        owner=STATE_OF_CHARGE,
-        name=str(record),
-        unit="1",
-        low=low,
-        high=high,
-        log=False,
-        centre=soc0,
-        sd=sd,
-        own=True,
-    )
+    return _within_sds(STATE_OF_CHARGE, str(record), "1", soc0, sd, log=False)
 
 
 def capacity_share(record: int, sd: float) -> FreeParameter:
     """Share of the file's capacity that the cell had in a record, its logarithm known to `sd`."""
+    return _within_sds(CAPACITY_SHARE, str(record), "1", 1.0, sd, log=True)
+
+
+def _within_sds(
+    owner: str,
+    name: str,
+    unit: str,
+    centre: float,
+    sd: float,
+    log: bool,
+    bounds: tuple[float, float] = (-np.inf, np.inf),
+) -> FreeParameter:
+    """An own parameter from `FURTHEST_SDS` standard deviations below its centre to as many above, within its bounds."""
     reach = FURTHEST_SDS * sd
-    return FreeParameter(
-        owner=CAPACITY_SHARE,
-        name=str(record),
-        unit="1",
-        low=float(np.exp(-reach)),
-        high=float(np.exp(reach)),
-        log=True,
-        centre=1.0,
-        sd=sd,
-        own=True,
-    )
+    low, high = (centre * np.exp(-reach), centre * np.exp(reach)) if log else (centre - reach, centre + reach)
+    low, high = max(float(low), bounds[0]), min(float(high), bounds[1])
+    return FreeParameter(owner, name, unit, low, high, log, centre=centre, sd=sd, own=True)
 
 
 def values_of(

@@ -82,8 +82,8 @@ class _Searches:
     archive: Archive
     thresholds: Thresholds
     report: Report
+    shallower: Mapping[Trust, Path]
     paths: dict[Trust, Path] = field(default_factory=dict)
-    shallower: Mapping[Trust, Path] = field(default_factory=dict)
 
     def at(self, problem: InverseProblem, trust: Trust) -> Path:
         """The search at one trust.  Raises DataError where the model cannot be simulated on the records."""

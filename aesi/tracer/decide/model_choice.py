@@ -119,8 +119,9 @@ class _SingleParticle:
         return self.search(self.problem, self.archive, self.max_effects, shallower)
 
     def first_search(self) -> _FirstSearch:
-        """The search for `FIRST_LOOK` effects where the two models differ notably. It goes on to all effects where the
-        models do not differ, where the first search explains the data, and where no effect could."""
+        """The search for up to `FIRST_LOOK` effects where the two models differ notably, else for as many as may be
+        named. The short search is continued where it finds an effect, and where it leaves more than the two models
+        differ by."""
         few = min(FIRST_LOOK, self.max_effects) if _notable(self.declared) else self.max_effects
         first = self.search(self.problem, self.archive, few)
         if few == self.max_effects:
@@ -143,8 +144,8 @@ class _SingleParticle:
 def _chosen_by_records(
     single: _SingleParticle, problem: InverseProblem, archive_of: ArchiveOf
 ) -> tuple[Evidence, ModelChoice]:
-    """The single particle, where the two models do not differ notably (on the declared cell and on the one it ended
-    with), or where it leaves far more than they differ by; else the believed one of both."""
+    """The single particle where the two models do not differ notably, for the declared cell and the one found, and
+    where its error is far larger than their difference; else the one of the two whose search is believed."""
     first = single.first_search()
     explained = single.may_explain(first.answer)
     reduction = _larger(single.declared, first.answer.paths["tight"]) if explained else single.declared

@@ -1,4 +1,4 @@
-"""Records whose current runs otherwise between their rows than it was assumed to, told by what explains them."""
+"""How a current runs between the rows of a record that does not declare it: as explains the record better."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from aesi.tracer.search.plausible import ALIKE_NATS
 
 
 def inferred_holds(path: Path) -> dict[int, InferredHold]:
-    """Number of a record -> its other hold, of records that declare none, where with it a hypothesis of fewer effects,
-    or else the chosen one, explains the record (leaves no more than a right one may), leaves less than the chosen one
-    does, and is more probable by `ALIKE_NATS`: the least that tells two hypotheses apart.
+    """Number of a record -> the hold that explains it better than the assumed one, for records that declare none. With
+    that hold a hypothesis of fewer effects, or else the chosen one, leaves less on the record than the chosen one does
+    with the assumed hold and no more than a right hypothesis may, and its cost is lower by `ALIKE_NATS` or more.
 
     Rows of 1 s whose current was held, taken as straight lines, have been explained by a wrong electrolyte and porosity
     where the contact resistance was wrong. Where neither explains the record, its hold cannot be told from what else

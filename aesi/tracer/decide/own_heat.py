@@ -11,12 +11,13 @@ from aesi.tracer.search.plausible import ALIKE_NATS
 
 
 def heat_of_file(evidence: Evidence) -> ActiveEffect | None:
-    """The self-heating that the cell's file declares, of a case that nothing explains at a constant temperature; None
-    where a temperature was measured, where self-heating is in the model or was not to be tried, and where the file
-    lacks a heat capacity or a conductance to the surroundings.
+    """Self-heating with the thermal data of the cell's file, for a second search; None where the first search explains
+    the data, beside known-good records, where a temperature was measured, where self-heating is in the model or is not
+    to be tried, and where the file lacks a heat capacity or a conductance to the surroundings.
 
-    A constant temperature is an approximation: what a cell loses warms it. One effect at a time, the search does not
-    come to both: of a cell in the cold a constant temperature explains too little, and the heat of a warm cell nothing.
+    The first search holds the temperature constant, although losses warm every cell. It adds one effect at a time and
+    so misses a wrong temperature with heat: in the cold a constant temperature explains too little, and heat alone
+    nothing.
     """
     problem = evidence.path.problem
     asked = evidence.verdict.word == "unknown" and not problem.has_good
@@ -29,8 +30,8 @@ def heat_of_file(evidence: Evidence) -> ActiveEffect | None:
 
 
 def with_heat_told(warm: Evidence, evidence: Evidence) -> Evidence | None:
-    """The evidence of the search with the file's heat, with a sentence on it; None where the data speak against it, by
-    `ALIKE_NATS`, the least that tells two hypotheses apart."""
+    """The evidence of the search with the file's heat, with a sentence on it; None where a constant temperature
+    predicts unseen data better by more than `ALIKE_NATS`."""
     cold = evidence.paths.get(warm.path.problem.trust, evidence.path)
     ahead = warm.path.chosen.score.total - cold.chosen.score.total
     if ahead < -ALIKE_NATS:

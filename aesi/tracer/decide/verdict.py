@@ -263,8 +263,8 @@ def look_alikes(path: Path, thresholds: Thresholds) -> tuple[tuple[tuple[str, ..
 
 
 def across_models(verdict: Verdict, other: Verdict) -> Verdict:
-    """The verdict, with one more look-alike where the search with the other model of the cell names another effect in
-    place of one of its effects and the same otherwise.
+    """The verdict, with one more look-alike where the search with the other model of the cell names the same effects
+    but one, and another effect in its place.
 
     Both searches explain the data to the noise. Each tells the two effects apart, but only by the approximations of its
     model.

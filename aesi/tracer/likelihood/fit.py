@@ -48,7 +48,7 @@ class FittedHypothesis:
     free: tuple[FreeParameter, ...]
     point: Linearised
     score: PredictiveScore
-    simulations: int = 0
+    simulations: int
     as_declared: bool = False
 
     @property

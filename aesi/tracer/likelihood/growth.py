@@ -218,9 +218,9 @@ class EffectGrowth:
         }
 
     def possible_changes_v(self) -> Array:
-        """(n, c) V, changes of the voltage that the effect can make, as columns. Each start, and the end of the descent
-        where there is one, gives the sensitivities there and the change from the parent to there; c is 0 where none of
-        these can be simulated."""
+        """(n, c) V, changes of the voltage that the effect can make, as columns: the sensitivities at each start and at
+        the end of the descent, if there is one, and the change from the parent to there; c is 0 where none of these can
+        be simulated."""
         columns = [np.zeros((len(self.parent.fit.point.residual_v), 0))]
         end = [] if self.end_u is None else [self.end_u]
         for u in {one.tobytes(): one for one in (*self.starts, *end)}.values():

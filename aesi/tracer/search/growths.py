@@ -130,9 +130,9 @@ def grown_with(parent: Parent, names: Sequence[str], archive: Archive) -> list[G
 
 
 def is_testable(problem: InverseProblem, name: str) -> bool:
-    """Whether the records can decide on an effect. They cannot where it infers a quantity that every record holds,
-    where it restates parameters of a file that was fitted to this very cell, or where, beside good records, all records
-    of a cell share it."""
+    """Whether these records can show an effect at all. They cannot show one that supplies a quantity which every record
+    has measured (the temperature), one that restates design parameters of a file which was fitted to this very cell,
+    and, beside known-good records, one that all records of a cell have in common."""
     effect = problem.effects[name]
     if effect.infers is not None and all(r.data.temperature_degc is not None for r in problem.records):
         return False

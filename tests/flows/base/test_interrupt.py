@@ -96,7 +96,7 @@ from flows.base.interrupt import ending_soon_on_interrupt
 from flows.evaluation.spread import in_processes
 if __name__ == "__main__":
     with ending_soon_on_interrupt():
-        print(list(in_processes(time.sleep, [60.0, 60.0], 2)))
+        print(list(in_processes(time.sleep, [60.0, 60.0], 2, lost=float)))
 """
 
 

@@ -66,7 +66,7 @@ def test_a_search_that_asked_a_lost_scheduler_for_its_cores_ended_in_words_about
 def test_a_batch_whose_scheduler_was_lost_ended_in_an_unexpected_error(scheduler):
     process, address = scheduler
     # Workers cannot import a function of this file.
-    results = on_dask(time.sleep, [0.0, 600.0], 1, address)
+    results = on_dask(time.sleep, [0.0, 600.0], 1, address, lost=float)
     assert next(results) is None
     process.kill()
     with pytest.raises(SchedulerLost, match=LOST):

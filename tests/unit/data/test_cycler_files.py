@@ -6,7 +6,7 @@ The files are written here in the layout of real exports; those were read with t
 import sys
 import warnings
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from datetime import datetime, timedelta
 from pathlib import Path
 from types import SimpleNamespace
@@ -231,6 +231,18 @@ def written(folder: Path, export: Callable[[], tuple[str, bytes]]) -> Path:
     name, content = export()
     path = folder / name
     path.write_bytes(content)
+    return path
+
+
+def workbook_of(path: Path, sheets: dict[str, Iterable[Sequence]]) -> Path:
+    """A workbook with these rows in each sheet."""
+    book = pytest.importorskip("openpyxl").Workbook()
+    book.remove(book.active)
+    for name, lines in sheets.items():
+        sheet = book.create_sheet(name)
+        for line in lines:
+            sheet.append(line)
+    book.save(path)
     return path
 
 
@@ -565,28 +577,18 @@ def test_the_names_below_a_block_about_the_test_were_not_proposed(tmp_path):
 
 
 def test_the_names_of_a_sheet_were_not_proposed(tmp_path):
-    openpyxl = pytest.importorskip("openpyxl")
-    book = openpyxl.Workbook()
-    book.active.append(["Bench 7"])
-    sheet = book.create_sheet("Record")
-    for row in (["Elapsed (s)", "Current (A)", "U (V)"], [0, 1.0, 3.7], [1, 1.0, 3.69]):
-        sheet.append(row)
-    book.save(tmp_path / "logger.xlsx")
+    record = [["Elapsed (s)", "Current (A)", "U (V)"], [0, 1.0, 3.7], [1, 1.0, 3.69]]
+    path = workbook_of(tmp_path / "logger.xlsx", {"Sheet": [["Bench 7"]], "Record": record})
     with pytest.raises(DataError, match=r'--column time_s="Elapsed .s." --column current_a="Current .A."'):
-        read_measurement(tmp_path / "logger.xlsx")
+        read_measurement(path)
 
 
 def test_the_names_of_a_sheet_of_sums_were_proposed_before_those_of_the_records(tmp_path):
-    openpyxl = pytest.importorskip("openpyxl")
-    book = openpyxl.Workbook()
-    for row in (["Cycle", "PlatTimeD/Sec", "MedVoltD/V"], [1, 0, 3.7], [2, 0, 3.6]):
-        book.active.append(row)
-    sheet = book.create_sheet("Record")
-    for row in (["Elapsed (s)", "Current (A)", "U (V)"], *([k, 1.0, 3.7] for k in range(9))):
-        sheet.append(row)
-    book.save(tmp_path / "logger.xlsx")
+    sums = [["Cycle", "PlatTimeD/Sec", "MedVoltD/V"], [1, 0, 3.7], [2, 0, 3.6]]
+    record = [["Elapsed (s)", "Current (A)", "U (V)"], *([k, 1.0, 3.7] for k in range(9))]
+    path = workbook_of(tmp_path / "logger.xlsx", {"Sheet": sums, "Record": record})
     with pytest.raises(DataError, match=r'--column time_s="Elapsed .s." --column current_a="Current .A."'):
-        read_measurement(tmp_path / "logger.xlsx")
+        read_measurement(path)
 
 
 def test_a_zip_archive_of_a_record_was_taken_for_a_workbook(tmp_path):
@@ -698,39 +700,26 @@ def test_dates_over_a_change_to_summer_time_run_on(tmp_path):
 
 
 def test_blank_rows_of_a_sheet_count_where_a_row_is_named(tmp_path):
-    openpyxl = pytest.importorskip("openpyxl")
-    book = openpyxl.Workbook()
-    rows = (["time_s", "current_a", "voltage_v"], [0, 1, 4.0], [None], [None], [1, "one", 3.9])
-    for number, row in enumerate(rows, start=1):
-        for column, value in enumerate(row, start=1):
-            book.active.cell(number, column, value)
-    book.save(tmp_path / "gaps.xlsx")
+    lines = [["time_s", "current_a", "voltage_v"], [0, 1, 4.0], [None], [None], [1, "one", 3.9]]
+    path = workbook_of(tmp_path / "gaps.xlsx", {"Sheet": lines})
     with pytest.raises(DataError, match=r"row 2 \(row 5 of the sheet\): column 'current_a' holds 'one'"):
-        read_measurement(tmp_path / "gaps.xlsx")
+        read_measurement(path)
 
 
 def test_a_test_that_goes_on_in_another_sheet_lost_it_without_a_word(tmp_path):
-    openpyxl = pytest.importorskip("openpyxl")
-    book = openpyxl.Workbook()
-    for name, first in (("Channel_1-1", 0), ("Channel_1-2", 50)):
-        sheet = book.create_sheet(name)
-        sheet.append(["time_s", "current_a", "voltage_v"])
-        for k in range(first, first + 50):
-            sheet.append([float(k), 1.0, 3.7 - 1e-4 * k])
-    book.save(tmp_path / "long.xlsx")
-    notes = read_measurement(tmp_path / "long.xlsx").notes
+    lines = [[float(k), 1.0, 3.7 - 1e-4 * k] for k in range(100)]
+    head = ["time_s", "current_a", "voltage_v"]
+    sheets = {"Sheet": [], "Channel_1-1": [head, *lines[:50]], "Channel_1-2": [head, *lines[50:]]}
+    notes = read_measurement(workbook_of(tmp_path / "long.xlsx", sheets)).notes
     assert notes[0].endswith("Read from the sheet 'Channel_1-1'.")
     assert "Not read: 'Channel_1-2', with the same columns" in notes[1]
 
 
 def test_a_sheet_with_a_number_that_no_float_holds_ended_in_an_overflow(tmp_path):
-    openpyxl = pytest.importorskip("openpyxl")
-    book = openpyxl.Workbook()
-    book.active.append(["time_s", "current_a", "voltage_v"])
-    for row in zip(TIME.tolist(), CURRENT.tolist(), VOLTAGE.tolist(), strict=True):
-        book.active.append(list(row))
-    book.active["B42"] = 777777
-    book.save(tmp_path / "plain.xlsx")
+    lines = np.column_stack([TIME, CURRENT, VOLTAGE]).tolist()
+    lines[40][1] = 777777
+    sheets = {"Sheet": [["time_s", "current_a", "voltage_v"], *lines]}
+    workbook_of(tmp_path / "plain.xlsx", sheets)
     # As another program may write it: openpyxl reads such a cell, and does not write it.
     with zipfile.ZipFile(tmp_path / "plain.xlsx") as plain, zipfile.ZipFile(tmp_path / "a.xlsx", "w") as book:
         for name in plain.namelist():

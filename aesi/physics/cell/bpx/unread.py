@@ -104,7 +104,7 @@ def version_0_sentences(names: Sequence[str]) -> tuple[str, ...]:
 
 def capacity_sentences(cell: CellParameters) -> tuple[str, ...]:
     """A sentence where the nominal capacity is far from that of an electrode between its stoichiometry limits."""
-    for side, electrode in (("negative", cell.negative), ("positive", cell.positive)):
+    for side, electrode in cell.electrodes.items():
         held_ah = cell.window_capacity_ah(electrode)
         ratio = cell.nominal_capacity_ah / held_ah
         if not 1.0 / OTHER_CAPACITY <= ratio <= OTHER_CAPACITY:
@@ -119,7 +119,7 @@ def capacity_sentences(cell: CellParameters) -> tuple[str, ...]:
 def rising_potential_sentences(cell: CellParameters) -> tuple[str, ...]:
     """A sentence on each electrode whose potential rises with its stoichiometry somewhere between its limits."""
     sentences = []
-    for side, electrode in (("negative", cell.negative), ("positive", cell.positive)):
+    for side, electrode in cell.electrodes.items():
         at = inside_window(electrode)
         if isinstance(electrode.ocp, LookupTable):
             nodes = np.asarray(electrode.ocp.x)
@@ -152,7 +152,7 @@ def replaced_relation_sentences(cell: CellParameters) -> tuple[str, ...]:
     """Sentences on relations that are not simulated as declared somewhere in the range of the surfaces or the salt."""
     sentences = []
     stoichiometry = np.linspace(0.0, 1.0, POINTS)
-    for side, electrode in (("negative", cell.negative), ("positive", cell.positive)):
+    for side, electrode in cell.electrodes.items():
         what = f"the diffusivity of the {side} electrode"
         sentences += _not_positive_sentences(
             electrode.diffusivity, stoichiometry, what, "stoichiometries of {}", "at 0.5"

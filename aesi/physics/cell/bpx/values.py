@@ -24,6 +24,7 @@ from aesi.physics.cell.parts import (
     THERMAL_CONDUCTIVITY,
     CellParameters,
     Electrode,
+    Electrolyte,
     require_positive,
 )
 from aesi.physics.cell.relations import LookupTable, Relation
@@ -77,7 +78,6 @@ def check_values(cell: CellParameters, where: str) -> None:
             "Electrode area [m2]": cell.electrode_area_m2,
             "Number of electrode pairs connected in parallel to make a cell": cell.electrode_pairs,
             "Nominal cell capacity [A.h]": cell.nominal_capacity_ah,
-            "Initial electrolyte concentration [mol.m-3]": cell.electrolyte.c0_mol_m3,
         },
     )
     require_positive(
@@ -90,17 +90,7 @@ def check_values(cell: CellParameters, where: str) -> None:
     )
     _check_share(f"{where}: Separator", "porosity", cell.separator.porosity)
     _check_share(f"{where}: Separator", "transport efficiency", cell.separator.transport_efficiency)
-    _check_share(f"{where}: Electrolyte", "transference", cell.electrolyte.transference)
-    least, most = SALT_MOL_M3
-    if not least <= cell.electrolyte.c0_mol_m3 <= most:
-        raise CellError(
-            f"{where}: Initial electrolyte concentration [mol.m-3] = {cell.electrolyte.c0_mol_m3:g} is outside "
-            f"{least:g} to {most:g} mol/m3, where all electrolytes are; 1 mol/L is 1000."
-        )
-    at_rest = np.array([cell.electrolyte.c0_mol_m3])
-    for name in ("conductivity", "diffusivity"):
-        _check_holds_rest(cell, getattr(cell.electrolyte, name), f"{where}: Electrolyte: {name}")
-        _check_positive(getattr(cell.electrolyte, name), at_rest, f"{where}: Electrolyte: {name}", "mol/m3")
+    _check_electrolyte(cell.electrolyte, where)
     if not LEAST_CUT_OFF_V <= cell.lower_voltage_v < cell.upper_voltage_v:
         raise CellError(
             f"{where}: the lower cut-off ({cell.lower_voltage_v:g} V) has to be at least {LEAST_CUT_OFF_V:g} V and "
@@ -178,7 +168,7 @@ def _check_surface(cell: CellParameters, electrode: Electrode, side: str, window
 
 def _check_capacity(cell: CellParameters, where: str) -> None:
     """Check that each electrode holds about the nominal capacity."""
-    for label, electrode in (("negative", cell.negative), ("positive", cell.positive)):
+    for label, electrode in cell.electrodes.items():
         window_ah = cell.window_capacity_ah(electrode)
         if not 1.0 / OTHER_UNIT <= cell.nominal_capacity_ah / window_ah <= OTHER_UNIT:
             raise CellError(
@@ -343,14 +333,26 @@ def _check_filling(electrode: Electrode, what: str) -> None:
             )
 
 
-def _check_holds_rest(cell: CellParameters, table: Relation, what: str) -> None:
-    """Check that a table over the salt's concentration holds the one at rest, which is that of most of the cell."""
-    rest = cell.electrolyte.c0_mol_m3
-    if isinstance(table, LookupTable) and not table.x[0] <= rest <= table.x[-1]:
+def _check_electrolyte(electrolyte: Electrolyte, where: str) -> None:
+    """Check the concentration at rest and the properties there. A table over the concentration has to hold that one,
+    which is that of most of the cell."""
+    rest, (least, most) = electrolyte.c0_mol_m3, SALT_MOL_M3
+    require_positive(where, {"Initial electrolyte concentration [mol.m-3]": rest})
+    _check_share(f"{where}: Electrolyte", "transference", electrolyte.transference)
+    if not least <= rest <= most:
         raise CellError(
-            f"{what}: x of a table runs from {table.x[0]:g} to {table.x[-1]:g}, without the concentration at rest "
-            f"({rest:g} mol/m3); it is in mol/m3, so that 1 mol/L is 1000."
+            f"{where}: Initial electrolyte concentration [mol.m-3] = {rest:g} is outside {least:g} to {most:g} mol/m3, "
+            "where all electrolytes are; 1 mol/L is 1000."
         )
+    relations = {"conductivity": electrolyte.conductivity, "diffusivity": electrolyte.diffusivity}
+    for name, relation in relations.items():
+        what = f"{where}: Electrolyte: {name}"
+        if isinstance(relation, LookupTable) and not relation.x[0] <= rest <= relation.x[-1]:
+            raise CellError(
+                f"{what}: x of a table runs from {relation.x[0]:g} to {relation.x[-1]:g}, without the concentration at "
+                f"rest ({rest:g} mol/m3); it is in mol/m3, so that 1 mol/L is 1000."
+            )
+        _check_positive(relation, np.array([rest]), what, "mol/m3")
 
 
 def _check_share(what: str, name: str, value: float) -> None:

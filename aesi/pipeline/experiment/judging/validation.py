@@ -55,8 +55,9 @@ def validation_mser(loaded: Loaded, problem: Problem, candidates: Sequence[Candi
 
 
 def _part_squares(loaded: Loaded, problem: Problem, candidates: Sequence[Candidate]) -> Iterator[SquaresLeft]:
-    """Squared errors on each fold of the search, of physics that did not see it and of the ensembles: by the share that
-    these leave of the error in the search, which is that of the same physics but where terms may hold the error."""
+    """Squared errors on each fold of the search, of the physics that did not see it and of the ensembles. That of an
+    ensemble is the share of the error which it leaves in the search, times the error of this physics; both errors are
+    of the same physics unless terms may hold the error."""
     shares = [nested_shares(problem, candidates, number) for number in range(len(ENSEMBLES))]
     for d, ((a, b), out) in enumerate(zip(problem.folds, loaded.left_out.parts, strict=True)):
         rows = fold_samples(problem, a, b)[1]

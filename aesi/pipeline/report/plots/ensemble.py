@@ -100,9 +100,17 @@ def importance_figure(terms: Sequence[Row]) -> Figure | None:
         "Importance of each term by singular value decomposition of the columns term times coefficient; "
         f"the intercept is left out.{_cut_note(len(rows))}{_symbols(rows)}"
     )
-    return _bars(
-        rows, [abs(row["importance"]) for row in rows], "Ranking of the terms", caption, "importance, -"
+    shown = rows[:MOST_TERMS][::-1]
+    fig = style.figure("Ranking of the terms", caption, _tall(len(shown)), showlegend=False)
+    fig.add_bar(
+        x=[abs(row["importance"]) for row in shown],
+        y=[row["term"] for row in shown],
+        orientation="h",
+        marker={"color": style.BLUE},
+        hovertemplate="%{y}: %{x:.4g}<extra></extra>",
     )
+    fig.update_xaxes(title_text="importance, -")
+    return fig
 
 
 def coefficient_figure(terms: Sequence[Row]) -> Figure | None:
@@ -193,20 +201,6 @@ def _holding(n: int, whole: int, drawn: float, share: float) -> Array:
     sample, starts = np.arange(n), n - whole + 1
     last, first = np.minimum(sample, starts - 1), np.maximum(sample - drawn + 1.0, 0.0)
     return np.asarray(share * np.maximum(last - first + 1.0, 0.0) / starts)
-
-
-def _bars(rows: Sequence[Row], values: Sequence[float], title: str, caption: str, axis: str) -> Figure:
-    shown = list(zip(rows, values, strict=True))[:MOST_TERMS][::-1]
-    fig = style.figure(title, caption, _tall(len(shown)), showlegend=False)
-    fig.add_bar(
-        x=[value for _, value in shown],
-        y=[row["term"] for row, _ in shown],
-        orientation="h",
-        marker={"color": style.BLUE},
-        hovertemplate="%{y}: %{x:.4g}<extra></extra>",
-    )
-    fig.update_xaxes(title_text=axis)
-    return fig
 
 
 def _legend_entry(fig: Figure, name: str, symbol: str) -> None:

@@ -245,31 +245,30 @@ def next_finding(discovery: Mapping[str, Any], titles: Mapping[str, str] | None 
     """Sentences on what came nearest and on what to do next where effects were tried and leave something; '' else."""
     if discovery["verdict"] != "unknown" or not _tried(discovery):
         return ""
-    rows = [] if discovery["effects"] else discovery["candidates"]
-    best = max(rows, key=lambda row: float(row["score"]), default=None)
-    nearest = "" if best is None else f"Best candidate, not named: {hypothesis_title(best, titles or {})}"
-    remark = best.get("remark") if best else ""
-    nearest += f" ({remark})" if remark else ""
-    beside = (
-        ""
-        if discovery.get("good")
-        else ", or a known-good record of the cell (--good), with which the verdict can be 'found' or 'none'"
-    )
-    check = (
-        f"check that the cell file is of this cell (those of others are off by {OF_ANOTHER_CELL_MV:g} mV and more), "
-        "and fit it with aesi calibrate; then "
-        if discovery["structured_mv"] >= OF_ANOTHER_CELL_MV
-        else ""
-    )
+    nearest = check = beside = start = ""
+    if not discovery["effects"]:
+        start = "; start it from the declared file"
+        if discovery["candidates"]:
+            best = max(discovery["candidates"], key=lambda row: float(row["score"]))
+            remark = f" ({best['remark']})" if best.get("remark") else ""
+            nearest = f"Best candidate, not named: {hypothesis_title(best, titles or {})}{remark}. "
+    if discovery["structured_mv"] >= OF_ANOTHER_CELL_MV:
+        check = (
+            "check that the cell file is of this cell (those of others are off by "
+            f"{OF_ANOTHER_CELL_MV:g} mV and more), and fit it with aesi calibrate; then "
+        )
+    if not discovery.get("good"):
+        beside = (
+            ", or a known-good record of the cell (--good), with which the verdict can be 'found' or 'none'"
+        )
     return (
-        f"{nearest}{'. ' if nearest else ''}Next: {check}add data of another kind (a slow discharge, pulses with "
-        f"rests, another temperature) to narrow down the cause{beside}. aesi run learns a correction of the remaining "
-        f"error{'' if discovery['effects'] else '; start it from the declared file'}."
+        f"{nearest}Next: {check}add data of another kind (a slow discharge, pulses with rests, another temperature) to "
+        f"narrow down the cause{beside}. aesi run learns a correction of the remaining error{start}."
     )
 
 
 def hypothesis_title(row: Row, titles: Mapping[str, str]) -> str:
-    """An effect as it did best: by itself, or beside the others of its hypothesis, whose score it shares."""
+    """The title of an effect and, in its best hypothesis, of the effects beside it, with which it shares the score."""
     name, *others = (
         _title(titles, effect) for effect in dict.fromkeys((row["effect"], *row.get("hypothesis", ())))
     )

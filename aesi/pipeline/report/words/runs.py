@@ -27,9 +27,9 @@ def run_finding(view: RunView) -> str:
 
 
 def _refit_better(view: RunView) -> str:
-    """Clause, from '; ' on, that the physics with its own parameters refitted errs less, where the correction is not
-    on that; '' where it does not."""
-    ours, refitted = _figure(view.model(view.chosen), "free_run", "test_rmse_mv"), _refitted_mv(view)
+    """Clause, from '; ' on, that the physics with its own parameters refitted has a lower error than the chosen model;
+    '' where it has not, or where the correction was learnt on that physics."""
+    ours, refitted = _free_run_mv(view, view.chosen), _refitted_mv(view)
     if ours is None or refitted is None or not _is_less(refitted, ours):
         return ""
     return (
@@ -47,9 +47,10 @@ def _refitted_mv(view: RunView) -> float | None:
 
 
 def _physics_mv(view: RunView, name: str, role: Role = "test") -> float | None:
-    """RMSE of the physics as declared, or of that which is corrected, in free run, mV. Of one that is not among the
-    models of the experiment it is told by what the chosen model takes off it; None where that is not known."""
-    told = _figure(view.model(name), "free_run", f"{role}_rmse_mv")
+    """RMSE in free run, mV, of the physics as declared or of that on which the correction was learnt. Where that is no
+    model of the experiment, it follows from the reduction of the error by the chosen model; None where this is not
+    known either."""
+    told = _free_run_mv(view, name, role)
     if told is not None:
         return told
     return _before_mv(view, role, "mser_pct" if name == view.physics else "mser_recalibrated_pct")
@@ -65,8 +66,8 @@ def _before_mv(view: RunView, role: Role, key: str) -> float | None:
 
 
 def _not_applied(view: RunView) -> str:
-    """Clause, from '; ' on, on the test records that say nothing of the correction, since it has faded there, or on one
-    that is applied nowhere; '' where there is none."""
+    """Clause, from '; ' on, on test records so far outside the trained range that next to nothing of the correction is
+    applied, or on a correction that is applied nowhere; '' without either."""
     records = (view.model(view.chosen) or {}).get("test_records") or {}
     if any(map(is_applied_nowhere, records.values())):
         return f"; {NOWHERE}"
@@ -82,8 +83,8 @@ def _not_applied(view: RunView) -> str:
 
 
 def _ran_out(view: RunView) -> str:
-    """Clause, from '; ' on, on when a model ran out, from where on the errors of test records say no more than that,
-    and on the error before; '' where none did."""
+    """Clause, from '; ' on, on when a simulation of test records ran empty or full, after which its errors do not show
+    how accurate the model is, and on the errors before that; '' where none did."""
     model = view.model(view.chosen) or {}
     records = {
         name: figures["ran_out_s"]
@@ -169,14 +170,14 @@ def corrected_mv(view: RunView) -> float | None:
 def headline_digits(view: RunView) -> int:
     """Decimals that tell the error of the chosen model, in free run on the test records, mV, from that of the physics
     that it corrects."""
-    ours, physics = _figure(view.model(view.chosen), "free_run", "test_rmse_mv"), corrected_mv(view)
+    ours, physics = _free_run_mv(view, view.chosen), corrected_mv(view)
     return 1 if ours is None or physics is None or view.chosen == view.corrected else _digits(ours, physics)
 
 
 def own_share(view: RunView) -> float | None:
     """By how much the correction lowers the mean squared error of the physics that it was learnt on, in free run on the
     test records, per cent; negative where it raises it. None where there is no correction, or a figure is missing."""
-    before, after = corrected_mv(view), _figure(view.model(view.chosen), "free_run", "test_rmse_mv")
+    before, after = corrected_mv(view), _free_run_mv(view, view.chosen)
     if not before or after is None or view.chosen in (view.physics, view.corrected):
         return None
     return 100.0 * (1.0 - (after / before) ** 2)
@@ -185,7 +186,7 @@ def own_share(view: RunView) -> float | None:
 def refit_finding(view: RunView) -> str:
     """A sentence on what the correction gains beyond a mere refit of the physics, where it was not learnt on that; or
     on what to do where the refit does better."""
-    after = _figure(view.model(view.chosen), "free_run", "test_rmse_mv")
+    after = _free_run_mv(view, view.chosen)
     beyond = _figure(view.model(view.chosen), "free_run", "test_mser_recalibrated_pct")
     refitted = _refitted_mv(view)
     if view.corrected == view.chosen or after is None or beyond is None or refitted is None:
@@ -235,7 +236,7 @@ def constant_finding(view: RunView) -> str:
     rows = (view.model(f"{physics} + constant") for physics in (view.corrected, view.physics))
     row = next((row for row in rows if row is not None), None)
     error = _figure(row, "free_run", "test_rmse_mv")
-    ours = _figure(view.model(view.chosen), "free_run", "test_rmse_mv")
+    ours = _free_run_mv(view, view.chosen)
     if row is None or row["name"] == view.chosen or error is None or ours is None:
         return ""
     left = _distinct_mv(error, ours)[0]
@@ -244,7 +245,7 @@ def constant_finding(view: RunView) -> str:
 
 def others_finding(view: RunView) -> str:
     """Which other corrections do better on the test records, in words; '' where none does."""
-    ours = _figure(view.model(view.chosen), "free_run", "test_rmse_mv")
+    ours = _free_run_mv(view, view.chosen)
     physics = (view.physics, view.corrected)
     left = {
         row["name"]: _figure(row, "free_run", "test_rmse_mv")
@@ -340,6 +341,11 @@ def _distinct_mv(first: float, other: float) -> tuple[str, str]:
 def _digits(first: float, other: float) -> int:
     """Decimals of two errors that stand side by side, mV."""
     return HUNDREDTHS if abs(first - other) < TENTH_MV or f"{first:.1f}" == f"{other:.1f}" else 1
+
+
+def _free_run_mv(view: RunView, name: str, role: Role = "test") -> float | None:
+    """RMSE of a model in free run, mV; None where it is not known."""
+    return _figure(view.model(name), "free_run", f"{role}_rmse_mv")
 
 
 def _figure(row: Row | None, group: str, key: str) -> float | None:

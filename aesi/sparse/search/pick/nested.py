@@ -55,8 +55,8 @@ def picked(
 
 
 def nested_shares(problem: Problem, candidates: Sequence[Candidate], ensemble: int) -> Array:
-    """(n_folds,) squared error on each fold with the choice of the other folds, over that of the bare physics; 1 where
-    there is no choice, and where that error is exactly zero, so that nothing is there to be shared.
+    """(n_folds,) squared error on each fold by the candidate that the other folds choose, over that of the bare
+    physics; 1 where they choose none, and where the bare physics has no error.
 
     ensemble : as for `picked`.
     """
