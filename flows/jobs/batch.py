@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from aesi.errors import InputError
 from aesi.numerics.files.source_digest import source_digest
 from aesi.pipeline.batch.job import Settings, lost_job, of_other_code, run_job
-from aesi.pipeline.batch.plan import Job, read_plan, without_records
+from aesi.pipeline.batch.plan import Job, of_no_cell, read_plan, without_records
 from aesi.pipeline.batch.summary import write_summary
 from aesi.pipeline.experiment.sections import TrackingConfig
 from aesi.pipeline.written import SUMMARY_PAGE, SUMMARY_TABLE
@@ -89,6 +89,8 @@ def _say_plan(console: Console, jobs: Sequence[Job], source: Path, out: Path, wo
     console.say(f"{cells} from {source}; results in {out}")
     if empty := without_records(source):
         console.say(f"no record in {', '.join(empty)}; passed over.")
+    if loose := of_no_cell(source):
+        console.say(f"in no subfolder, and so of no cell: {', '.join(loose)}; passed over.")
     if other := of_other_code(jobs, out):
         were = "was" if len(other) == 1 else "were"
         console.say(

@@ -12,7 +12,7 @@ from aesi.errors import InputError
 from aesi.pipeline.report.compare import ComparedRun, write_comparison
 from aesi.pipeline.written import COMPARISON, FINDING
 from flows.tracking.experiment_log import CODE, OF_A_MODEL
-from flows.tracking.store import Store, beginning, is_of_experiment, job_of
+from flows.tracking.store import SHORTEST_ID, Store, is_of_experiment, job_of, one_of
 from flows.tracking.tracker import was_cut
 
 FINISHED = "FINISHED"
@@ -54,14 +54,15 @@ def _chosen(store: Store, wanted: Sequence[str]) -> list[tuple[str, Any]]:
             matching = [run for run in reversed(jobs) if run.info.status == FINISHED]
         else:
             known = known if known is not None else store.all_jobs()
-            matching = beginning(known, name)
-            if len(matching) > 1:
-                raise InputError(f"{name!r} is the beginning of {len(matching)} run ids; give more of it.")
+            one = one_of(known, name)
+            matching = [one] if one else []
         if not matching:
             ended = (run for run in store.all_jobs() if run.info.status == FINISHED)
             there = ", ".join(sorted({experiments[run.info.experiment_id] for run in ended})) or "none"
+            needed = f" (of an id, {SHORTEST_ID} letters at least)" if len(name) < SHORTEST_ID else ""
             raise InputError(
-                f"{name!r} is no tracked run and no experiment with a finished run; experiments with one: {there}."
+                f"{name!r} is no tracked run{needed} and no experiment with a finished run; experiments with one: "
+                f"{there}."
             )
         found |= {run.info.run_id: (experiments[run.info.experiment_id], run) for run in matching}
     return list(found.values())

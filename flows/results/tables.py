@@ -19,7 +19,7 @@ from aesi.pipeline.report import tables
 from aesi.pipeline.report.compare import differing_keys
 from aesi.pipeline.written import FIGURES, REPORT, SUMMARY
 from flows.tracking.experiment_log import CODE, FALLBACK, SETTING, UNFITTED
-from flows.tracking.store import KIND, Store, beginning, is_of_experiment
+from flows.tracking.store import KIND, SHORTEST_ID, Store, is_of_experiment, one_of
 from flows.tracking.view import NOTE
 
 RANGED = ("test_mser_pct", "test_mser_recalibrated_pct", "coverage_pct")
@@ -180,10 +180,14 @@ def _of_one_setting(asked: Mapping[str, Any]) -> list[Any]:
 
 
 def _by_id(finished: Sequence[Any], run_id: str, name: str) -> Any:
-    found = beginning(finished, run_id)
-    if len(found) != 1:
-        raise InputError(f"{run_id!r} names {len(found)} finished runs of {name!r}; give a whole run id.")
-    return found[0]
+    found = one_of(finished, run_id)
+    if found is None:
+        there = _some([run.info.run_id[:8] for run in finished]) or "none"
+        raise InputError(
+            f"--run {run_id} is no finished run of {name!r}; give its id, or the beginning of at least {SHORTEST_ID} "
+            f"letters. There are: {there}."
+        )
+    return found
 
 
 def _summary(store: Store, run: Any) -> dict[str, Any]:

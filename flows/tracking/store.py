@@ -47,16 +47,19 @@ REACH_S = 5.0
 """Wait for the answer of a tracking server."""
 PASSING = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EAGAIN, errno.EMFILE)
 SHORTEST_ID = 4
-"""Letters of a run's id that may stand for it."""
+"""Letters at the beginning of a run's id that may stand for it."""
 PAGE = 1000
 """Runs asked for at a time."""
 
 
-def beginning(runs: Sequence[Any], begin: str) -> list[Any]:
-    """Those of the runs whose id begins with `begin`, which may also be the folder that a run wrote; none where it is
-    shorter than `SHORTEST_ID`."""
+def one_of(runs: Sequence[Any], begin: str) -> Any | None:
+    """The run whose id begins so, or that wrote the folder of that name; None where there is none, and where the text
+    is too short to stand for an id.  Raises InputError where there are several."""
     begin = Path(begin).name
-    return [run for run in runs if run.info.run_id.startswith(begin)] if len(begin) >= SHORTEST_ID else []
+    found = [run for run in runs if run.info.run_id.startswith(begin)] if len(begin) >= SHORTEST_ID else []
+    if len(found) > 1:
+        raise InputError(f"{begin!r} is the beginning of {len(found)} run ids; give more of it.")
+    return found[0] if found else None
 
 
 def job_of(run: Any) -> str:
@@ -196,17 +199,13 @@ class Store:
         try:
             return self.client.get_run(run_id)
         except MlflowException:
-            begun = beginning(self.all_jobs(), run_id)
-            if len(begun) == 1:
-                return begun[0]
-            asked = (
-                "more of its id"
-                if begun
-                else "the whole id of a candidate, or the beginning of that of a run"
-            )
-            raise InputError(
-                f"no run {run_id!r} is tracked in {without_login(self.uri)}; give {asked}."
-            ) from None
+            begun = one_of(self.all_jobs(), run_id)
+            if begun is None:
+                raise InputError(
+                    f"no run {run_id!r} is tracked in {without_login(self.uri)}; give the whole id of a candidate, or "
+                    f"the beginning of that of a run, at least {SHORTEST_ID} letters."
+                ) from None
+            return begun
 
     def holds(self, run_id: str) -> bool:
         """Whether a run of that id is there, and not deleted."""

@@ -147,6 +147,11 @@ def without_records(source: Path) -> tuple[str, ...]:
     )
 
 
+def of_no_cell(source: Path) -> tuple[str, ...]:
+    """The files in a folder itself that may be records: only those in its subfolders are read; none of a table."""
+    return tuple(file.name for file in _records_in(source)) if source.is_dir() else ()
+
+
 def _of_folder(folder: Path, cell: Path | None) -> tuple[Job, ...]:
     return tuple(
         _of_subfolder(each, cell, data) for each in _subfolders(folder) if (data := _records_in(each))

@@ -136,8 +136,6 @@ def _prepared(
     thin_noise = noise_of(thin.take(slice(0, n_fit)), cell.nominal_capacity_ah)
     white = _white_v(record, noise, thin_noise)
     equivalent = _equivalent_white_v(record, noise, thin_noise, white, n_fit, quantum_v(fitted.voltage_v))
-    as_given = start.basis == "given" and not (start.contradicted or start.doubted or start.flowed)
-    start_note = () if as_given else (start.sentence,)
     return PreparedRecord(
         data=data,
         thin=thin,
@@ -150,7 +148,7 @@ def _prepared(
         equivalent_white_v=np.hypot(equivalent, THINNED_SHARE * lost),
         noise_full_v=noise.sd_v,
         notes=(
-            *start_note,
+            start.sentence,
             hold_sentence(
                 data.name,
                 record.hold,

@@ -49,6 +49,20 @@ def test_a_batch_that_goes_on_after_an_upgrade_says_what_is_done_again(tracked, 
     assert "a was done by another version of this program" in said.out + said.err
 
 
+def test_a_record_beside_the_subfolders_was_left_out_without_a_word(tracked, capsys):
+    from flows.jobs.batch import batch
+
+    cells = tracked / "cells"
+    (cells / "a").mkdir(parents=True)
+    for file in (cells / "a" / "drive.csv", cells / "loose.csv", cells / "notes.md"):
+        file.write_text("a")
+    (job,) = read_plan(cells, CELL)
+    done(tracked / "out" / "a", job, 3.0)
+    batch(cells, tracked / "out", CELL, workers=1)
+    said = capsys.readouterr()
+    assert "in no subfolder, and so of no cell: loose.csv; passed over." in said.out + said.err
+
+
 @pytest.mark.parametrize("runner", ["local", "dask"])
 def test_a_batch_is_tracked_with_the_trend_of_its_specimens(tracked, runner):
     from flows.jobs.batch import batch

@@ -11,8 +11,9 @@ from aesi.errors import InputError
 from aesi.pipeline.report.compare import ComparedRun, differing_settings, write_comparison
 from flows.jobs.experiment import _uri_option
 from flows.results.compare import PROGRAM, _judged_on, compare
+from flows.results.tables import tables_of
 from flows.tracking.experiment_log import CODE
-from flows.tracking.store import JOB, KIND, Store
+from flows.tracking.store import EXPERIMENT, JOB, KIND, SHORTEST_ID, Store
 from flows.tracking.tracker import _texts
 from flows.tracking.whole_run import NestedRun, insert_run
 
@@ -393,3 +394,22 @@ def test_a_run_whose_files_lie_on_another_machine_was_compared_as_one_that_has_n
     said = f"verdicts of drive are missing: its files are in {there}, which is not here; mount or restore it"
     assert (code, err.count(said)) == (0, 1)
     assert said in re.sub(r"&nbsp;|\u00a0", " ", (tracked / "page.html").read_text())
+
+
+def test_the_beginning_of_an_id_was_refused_without_a_word_on_its_length(tmp_path):
+    uri = f"sqlite:///{tmp_path / 'mlflow.db'}"
+    store = Store(uri)
+    tags = {KIND: "run", JOB: EXPERIMENT}
+    run_id = store.client.create_run(store.client.create_experiment("mine"), tags=tags).info.run_id
+    store.client.set_terminated(run_id, "FINISHED")
+    short = run_id[: SHORTEST_ID - 1]
+    for asked in (
+        lambda: compare([short], tmp_path / "page.html", uri),
+        lambda: tables_of("mine", run_ids=[short], uri=uri),
+        lambda: store.run(short),
+    ):
+        with pytest.raises(InputError, match=rf"'?{short}'? .*{SHORTEST_ID} letters"):
+            asked()
+    assert store.run(run_id[:SHORTEST_ID]).info.run_id == run_id
+    with pytest.raises(InputError, match=rf"There are: {run_id[:8]}\.$"):
+        tables_of("mine", run_ids=["anotherone"], uri=uri)

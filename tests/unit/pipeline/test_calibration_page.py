@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from aesi.calibration import Conditions, calibrate
+from aesi.calibration.records.thinning import SPACING
+from aesi.data.thinning import condensed
 from aesi.physics import Cell, simulate
 from aesi.pipeline.calibrate import calibrate_files, fit_traces
 from aesi.pipeline.impedance import SpectrumError
@@ -197,6 +199,23 @@ def test_the_error_of_a_file_was_that_of_the_hours_after_it_had_run_out(content)
     assert "the error is 4.0 to 12.3 mV, until it runs out on slow. On slow the start file" in finding(
         content
     )
+
+
+def test_the_error_over_all_rows_was_said_to_be_smaller_also_where_the_fitted_rows_average_noise(
+    tmp_path, content
+):
+    """Pulses that the file fits to the noise of the sensor: averages have less of it than single rows."""
+    time_s = np.arange(0.0, 7200.0)
+    current_a = np.where(time_s % 1800.0 < 20.0, 5.0, 0.0)
+    noise_v = 1e-3 * np.random.default_rng(0).standard_normal(len(time_s))
+    measured = Measurement(time_s, current_a, 3.7 + noise_v, name="pulses", hold="backward")
+    thinned, _ = condensed(measured, 5.0, 900.0, SPACING)
+    rms_mv = [1e3 * np.std(record.voltage_v) for record in (measured, thinned)]
+    assert rms_mv[0] > 1.2 * rms_mv[1]
+    view = CalibrationView(
+        content, "the single particle", traces(["pulses", "slow"]), HEALTH, "these tell 1 of 5"
+    )
+    assert "and larger where sensor noise is much of it" in page(tmp_path, view)
 
 
 def test_no_knots_are_no_figure():

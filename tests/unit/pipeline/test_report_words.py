@@ -481,6 +481,19 @@ def test_a_declared_model_that_is_written_unchanged_was_shown_as_a_third_one(vie
     )
 
 
+def test_a_declared_cell_was_called_recalibrated_where_only_the_start_of_a_record_was_fitted(views):
+    """With one effect tried alone: the model erred by 3 mV as recalibrated, and by 8 mV when it was simulated."""
+    view = views.discovery_view(200, verdict="unknown")
+    start = {"effect": "soc0", "parameter": "drive", "value": 0.8413, "deviations": -1.6}
+    content = view.discovery | {"own_parameters": {"recalibrated": [start], "after": [start]}}
+    text = discoveries.written_finding(content)
+    assert text.startswith("model/ holds the declared cell: recalibration fitted nothing of it")
+    assert "(initial state of charge: drive at 0.841)" in text
+    of_the_cell = {"effect": "porosity", "parameter": "factor", "value": 1.1, "deviations": 0.1}
+    both = content | {"own_parameters": {"recalibrated": [start, of_the_cell]}}
+    assert discoveries.written_finding(both) == "model/ holds the recalibrated model."
+
+
 def test_a_model_that_is_written_beside_a_refit_and_does_better_was_not_shown(views):
     """A refit of other parameters than the recalibrated model's is a model of its own, without an effect in it."""
     view = views.discovery_view(200, verdict="unknown")

@@ -47,6 +47,8 @@ def test_a_given_state_of_charge_is_taken_and_a_rest_is_read(cell, make):
     assert read.start.basis == "rest"
     assert abs(read.soc0 - 0.9) < 3 * read.soc0_sd
     assert any("state of charge" in note for note in read.notes)
+    # Where a record starts was told where it was read, and left out of the report where it was given.
+    assert any("starts at a state of charge of 0.9, as given" in note for note in given.notes)
 
 
 def test_a_voltage_of_no_state_of_this_cell_is_refused(cell, make):

@@ -23,6 +23,7 @@ from aesi.pipeline.report.words.sizes import (
     what_good_records_lack,
     with_size,
 )
+from aesi.tracer.case.free_parameter import RECORD_OWNERS, STATE_OF_CHARGE
 from aesi.tracer.decide.model_to_write import AS_GOOD
 from aesi.tracer.decide.verdict import Thresholds, beyond_noise
 from aesi.tracer.likelihood.model_error import MEASURED_V
@@ -197,13 +198,27 @@ def written_finding(discovery: Mapping[str, Any]) -> str:
         )
         return f"model/ holds a recalibrated model{beside}."
     if state == "recalibrated":
-        return "model/ holds the recalibrated model."
+        return _of_records_alone(discovery) or "model/ holds the recalibrated model."
     text = "model/ holds the declared model, unchanged"
     if (why := discovery.get("not_adopted")) is not None:
         return f"{text}. Not adopted: {why}."
     if discovery["verdict"] == "unknown":
         return f"{text}: no fit predicts data that were left out of it well enough to replace it."
     return f"{text}."
+
+
+def _of_records_alone(discovery: Mapping[str, Any]) -> str:
+    """Sentences on `model/` where the recalibration had nothing of the cell to fit, as where one effect alone is tried:
+    the starts of the records, in which it differs from the declared model, are in no model.  '' elsewhere."""
+    rows = discovery.get("own_parameters", {}).get("recalibrated", [])
+    if not rows or not all(row["effect"] in RECORD_OWNERS for row in rows):
+        return ""
+    starts = [f"{row['parameter']} at {row['value']:.3f}" for row in rows if row["effect"] == STATE_OF_CHARGE]
+    where = f" (initial state of charge: {listed(starts)})" if starts else ""
+    return (
+        f"model/ holds the declared cell: recalibration fitted nothing of it, only what belongs to a record{where}. "
+        "Simulated from a start that is read anew, a record is as far off as declared."
+    )
 
 
 def reason_finding(discovery: Mapping[str, Any], titles: Mapping[str, str] | None = None) -> str:
