@@ -86,12 +86,14 @@ class Rebuilt:
 def rebuild(run_id: str, uri: str | None = None) -> Rebuilt:
     """The candidate of a tracked run; for the run of an experiment, the fittest of those that were chosen.
 
-    Raises InputError where the run is no candidate, had failed, or lacks what it was made from, or where another
-    version wrote that.
+    Raises InputError where the run is no candidate, had failed, or lacks what it was made from, where another version
+    wrote that, or where it is not on this machine.
     """
     store = Store.to_read(uri)
     run = _candidate(store, run_id)
     parent = store.run(run.data.tags[PARENT])
+    if away := store.files_away(parent):
+        raise InputError(f"run {parent.info.run_id} cannot be read: {away}.")
     with _as_written(parent):
         read = partial(store.read, parent)
         config = parse_experiment(json.loads(read(EXPERIMENT).read_text(encoding="utf-8")))

@@ -89,7 +89,12 @@ def read_plan(source: Path, cell: Path | None = None, soh: Soh | None = None) ->
     if not jobs:
         raise InputError(f"{source} holds no cell: one subfolder each with its records, or a table of them.")
     if all(job.unusable for job in jobs):
-        raise InputError(f"none of the {len(jobs)} cells can be used; the first: {jobs[0].unusable}")
+        none = (
+            "the one cell cannot be used"
+            if len(jobs) == 1
+            else f"none of the {len(jobs)} cells can be used; the first"
+        )
+        raise InputError(f"{none}: {jobs[0].unusable}")
     return tuple(job if job.soh is not None else replace(job, soh=soh) for job in jobs)
 
 

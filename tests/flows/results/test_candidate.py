@@ -127,6 +127,15 @@ def test_a_run_of_an_earlier_version_was_an_unexpected_error(store_alone, name, 
     assert words in str(told.value)
 
 
+def test_a_run_whose_files_are_away_was_said_to_be_of_an_earlier_version(store_alone, tmp_path):
+    from flows.results.candidate import rebuild
+
+    (run,) = runs_of(store_alone, "run")
+    shutil.rmtree(tmp_path / "elsewhere" / "mlartifacts")
+    with pytest.raises(InputError, match=r"^run \w+ cannot be read: its files are in .*, which is not here"):
+        rebuild(run.info.run_id, store_alone)
+
+
 def renamed(data):
     """Stored records with a field that the class of this version does not have."""
     head = len(codec.MAGIC) + hashlib.sha256().digest_size

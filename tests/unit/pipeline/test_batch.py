@@ -316,3 +316,18 @@ def test_a_table_that_cannot_be_meant_is_one_sentence(tmp_path, content, words):
     (tmp_path / "plan.csv").write_bytes(content)
     with pytest.raises(InputError, match=words):
         read_plan(tmp_path / "plan.csv", CELL)
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (("a",), r"^the one cell cannot be used: plan\.csv, line 2"),
+        (("a", "b"), "none of the 2 cells can be used; the"),
+    ],
+)
+def test_one_cell_was_refused_as_none_of_the_1_cells(tmp_path, monkeypatch, names, said):
+    monkeypatch.chdir(tmp_path)
+    plan = Path("plan.csv")
+    plan.write_text("name,data\n" + "".join(f"{name},nowhere.csv\n" for name in names))
+    with pytest.raises(InputError, match=said):
+        read_plan(plan, CELL)
