@@ -55,8 +55,9 @@ def scaled_to_discharge(cell: Cell, measurements: Sequence[Measurement]) -> tupl
         return cell, (size_assumed(cell, measurements),)
     factor = known / cell.capacity_ah
     return with_area_factor(cell, factor, known), (
-        f"a full discharge took {known:.3f} Ah, and the start file declares {cell.capacity_ah:.3f} Ah: the fit starts "
-        f"from an electrode area scaled by {factor:.3f}; the fitted capacity is given with the state of health.",
+        f"a full discharge took {known:.3f} Ah, and the start file's electrodes give {cell.capacity_ah:.3f} Ah between "
+        f"empty and full: the fit starts from an electrode area scaled by {factor:.3f}; the fitted capacity is given "
+        "with the state of health.",
     )
 
 

@@ -184,6 +184,8 @@ def predict_file(
     if measured and profile.voltage_v is None:
         raise DataError(f"{current.name} has no voltage_v; leave out --measured for a free run.")
     given = HybridModel.load(model)
+    if asked.soc0_sd is not None and given.bands is None:
+        raise InputError(f"--soc0-sd widens the band of a free run, and {model} has none; leave it out.")
     saved = given.with_soh(asked.soh)
     say(soh_sentences(given, asked.soh))
     profiled = _profiled_model(saved, profile, current, asked, say)

@@ -82,7 +82,7 @@ def at_its_temperature(temperature_degc: Array) -> str:
     """A clause on the temperature at which a record with this column (n,) is simulated."""
     low, high = float(np.min(temperature_degc)), float(np.max(temperature_degc))
     if not measured_on_case(temperature_degc):
-        return f"at {low:.4g} degC in every row, as its column states"
+        return f"at {low:.4g} degC in every row, as stated"
     return f"at its measured temperature, {range_words(f'{low:.1f}', f'{high:.1f}')} degC"
 
 

@@ -759,11 +759,7 @@ def test_the_temperature_that_a_prediction_is_made_at_is_said(model, data, tmp_p
         frame.assign(**columns).to_csv(tmp_path / f"{name}.csv", index=False)
         said = []
         predict_file(folder, tmp_path / f"{name}.csv", tmp_path / "out.csv", say_notes=said.extend)
-        words = (
-            "at 11 degC in every row, as its column states"
-            if columns
-            else "no temperature column; taken at 25 degC"
-        )
+        words = "at 11 degC in every row, as stated" if columns else "no temperature column; taken at 25 degC"
         assert any(note.startswith(f"{name}: {words}") for note in said)
 
 
@@ -1121,6 +1117,16 @@ def test_the_band_of_physics_alone_was_called_empty(model, record, tmp_path, ban
     assert pd.read_csv(tmp_path / "o.csv")["lower_v"].notna().all() == banded
     (told,) = [note for note in said if "no learnt correction" in note]
     assert told.endswith("lower_v and upper_v are empty.") != banded
+
+
+def test_an_uncertain_start_is_refused_for_a_model_without_bands(model, record, tmp_path):
+    without = replace(model, bands=None).save(tmp_path / "model")
+    asked = ProfileRequest(soc0=SOC0, soc0_sd=0.01)
+    with pytest.raises(
+        InputError, match=r"widens the band of a free run, and .*model has none; leave it out\."
+    ):
+        predict_file(without, record, tmp_path / "o.csv", asked)
+    assert not (tmp_path / "o.csv").exists()
 
 
 def test_a_record_that_the_band_holds_less_of_than_of_any_left_out_piece_is_told(model, data):

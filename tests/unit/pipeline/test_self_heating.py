@@ -62,7 +62,7 @@ def test_a_heat_capacity_that_counts_at_a_measured_case_was_told_to_add_nothing(
         said[factor] = run.series["temperature_k"][300], " ".join(told)
     assert said[0.5][0] > said[1.0][0] + 0.1
     assert "self_heating has nothing to add but the cell's heat capacity." in said[0.5][1]
-    stated = "at 30 degC in every row, as its column states, for its case: the winding is warmer under load"
+    stated = "at 30 degC in every row, as stated, for its case: the winding is warmer under load"
     assert f"{stated}; self_heating has nothing to add." in said[1.0][1]
 
 

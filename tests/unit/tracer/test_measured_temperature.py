@@ -28,7 +28,7 @@ def test_a_cold_record_is_explained_by_its_own_column(cell, make):
     found = discover(cell, [told], soc0=0.9, effects=TRIED)
     assert found.verdict.word == "none"
     assert "ambient_temperature" not in {c.effect for c in found.candidates}
-    assert any("simulated at 10 degC in every row, as its column states" in note for note in found.notes)
+    assert any("simulated at 10 degC in every row, as stated" in note for note in found.notes)
     untold = discover(cell, [replace(told, temperature_degc=None)], soc0=0.9, effects=TRIED)
     assert untold.verdict.effects == ("ambient_temperature",)
 
