@@ -36,6 +36,7 @@ from aesi.physics.effect import ActiveEffect, Record, as_cell_saw, instruments_f
 from aesi.physics.rest.open_circuit import (
     BEYOND_V,
     CHARGED_V,
+    GIVEN_BY,
     GIVEN_SD,
     GOOD_READING_V,
     READING_V,
@@ -64,10 +65,10 @@ of 1C off takes half an hour for it. Hours of C/50 and C/55 either way from 0.02
 1.5 and 1.1 deviations; as one rest, whatever they move, by 17 points and 120 deviations."""
 STEP_SD = 12.0**-0.5
 """Standard deviation of a value that is rounded to steps of one."""
-GIVE_IT = "; give --soc0{} if it is known"
+GIVE_IT = "; give {} if it is known"
 """Clause at the end of a sentence on an uncertain reading, where no state of charge was given."""
-OF_ONE = " FILE=SOC"
-"""How the option in it is given for one of several records."""
+OF_ONE = f"{GIVEN_BY} FILE=SOC"
+"""How a user gives the state of charge of one of several records."""
 FLOWED_BEFORE = (
     "as if a current had flowed before (the model begins at rest: if so, its first minutes are off)"
 )
@@ -125,17 +126,19 @@ def initial_state(
         soc0, shared = record.soc0, False
     if not len(record):
         raise DataError(f"{record.name} has no row to start from.")
+    option = OF_ONE if shared else GIVEN_BY
     active = instruments_first(checked_effects(effects))
     unknown = ~np.isfinite(record.voltage_v)
     if unknown[0]:
         if soc0 is None:
-            raise DataError(f"{record.name} has no voltage to start from; give --soc0.")
+            raise DataError(f"{record.name} has no voltage to start from; give {option}.")
         return _given(record, soc0, None)
     seen = _record_as_cell_saw(record, active, hold)
     if unknown.any():
         seen = seen.take(slice(0, int(np.argmax(unknown))))
-    advice = GIVE_IT.format(OF_ONE if shared else "") if soc0 is None else ""
-    start = _StartReading(cell, seen, hold, active, model, potentials_v, float(record.current_a[0]), advice)
+    advice = GIVE_IT.format(option) if soc0 is None else ""
+    first_a = float(record.current_a[0])
+    start = _StartReading(cell, seen, hold, active, model, potentials_v, first_a, option, advice)
     if soc0 is None:
         return start.read()
     try:
@@ -199,8 +202,8 @@ def _given(
 class _StartReading:
     """Reads the state of charge at the first row of one record, with the model of one cell and its effects.
 
-    record : as the cell saw it.  written_a : the first current as the file has it, A.  advice : clause at the end of a
-    sentence on an uncertain reading.
+    record : as the cell saw it.  written_a : the first current as the file has it, A.  option : by which a user gives
+    the state of charge instead.  advice : clause at the end of a sentence on an uncertain reading.
     """
 
     def __init__(
@@ -212,13 +215,14 @@ class _StartReading:
         model_name: ModelName,
         potentials_v: float,
         written_a: float,
+        option: str,
         advice: str,
     ) -> None:
         self.declared, self.record, self.effects = cell, record, effects
         self.model = model_with(cell, effects)
         self.cell = self.model.cell
         self.current_a, self.written_a = float(record.current_a[0]), written_a
-        self.open_circuit = OpenCircuit.at_start(self.cell, record, potentials_v)
+        self.open_circuit = OpenCircuit.at_start(self.cell, record, potentials_v, option)
         self.model_name, self.hold, self.advice = model_name, hold, advice
         self.load = LoadedStart(self.open_circuit, record, hold, model_name)
 
@@ -407,7 +411,7 @@ class _StartReading:
         return (
             f"; but by the potentials and the stoichiometry limits of the cell's file a state of charge of 1 rests at "
             f"{full_v:.3f} V, {off}: correct the cut-off, the potentials or the limits (aesi calibrate fits limits and "
-            "potentials), or give --soc0"
+            f"potentials), or give {self.open_circuit.given_by}"
         )
 
     def _in_declared_windows(self, soc: float) -> float:

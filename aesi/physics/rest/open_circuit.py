@@ -18,6 +18,8 @@ from aesi.records.checked import check_plain_volts, is_finite_number
 
 GIVEN_SD = 0.0005
 """Standard deviation of a state of charge that the user gives, and the smallest of any."""
+GIVEN_BY = "--soc0"
+"""Option by which a user gives a state of charge."""
 READING_V = 9e-3
 """Standard deviation of the open-circuit voltage of a cell file, V: RMS error of calibrated and published files on a
 measured drive (geometric mean of eight development records of `aesi bench real`)."""
@@ -64,14 +66,20 @@ class OpenCircuit:
     """The open-circuit voltage of a cell (effects folded in) at one temperature.
 
     kelvin : K; None is the cell file's initial temperature.  name : of the record whose voltages are read, if any.
-    potentials_v : V, standard deviation of this voltage.
+    potentials_v : V, standard deviation of this voltage.  given_by : option by which a user gives the state of charge
+    instead.
     Raises CellError where a potential is not finite within `SOC_BEYOND` of the cell's range.
     """
 
     def __init__(
-        self, cell: Cell, kelvin: float | None = None, name: str = "", potentials_v: float = READING_V
+        self,
+        cell: Cell,
+        kelvin: float | None = None,
+        name: str = "",
+        potentials_v: float = READING_V,
+        given_by: str = GIVEN_BY,
     ) -> None:
-        self.cell, self.name, self.potentials_v = cell, name, potentials_v
+        self.cell, self.name, self.potentials_v, self.given_by = cell, name, potentials_v, given_by
         self.kelvin = cell.initial_temperature_k if kelvin is None else kelvin
         self.soc = np.linspace(*aged_range(cell), GRID)
         ocv = _ocv(cell, self.soc, self.kelvin)
@@ -84,11 +92,13 @@ class OpenCircuit:
         self.ocv = np.maximum.accumulate(ocv)
 
     @classmethod
-    def at_start(cls, cell: Cell, record: Measurement, potentials_v: float = READING_V) -> OpenCircuit:
+    def at_start(
+        cls, cell: Cell, record: Measurement, potentials_v: float = READING_V, given_by: str = GIVEN_BY
+    ) -> OpenCircuit:
         """At the temperature of a record's first row, where it was measured."""
         degc = record.temperature_degc
         kelvin = None if degc is None else float(degc[0]) + ZERO_CELSIUS_K
-        return cls(cell, kelvin, record.name, potentials_v)
+        return cls(cell, kelvin, record.name, potentials_v, given_by)
 
     def soc_at(self, voltage_v: float) -> float:
         """State of charge at an open-circuit voltage (V), clipped to the range of the cell."""
@@ -114,7 +124,11 @@ class OpenCircuit:
         ):
             return self
         return OpenCircuit(
-            own.with_negative(**n).with_positive(**p), self.kelvin, self.name, self.potentials_v
+            own.with_negative(**n).with_positive(**p),
+            self.kelvin,
+            self.name,
+            self.potentials_v,
+            self.given_by,
         )
 
     def reread(self, other: OpenCircuit, soc: float, sd: float, higher_v: float) -> float:
@@ -167,7 +181,7 @@ class OpenCircuit:
             raise DataError(
                 f"{of_record}a rest voltage of {voltage_v:.4f} V lies outside [{low:.3f}, {high:.3f}] V, what "
                 f"the open-circuit potentials and stoichiometry limits of {self.cell.name} allow; check that the "
-                "record belongs to this cell, or give --soc0."
+                f"record belongs to this cell, or give {self.given_by}."
             )
         # Beyond full and empty the potentials say as little as they are far from it, and not that it is known.
         inside_v = float(np.clip(voltage_v, self.ocv[0], self.ocv[-1]))

@@ -553,6 +553,11 @@ def test_one_of_several_records_asks_for_its_own_state_of_charge():
     lfp = Cell.from_bpx(CELLS / "lfp_prada2013.bpx.json")
     flat = initial_state(lfp, resting(float(lfp.rest_voltage_v(0.5)[0])), shared=True)
     assert flat.sentence.endswith("; give --soc0 FILE=SOC if it is known.")
+    for unreadable in (resting(4.6), resting(np.nan)):
+        with pytest.raises(DataError, match=r"give --soc0 FILE=SOC\.$"):
+            initial_state(lfp, unreadable, shared=True)
+        with pytest.raises(DataError, match=r"give --soc0\.$"):
+            initial_state(lfp, unreadable)
 
 
 def test_a_rest_is_read_as_it_is_where_it_does_not_move():
